@@ -37,8 +37,11 @@ ORDERS = (1, 2, 3, 4)
 _BLUR, _SPACING, _EXTENT, _CUT = 0.45, 0.3, 2.5, 2.2
 #: Radii of the tables, over the blur.
 _PER_BLUR = 10
+#: Radial departures that move no voltage by this share of its noise are not told from angular ones.
+_RESOLVED = 0.1
 #: Expected sizes of an order, over the Gaussian's L2 norm.
-_STRENGTHS = np.geomspace(0.003, 2.0, 40)
+_STRENGTHS = np.geomspace(0.003, 2.0, 30)
+_FIRST, _SWEEPS = 0.1, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +103,10 @@ def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> Fl
 
 
 def angular_departures(
-    model: ForwardModel, fit: GaussianFit, weights: FloatArray, noise: float
+    model: ForwardModel, fit: GaussianFit, radial: FloatArray, weights: FloatArray, noise: float
 ) -> AngularDepartures:
     """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
+    # ``radial``: voltages of the fit's parameters and of all radial departures, shape (n, p).
     width = max(fit.sigma, 0.5 * model.points.step)
     radius = width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING)
     blur, extent = _BLUR * width, _EXTENT * width
@@ -111,12 +115,12 @@ def angular_departures(
     size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
     plain = replace(plain, amplitudes=tuple(size * a for a in plain.amplitudes))
     standardised = model.points.standardised
-    base = np.linalg.qr(standardised(fit.jacobian, weights))[0]
+    left, singular, _ = np.linalg.svd(standardised(radial, weights) / noise, full_matrices=False)
+    base = left[:, singular > _RESOLVED]
     data = standardised(model.points.u - fit.predicted, weights) / noise
     columns = standardised(plain.signal(model, fit.centre), weights) / noise
     data, columns = (values - base @ (base.T @ values) for values in (data, columns))
-    ends = np.cumsum([2 * a.shape[1] for a in plain.amplitudes])[:-1]
-    strengths = [_expected_strength(c, data) for c in np.split(columns, ends, axis=1)]
+    strengths = _expected_strengths(columns, data, [2 * a.shape[1] for a in plain.amplitudes])
     scaled = tuple(s * a for s, a in zip(strengths, plain.amplitudes, strict=True))
     return replace(plain, amplitudes=scaled)
 
@@ -140,11 +144,23 @@ def _unit_amplitudes(
     return tuple(amplitudes)
 
 
-def _expected_strength(columns: FloatArray, data: FloatArray) -> float:
-    """Root of the mean square of the strength over its posterior, for noise of one."""
-    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    power = (left.T @ data) ** 2
-    variance = 1 + np.multiply.outer(_STRENGTHS**2, singular**2)
-    log_marginal = -0.5 * np.sum(np.log(variance) + power / variance, axis=1)
-    probability = np.exp(log_marginal - log_marginal.max())
-    return float(np.sqrt(probability @ _STRENGTHS**2 / probability.sum()))
+def _expected_strengths(columns: FloatArray, data: FloatArray, counts: list[int]) -> FloatArray:
+    """Root mean squares of the strengths over their posterior, each given the others."""
+    # Beside an ellipse orders mix: its shift has one of 1 and one of 3.
+    square, along = columns.T @ columns, columns.T @ data
+    order, strengths = np.repeat(np.arange(len(counts)), counts), np.full(len(counts), _FIRST)
+
+    def log_marginal(trial: FloatArray) -> float:
+        size = trial[order]
+        root = np.linalg.cholesky(np.eye(size.size) + np.outer(size, size) * square)
+        explained = np.linalg.solve(root, size * along)
+        return float(0.5 * explained @ explained - np.log(np.diag(root)).sum())
+
+    for _ in range(_SWEEPS):
+        for i in range(strengths.size):
+            trials = np.tile(strengths, (_STRENGTHS.size, 1))
+            trials[:, i] = _STRENGTHS
+            logs = np.array([log_marginal(trial) for trial in trials])
+            probability = np.exp(logs - logs.max())
+            strengths[i] = np.sqrt(probability @ _STRENGTHS**2 / probability.sum())
+    return strengths

@@ -19,6 +19,7 @@ the sensor to the indenter,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ive, j0, j1
 
-from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.hankel import RadialSpectrum, bessel
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
@@ -37,8 +38,22 @@ class Geometry:
 
     radius: FloatArray  # (n,), in m
     towards: FloatArray  # (2, n): derivatives of the radius by the centre's x and y
-    bessel0: FloatArray  # (n, nodes)
-    bessel1: FloatArray
+    k: FloatArray  # (nodes,), in rad/m
+
+    @cached_property
+    def bessel0(self) -> FloatArray:
+        """Bessel function of order zero of all products k R, shape (n, nodes)."""
+        return self._of_products(j0)
+
+    @cached_property
+    def bessel1(self) -> FloatArray:
+        """The same of order one."""
+        return self._of_products(j1)
+
+    def _of_products(self, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        # Repeats share their positions: each Bessel function is computed once.
+        unique, back = np.unique(self.radius, return_inverse=True)
+        return np.asarray(function(np.multiply.outer(unique, self.k))[back])
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,16 +101,22 @@ class ForwardModel:
                     columns[-1][inside] = _unit_range(position[inside])
         return np.stack(columns, axis=1)
 
+    @cached_property
+    def elliptic_tables(self) -> tuple[FloatArray, list[FloatArray]]:
+        """Radii (t,) out to the scans' span, and Bessel functions of even order (t, nodes) there."""
+        points = self.points
+        span = float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
+        table = np.linspace(0.0, 2 * span, int(np.ceil(2 * span * self.k[-1] / _TABLE_PHASE)) + 4)
+        products = np.multiply.outer(table, self.k)
+        return table, [bessel(2 * m, products) for m in range(_HARMONICS)]
+
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
         centre = np.atleast_2d(centres)[self.points.scan].T
         dx, dy = self.points.x - centre[0], self.points.y - centre[1]
         radius = np.hypot(dx, dy)
-        # Repeats share their positions: each Bessel function is computed once.
-        unique, back = np.unique(radius, return_inverse=True)
-        argument = np.multiply.outer(unique, self.k)
         towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
-        return Geometry(radius, towards, j0(argument)[back], j1(argument)[back])
+        return Geometry(radius, towards, self.k)
 
     def cosines(self, centres: FloatArray) -> FloatArray:
         """Cosines between a channel's component and the points, for trial centres (m, 2)."""
@@ -137,8 +158,11 @@ class ForwardModel:
 
     def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""
-        shift, scan = self.shift_derivative(geometry, kernel), self.points.scan
-        free = np.argwhere(self.points.free)
+        return self.by_free_centres(self.shift_derivative(geometry, kernel))
+
+    def by_free_centres(self, shift: FloatArray) -> FloatArray:
+        """Derivatives by the free coordinates of all centres, (n, m), from those of points (2, n)."""
+        scan, free = self.points.scan, np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
     def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
@@ -176,21 +200,25 @@ def _unit_range(positions: FloatArray) -> FloatArray:
 #: An ellipse's response is a sum of so many harmonics, its derivatives are by centred differences.
 _HARMONICS = 5
 _LARGEST = 0.95
+#: Phase (rad) of the last wavenumber from one radius of a table to the next.
+_TABLE_PHASE = 0.2
 _STEP = 1e-4
 
 
 def elliptic_columns(
     model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
-) -> FloatArray:
-    """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2."""
+) -> tuple[FloatArray, FloatArray]:
+    """Response per A of an elliptic Gaussian and its derivatives by s, e1, e2; by the centre."""
+    # Shapes (n, 4), and (2, n) of each point's own centre.
     here = np.concatenate([[sigma], ellipticity])
-    harmonics = _bessel(geometry, model.k)
-    columns = [_response(model, geometry, harmonics, here)]
-    for step in np.diag([_STEP * sigma, _STEP, _STEP]):
-        above = _response(model, geometry, harmonics, here + step)
-        below = _response(model, geometry, harmonics, here - step)
-        columns.append((above - below) / (2 * step.sum()))
-    return np.stack(columns, axis=1)
+    steps = np.diag([_STEP * sigma, _STEP, _STEP])
+    places = [here, *(here + step for step in steps), *(here - step for step in steps)]
+    (values, *others), shift = _responses(model, geometry, places)
+    slopes = [
+        (above - below) / (2 * step.sum())
+        for above, below, step in zip(others[:3], others[3:], steps, strict=True)
+    ]
+    return np.stack([values, *slopes], axis=1), shift
 
 
 def elliptic_departure(
@@ -211,34 +239,34 @@ def _bounded(ellipticity: FloatArray) -> FloatArray:
     return np.asarray(ellipticity * min(1.0, _LARGEST / size) if size > 0 else ellipticity)
 
 
-def _response(
-    model: ForwardModel, geometry: Geometry, harmonics: list[FloatArray], place: FloatArray
-) -> FloatArray:
-    sigma, (e1, e2) = float(place[0]), _bounded(place[1:])
-    e = float(np.hypot(e1, e2))
-    half = 0.5 * (sigma * model.k) ** 2
-    # The derivatives of the radius by the centre point to it: their angle is the direction's.
-    angle = np.arctan2(-geometry.towards[1], -geometry.towards[0]) - 0.5 * np.arctan2(e2, e1)
-    total = np.zeros_like(geometry.radius)
-    for m, bessel in enumerate(harmonics):
-        kernel = ive(m, half * e) * np.exp(-half * (1 - e))
-        around = Geometry(geometry.radius, geometry.towards, bessel, bessel)
-        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * model.signal(around, kernel)
-    return total
+def _responses(
+    model: ForwardModel, geometry: Geometry, places: list[FloatArray]
+) -> tuple[list[FloatArray], FloatArray]:
+    """Responses (n,) of elliptic Gaussians, and the slopes (2, n) of the first by the centre."""
+    from scipy.interpolate import CubicSpline
 
-
-def _bessel(geometry: Geometry, k: FloatArray) -> list[FloatArray]:
-    """Bessel functions of even order by upward recurrence; at small arguments their first term."""
-    # Repeats share their positions.
-    unique, first, back = np.unique(geometry.radius, return_index=True, return_inverse=True)
-    x, factorial = np.multiply.outer(unique, k), 1.0
-    even, below, above = [geometry.bessel0], geometry.bessel0[first], geometry.bessel1[first]
-    for order in range(2, 2 * _HARMONICS):
-        small = x < 0.1 * order
-        safe = np.where(small, 1.0, x)
-        factorial *= order
-        series = (x / 2) ** order / factorial
-        below, above = above, np.where(small, series, 2 * (order - 1) / safe * above - below)
-        if order % 2 == 0:
-            even.append(above[back])
-    return even
+    points, count = model.points, len(places)
+    table, harmonics = model.elliptic_tables
+    radius, toward, across = geometry.radius, *geometry.towards
+    angle = np.arctan2(-across, -toward)
+    totals, slope, turn = np.zeros((count, radius.size)), np.zeros_like(radius), np.zeros_like(radius)
+    for m, bessel_ in enumerate(harmonics):
+        kernels, tilts = np.empty((model.k.size, count)), np.empty(count)
+        for i, (sigma, *e) in enumerate(places):
+            e1, e2 = _bounded(np.array(e))
+            half, size = 0.5 * (sigma * model.k) ** 2, float(np.hypot(e1, e2))
+            kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
+            tilts[i] = 0.5 * np.arctan2(e2, e1)
+        for scan, reference in enumerate(model.references):
+            rows = points.scan == scan
+            measure = reference.wavenumbers.weights * reference.values
+            spline = CubicSpline(table, bessel_ @ (measure[:, None] * kernels))
+            phase = 2 * m * np.subtract.outer(angle[rows], tilts)
+            load = (1 if m == 0 else 2) * points.load[rows]
+            profiles = spline(radius[rows])
+            totals[:, rows] += (load[:, None] * np.cos(phase) * profiles).T
+            slope[rows] += load * np.cos(phase[:, 0]) * spline(radius[rows], 1)[:, 0]
+            turn[rows] -= 2 * m * load * np.sin(phase[:, 0]) * profiles[:, 0]
+    around = np.stack([-geometry.towards[1], geometry.towards[0]])
+    turned = np.divide(turn, radius, out=np.zeros_like(turn), where=radius > 0)
+    return list(totals), geometry.towards * slope + around * turned

@@ -323,10 +323,13 @@ def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None
     geometry = model.geometry(centre)
     kernel, slope = (shape or _gaussian_shape)(model.k, sigma)
     if elliptic:
-        signal, widening, *ovals = elliptic_columns(model, geometry, sigma, ellipticity).T
+        columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
+        signal, widening, *ovals = columns.T
+        shift = model.by_free_centres(amplitude * shift)
     else:
+        shift = model.centre_derivative(geometry, amplitude * kernel)
         signal, widening, *ovals = model.signal(geometry, np.stack([kernel, slope], axis=1)).T
-    shift, baseline = model.centre_derivative(geometry, amplitude * kernel), model.drift_columns
+    baseline = model.drift_columns
     oval = [amplitude * column for column in ovals[:elliptic]]
     jacobian = np.column_stack([signal, amplitude * widening, shift, baseline, *oval])
     predicted = amplitude * signal + baseline @ drift

@@ -200,7 +200,8 @@ def estimate_profile(
         fit = fit_gaussian_to_points(ForwardModel(round_, references), weights, start=fit)
         if angular:
             noise = raster_noise(points, residual) or noise
-            around = angular_departures(model, fit, weights, noise)
+            radial = bayesian.departure_basis(model, fit, weights).signals(model, fit)
+            around = angular_departures(model, fit, radial, weights, noise)
         basis = bayesian.departure_basis(model, fit, weights, around)
         weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=noise)
         residual = weighed.residual
