@@ -81,8 +81,11 @@ def assemble(
     if plane is None:
         errors = np.sqrt(np.diag(results.radial_covariance))
         plane = np.interp(np.hypot.outer(g.y, g.x), g.r, errors)
+        scatter = None
+    else:
+        scatter, plane = plane
     return ApparatusFunction(
-        field=ApparatusField(g.x, g.y, g.image, plane),
+        field=ApparatusField(g.x, g.y, g.image, plane, scatter),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=_transfer(solution, results),
         reconvolution=_reconvolution(solution),

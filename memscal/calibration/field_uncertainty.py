@@ -42,7 +42,8 @@ def field_errors(
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
 ) -> FloatArray | None:
-    """Standard uncertainty of G on its grid (m, n), in 1/m^2; ``None`` of a field that is lifted."""
+    """Standard uncertainties of G on its grid (2, m, n), in 1/m^2: of noise alone, and in all."""
+    # Of a field that is lifted from a profile: ``None``.
     from scipy.interpolate import RectBivariateSpline
 
     fields, estimate, g = solution.fields, solution.estimate, deconvolution.g
@@ -59,9 +60,10 @@ def field_errors(
     )
     on_lattice[fields.confinement == 0] = 0.0
     changes = _divided if deconvolution.divided else _of_posterior
-    variance = changes(solution, deconvolution, kernels, on_lattice.ravel(), inputs)
-    errors = np.sqrt(np.maximum(variance, 0.0)).reshape(on_lattice.shape)
-    return np.maximum(RectBivariateSpline(y, x, errors)(g.y, g.x), 0.0)
+    variances = changes(solution, deconvolution, kernels, on_lattice.ravel(), inputs)
+    errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
+    planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
+    return np.maximum(planes, 0.0)
 
 
 def _kernels(estimate: ProfileEstimate, fields: RasterFields) -> FloatArray:
@@ -96,11 +98,14 @@ def _of_posterior(
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
-    """Variance of G (nodes,) by the covariance of the posterior's parameters, and inputs (n, q)."""
+    """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate, a = solution.estimate, deconvolution.conversion_constant
+    gain = estimate.weighed.gain
     rows = (kernels - np.outer(g, estimate.basis.integrals)) / a
-    variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
-    return np.asarray(variance + np.sum((rows @ (estimate.weighed.gain @ inputs)) ** 2, axis=1))
+    random = (gain * (estimate.noise**2 / estimate.outlier_weight)) @ gain.T
+    scatter = np.sum((rows @ random) * rows, axis=1)
+    rest = np.sum((rows @ (estimate.covariance - random)) * rows, axis=1)
+    return np.stack([scatter, rest + np.sum((rows @ (gain @ inputs)) ** 2, axis=1)])
 
 
 def _divided(
@@ -110,12 +115,12 @@ def _divided(
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
-    """Variance of G (nodes,) by a division: of noise, of inputs (n, q), of what it takes away."""
+    """Variances of G (2, nodes) by noise, and by inputs (n, q) and what a division takes away."""
     fields: Any = solution.fields
     estimate, smoothed = solution.estimate, solution.smoothed
     grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
     shape, taper = fields.confinement.shape, fields.confinement.ravel()
-    window, stress = deconvolution.quotient.window, rfft2(fields.stress.values)
+    window, stress = deconvolution.quotient.window, grid.forward(fields.stress.values)
     ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
     share = fields.share(smoothed)
     noise = estimate.noise**2 / estimate.outlier_weight
@@ -159,5 +164,5 @@ def _divided(
     hidden = np.column_stack([lost[:, -1], lost[:, :-1] @ square_root(estimate.covariance)])
     columns = np.hstack([changed(inputs), hidden])
     sums = np.append(of_a @ inputs, grid.cell_area * hidden.sum(axis=0))
-    variance += np.sum((columns - np.outer(g, sums)) ** 2, axis=1)
-    return np.asarray(variance / a**2)
+    rest = np.sum((columns - np.outer(g, sums)) ** 2, axis=1)
+    return np.stack([variance, rest]) / a**2

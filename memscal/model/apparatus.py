@@ -29,6 +29,7 @@ class ApparatusField(FrozenArrays):
     y: FloatArray
     g: FloatArray
     g_errors: FloatArray
+    g_scatter: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
