@@ -22,6 +22,8 @@ _LARGEST_RADIUS = 1.0
 #: What may be left of a stress at the end of its table.
 _DECAYED = 0.01
 _FEWEST_RADII = 4
+#: Positions of a field are even to this share of their step.
+_UNEVEN = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -75,7 +77,9 @@ class ApparatusFunction(Result, ApparatusData):
         """Return the standard uncertainty (k = 1) of :meth:`radial`, in 1/m^2."""
         return self._at(self.radial_profile.g_errors, r)
 
-    def convolve(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+    def convolve(
+        self, r: ArrayLike, sigma_zz: ArrayLike, *, y: ArrayLike | None = None
+    ) -> FloatArray:
         r"""Return :math:`G \otimes \sigma_{zz}`: a stress field as the sensor blurs it.
 
         Parameters
@@ -84,11 +88,15 @@ class ApparatusFunction(Result, ApparatusData):
             Increasing radii of the base stress, in m, from the axis to where it has decayed.
         sigma_zz : array_like, shape (n,)
             Normal stress at the base, in Pa; of a tangential channel the radial shear.
+        y : array_like, shape (m,), optional
+            With it ``sigma_zz`` is any field (m, n), on even positions ``y`` and ``x = r``, in m,
+            and G is that over the plane: what a point sensor would measure with the indenter at
+            each position is turned into what this sensor measures.
 
         Returns
         -------
-        ndarray, shape (n,)
-            The blurred stress at the same radii, in Pa.
+        ndarray, of the shape of ``sigma_zz``
+            The blurred stress at the same places, in Pa.
 
         Raises
         ------
@@ -96,6 +104,8 @@ class ApparatusFunction(Result, ApparatusData):
             If the table is not in metres, is coarser than G, begins off the axis, or ends
             before the stress has decayed.
         """
+        if y is not None:
+            return self._convolved_field(r, y, sigma_zz)
         radii, stress = self._checked(r, sigma_zz)
         profile = self.radial_profile
         # G is zero beyond the last wavenumber of its grid.
@@ -105,12 +115,14 @@ class ApparatusFunction(Result, ApparatusData):
         blurred = kernel * hankel_transform(radii, stress, wavenumbers.k, order=self.order)
         return wavenumbers.synthesise(blurred, radii, order=self.order)
 
-    def predict(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+    def predict(
+        self, r: ArrayLike, sigma_zz: ArrayLike, *, y: ArrayLike | None = None
+    ) -> FloatArray:
         r"""Return the voltage :math:`A\,G \otimes \sigma_{zz}` of a base stress, in V.
 
         Parameters and errors are those of :meth:`convolve`.
         """
-        return self.conversion_constant * self.convolve(r, sigma_zz)
+        return self.conversion_constant * self.convolve(r, sigma_zz, y=y)
 
     def convolve_uncertainty(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
         r"""Return the standard uncertainty of :meth:`convolve` that G brings, in Pa.
@@ -177,6 +189,69 @@ class ApparatusFunction(Result, ApparatusData):
         operator = (bessel(np.multiply.outer(radii, wavenumbers.k)) * field) @ kernel
         return operator, operator @ profile.g
 
+    def _convolved_field(self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+        """Convolve a field with G over the plane, on the field's own lattice."""
+        from scipy.interpolate import RectBivariateSpline
+        from scipy.signal import fftconvolve
+
+        if self.order:
+            raise InputError(
+                f"Channel {self.sensor.channel} measures a component of a vector field.",
+                cure="Give the radial profile of the shear, without y.",
+            )
+        stress, g, offsets = np.asarray(sigma_zz, dtype=np.float64), self.field, []
+        if stress.ndim != 2 or not np.isfinite(stress).all():
+            raise InputError("sigma_zz is no field (y, x) of finite stresses.")
+        for name, values, size in (("x", x, stress.shape[-1]), ("y", y, len(stress))):
+            axis = finite_vector(name, values)
+            step = float(np.ptp(axis)) / max(axis.size - 1, 1)
+            require_increasing(name, axis)
+            if axis.size != size:
+                raise InputError(
+                    f"sigma_zz has shape {stress.shape}, but there are {axis.size} positions along "
+                    f"{name}.",
+                    cure="Give a field of shape (y, x).",
+                )
+            if np.abs(np.diff(axis) - step).max() > _UNEVEN * step:
+                raise InputError(
+                    f"The positions along {name} are not even.",
+                    why="The field is convolved on its own lattice.",
+                    cure="Interpolate it to even positions.",
+                )
+            self._require_fine(step)
+            reach = int(max(np.abs(getattr(g, name)).max() / step, 1))
+            offsets.append(step * np.arange(-reach, reach + 1))
+        edge = max(np.abs(side).max() for side in (stress[[0, -1]], stress[:, [0, -1]]))
+        self._require_decayed(float(edge / np.abs(stress).max()), "the edge of the field")
+        outside = [(abs(o) > abs(a).max()) for o, a in zip(offsets, (g.x, g.y), strict=True)]
+        kernel = RectBivariateSpline(g.y, g.x, g.g)(offsets[1], offsets[0])
+        kernel[outside[1]], kernel[:, outside[0]] = 0.0, 0.0
+        cell = float((offsets[0][1] - offsets[0][0]) * (offsets[1][1] - offsets[1][0]))
+        # The kernel has its zero in the middle, and may be larger than the field.
+        rows, columns = len(kernel) // 2, kernel.shape[1] // 2
+        blurred = fftconvolve(stress, kernel) * cell
+        return np.asarray(
+            blurred[rows : rows + stress.shape[0], columns : columns + stress.shape[1]]
+        )
+
+    def _require_fine(self, step: float) -> None:
+        """Refuse a stress whose step (m) does not resolve G."""
+        if step > self.gaussian_sigma / 2:
+            raise InputError(
+                f"The stress is given every {step * 1e3:.3g} mm, coarser than half the "
+                f"width of the apparatus function ({self.gaussian_sigma * 1e3:.3g} mm).",
+                cure="Give the stress on a finer grid.",
+            )
+
+    def _require_decayed(self, left: float, end: str) -> None:
+        """Refuse a stress of which a share is left at its end."""
+        if left > _DECAYED:
+            raise InputError(
+                f"{left:.1%} of the largest stress is left at {end}.",
+                why="A convolution needs the stress out to where it has decayed.",
+                cure="Extend the table.",
+            )
+
     def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:
         radii = np.abs(np.asarray(r, dtype=np.float64))
         if np.isnan(radii).any():
@@ -205,19 +280,10 @@ class ApparatusFunction(Result, ApparatusData):
         peak = float(np.abs(stress).max())
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
         coarse = float(np.diff(radii)[strong].max(initial=0.0))
-        if coarse > self.gaussian_sigma / 2:
-            raise InputError(
-                f"The stress is given every {coarse * 1e3:.3g} mm, coarser than half the "
-                f"width of the apparatus function ({self.gaussian_sigma * 1e3:.3g} mm).",
-                cure="Give the stress on a finer grid.",
-            )
-        if abs(stress[-1]) > _DECAYED * peak:
-            raise InputError(
-                f"{abs(stress[-1]) / peak:.1%} of the largest stress is left at the end of the "
-                f"table, r = {radii[-1] * 1e3:.4g} mm.",
-                why="A convolution needs the stress out to where it has decayed.",
-                cure="Extend the table.",
-            )
+        self._require_fine(coarse)
+        self._require_decayed(
+            float(abs(stress[-1])) / peak, f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
+        )
         return radii, stress
 
 
