@@ -221,18 +221,16 @@ class ApparatusFunction(Result, ApparatusData):
             self._require_fine(step)
             reach = int(max(np.abs(getattr(g, name)).max() / step, 1))
             offsets.append(step * np.arange(-reach, reach + 1))
-        edge = max(np.abs(side).max() for side in (stress[[0, -1]], stress[:, [0, -1]]))
-        self._require_decayed(float(edge / np.abs(stress).max()), "the edge of the field")
+        edge = max(float(np.abs(stress[[0, -1]]).max()), float(np.abs(stress[:, [0, -1]]).max()))
+        self._require_decayed(edge / float(np.abs(stress).max()), "the edge of the field")
         outside = [(abs(o) > abs(a).max()) for o, a in zip(offsets, (g.x, g.y), strict=True)]
         kernel = RectBivariateSpline(g.y, g.x, g.g)(offsets[1], offsets[0])
         kernel[outside[1]], kernel[:, outside[0]] = 0.0, 0.0
         cell = float((offsets[0][1] - offsets[0][0]) * (offsets[1][1] - offsets[1][0]))
         # The kernel has its zero in the middle, and may be larger than the field.
-        rows, columns = len(kernel) // 2, kernel.shape[1] // 2
-        blurred = fftconvolve(stress, kernel) * cell
-        return np.asarray(
-            blurred[rows : rows + stress.shape[0], columns : columns + stress.shape[1]]
-        )
+        first_y, first_x = len(kernel) // 2, kernel.shape[-1] // 2
+        last_y, last_x = first_y + len(stress), first_x + stress.shape[1]
+        return np.asarray(fftconvolve(stress, kernel)[first_y:last_y, first_x:last_x] * cell)
 
     def _require_fine(self, step: float) -> None:
         """Refuse a stress whose step (m) does not resolve G."""

@@ -157,7 +157,8 @@ def _divided(
     of_a = grid.cell_area * (share * back[fields.index] + (taper @ beside) @ gain)
 
     def changed(voltages: FloatArray) -> FloatArray:
-        return taper[:, None] * (filtered(placed(voltages)) + beside @ (gain @ voltages))
+        fitted = beside @ (gain @ voltages)
+        return np.asarray(taper[:, None] * (filtered(placed(voltages)) + fitted))
 
     with_a = changed((noise * of_a)[:, None])[:, 0]
     variance = taper**2 * variance - 2 * g * with_a + g**2 * float(of_a**2 @ noise)

@@ -56,7 +56,7 @@ class AngularDepartures:
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return 2 * sum(amplitudes.shape[1] for amplitudes in self.amplitudes)
+        return sum(2 * amplitudes.shape[1] for amplitudes in self.amplitudes)
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Kernels at positions from the centre, shape (n,), in m: (n, count), in V/Pa/m^2."""
@@ -74,15 +74,13 @@ class AngularDepartures:
             k, table = model.k, self._table(float(np.hypot(x, y).max(initial=self.blur)))
             blurred = (np.exp(-0.5 * (self.blur * k) ** 2) * reference.values)[:, None]
             nodes, across = reference.wavenumbers, np.multiply.outer(k, self.radius)
-            radial = [
-                nodes.synthesise(blurred * bessel(m, across), table, order=m) for m in ORDERS
-            ]
+            radial = [nodes.synthesise(blurred * bessel(m, across), table, order=m) for m in ORDERS]
             columns[rows] = points.load[rows, None] * self._around(x, y, table, radial)
         return columns
 
     def _table(self, reach: float) -> FloatArray:
-        step = self.blur / _PER_BLUR
-        return step * np.arange(int(np.ceil(reach / step)) + 4)
+        intervals = int(np.ceil(reach * _PER_BLUR / self.blur)) + 3
+        return np.linspace(0.0, intervals * self.blur / _PER_BLUR, intervals + 1)
 
     def _around(
         self, x: FloatArray, y: FloatArray, table: FloatArray, radial: list[FloatArray]

@@ -163,7 +163,7 @@ class DepartureBasis:
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
     families: tuple[FamilyFit, ...]  # as many as fit the scan
     # The last of the flat parameters have a prior of unit variance: amplitudes of these kernels.
-    angular: AngularDepartures | None = None
+    angular: AngularDepartures | None
 
     @property
     def blocks(self) -> tuple[slice, ...]:

@@ -103,7 +103,7 @@ class ForwardModel:
 
     @cached_property
     def elliptic_tables(self) -> tuple[FloatArray, list[FloatArray]]:
-        """Radii (t,) out to the scans' span, and Bessel functions of even order (t, nodes) there."""
+        """Radii (t,) out to twice the span, and Bessel functions of even order there, (t, nodes)."""
         points = self.points
         span = float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
         table = np.linspace(0.0, 2 * span, int(np.ceil(2 * span * self.k[-1] / _TABLE_PHASE)) + 4)
@@ -161,7 +161,7 @@ class ForwardModel:
         return self.by_free_centres(self.shift_derivative(geometry, kernel))
 
     def by_free_centres(self, shift: FloatArray) -> FloatArray:
-        """Derivatives by the free coordinates of all centres, (n, m), from those of points (2, n)."""
+        """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""
         scan, free = self.points.scan, np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
@@ -249,7 +249,7 @@ def _responses(
     table, harmonics = model.elliptic_tables
     radius, toward, across = geometry.radius, *geometry.towards
     angle = np.arctan2(-across, -toward)
-    totals, slope, turn = np.zeros((count, radius.size)), np.zeros_like(radius), np.zeros_like(radius)
+    totals, (slope, turn) = np.zeros((count, radius.size)), np.zeros((2, radius.size))
     for m, bessel_ in enumerate(harmonics):
         kernels, tilts = np.empty((model.k.size, count)), np.empty(count)
         for i, (sigma, *e) in enumerate(places):

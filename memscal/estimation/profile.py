@@ -223,7 +223,7 @@ def _outliers(
     points: ScanPoints, residual: FloatArray, stated: FloatArray, threshold: float
 ) -> FloatArray:
     """Weights of the points by their residuals; over the plane by what neighbours do not share."""
-    least = np.finfo(float).tiny
+    least = float(np.finfo(float).tiny)
     if points.planar:
         least = float(robust_scale(residual * np.sqrt(stated)))
         residual = isolated(points, residual)

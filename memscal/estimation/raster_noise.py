@@ -72,7 +72,8 @@ def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
     for scan in range(points.scans):
         rows = np.flatnonzero(points.scan == scan)
         places = np.stack([points.x[rows], points.y[rows]], axis=1)
-        nearest = KDTree(places).query(places, k=min(_NEIGHBOURS + 1, rows.size))[1][:, 1:]
+        count = min(_NEIGHBOURS + 1, rows.size)
+        nearest = np.asarray(KDTree(places).query(places, k=count)[1])[:, 1:]
         around = np.median(residual[rows][nearest], axis=1)
         left = residual[rows] - around
         same = left * residual[rows] > 0

@@ -245,6 +245,8 @@ def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
 #: A spectral component is relevant while it stands this many times above its noise: with the
 #: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
 RELEVANT = 15.0
+#: ...of a raster, which has as many components as points, they are about equal at this one...
+RELEVANT_OF_RASTER = 6.0
 #: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.
 RESOLVED = 3.0
 
@@ -267,7 +269,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     """Find the band of a scan, of a tangential channel (nothing to divide) by its estimate."""
     k, yardstick = estimate.model.k, gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
     reference = np.abs(estimate.model.reference.values)
-    error = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny)
+    error, clear = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny), RELEVANT
     if smoothed is None:
         signal = np.abs(estimate.spectrum.values)
         noise = error * estimate.conversion_constant * reference
@@ -275,13 +277,13 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
         # Of all points of a raster the noise is equal at all wavenumbers.
         share = points.cell / points.of_places("readings") * estimate.outlier_weight
         noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
-        signal = np.abs(smoothed.spectrum.values)
+        signal, clear = np.abs(smoothed.spectrum.values), RELEVANT_OF_RASTER
     else:
         signal, noise = np.abs(smoothed.spectrum.values), smoothed.noise
     noise = np.maximum(noise, np.finfo(float).tiny)
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
     sampled = np.pi / estimate.points.step
-    relevant = min(_falls_below(k, signal / noise, RELEVANT), sampled)
+    relevant = min(_falls_below(k, signal / noise, clear), sampled)
     ratio = yardstick / error
     lost = np.flatnonzero(ratio < RESOLVED)
     end = int(lost[0]) + 1 if lost.size else k.size

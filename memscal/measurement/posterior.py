@@ -168,7 +168,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     fit = _fit(shape, model, weights, start.gaussian)
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
-    basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), shape)
+    basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
     weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
     kernels = basis.kernels(model.k)
     rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])

@@ -57,7 +57,9 @@ def clean_raster(
     size = 2 * count
     product = rfft2(at(np.hypot.outer(axis, axis)), (size, size)) * rfft2(g, (size, size))
     field = irfft2(product)[count // 2 :, count // 2 :][:count, :count] * step**2
-    inside = np.arange(count // 2 - finer * (side // 2), count // 2 + finer * (side // 2) + 1, finer)
+    inside = np.arange(
+        count // 2 - finer * (side // 2), count // 2 + finer * (side // 2) + 1, finer
+    )
     return np.asarray(CONVERSION * field[np.ix_(inside, inside)])
 
 
