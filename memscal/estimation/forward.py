@@ -103,7 +103,7 @@ class ForwardModel:
 
     @cached_property
     def elliptic_tables(self) -> tuple[FloatArray, list[FloatArray]]:
-        """Radii (t,) out to twice the span, and Bessel functions of even order there, (t, nodes)."""
+        """Radii (t,) to twice the span, and Bessel functions of even order there, (t, nodes)."""
         points = self.points
         span = float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
         table = np.linspace(0.0, 2 * span, int(np.ceil(2 * span * self.k[-1] / _TABLE_PHASE)) + 4)

@@ -47,19 +47,28 @@ def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian() -> None:
     scan = elliptic_scan(e, noise=0.0)
     estimate = estimated(simulated(raster=True, points=17, half_range=4e-3))
     geometry = estimate.model.geometry(np.array([0.15e-3, 0.15e-3]))
-    found = CONVERSION * elliptic_columns(estimate.model, geometry, SIGMA, np.array(e))[:, 0]
+    found = CONVERSION * elliptic_columns(estimate.model, geometry, SIGMA, np.array(e))[0][:, 0]
     np.testing.assert_allclose(found, scan.u_zz.ravel(), atol=2e-4 * scan.u_zz.max())
 
 
 def test_the_columns_are_the_derivatives_of_the_response() -> None:
     estimate = estimated(simulated(raster=True, points=13))
-    geometry, here = estimate.gaussian.geometry, np.array([0.2, -0.1])
-    columns = elliptic_columns(estimate.model, geometry, SIGMA, here)
+    geometry, here = estimate.model.geometry(estimate.centres), np.array([0.2, -0.1])
+    columns, shift = elliptic_columns(estimate.model, geometry, SIGMA, here)
     for i, step in ((2, np.array([1e-3, 0.0])), (3, np.array([0.0, 1e-3]))):
-        above = elliptic_columns(estimate.model, geometry, SIGMA, here + step)[:, 0]
-        below = elliptic_columns(estimate.model, geometry, SIGMA, here - step)[:, 0]
+        above = elliptic_columns(estimate.model, geometry, SIGMA, here + step)[0][:, 0]
+        below = elliptic_columns(estimate.model, geometry, SIGMA, here - step)[0][:, 0]
         slope = (above - below) / 2e-3
         np.testing.assert_allclose(columns[:, i], slope, atol=1e-4 * np.abs(slope).max())
+    for i, step in enumerate(1e-6 * np.eye(2)):
+        above, below = (
+            elliptic_columns(
+                estimate.model, estimate.model.geometry(estimate.centres + way), SIGMA, here
+            )[0][:, 0]
+            for way in (step, -step)
+        )
+        slope = (above - below) / 2e-6
+        np.testing.assert_allclose(shift[i], slope, atol=1e-4 * np.abs(slope).max())
 
 
 def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
