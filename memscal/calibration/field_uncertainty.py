@@ -102,7 +102,8 @@ def _of_posterior(
     estimate, a = solution.estimate, deconvolution.conversion_constant
     gain = estimate.weighed.gain
     rows = (kernels - np.outer(g, estimate.basis.integrals)) / a
-    random = (gain * (estimate.noise**2 / estimate.outlier_weight)) @ gain.T
+    scattered = estimate.scattered(gain)
+    random = scattered @ scattered.T
     scatter = np.sum((rows @ random) * rows, axis=1)
     rest = np.sum((rows @ (estimate.covariance - random)) * rows, axis=1)
     return np.stack([scatter, rest + np.sum((rows @ (gain @ inputs)) ** 2, axis=1)])

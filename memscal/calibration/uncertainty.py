@@ -277,7 +277,7 @@ def propagate(
     parts = [*(derivatives for _, derivatives in numbers.values()), kernel[1:]]
     by_voltage = np.vstack([part.by_voltage for part in parts])
     columns = {
-        "noise": by_voltage @ estimate.noise_root,
+        "noise": estimate.scattered(by_voltage),
         "regularisation": np.vstack([part.by_state for part in parts]) @ _fixed_root(estimate),
         "window": np.vstack([part.hidden for part in parts]),
     }
@@ -529,11 +529,10 @@ def route_difference(solution: Solution) -> float | None:
     linear = _division_map(solution, smoothed, division, np.zeros(0))
     changes = linear.signals[:, 1:].copy()
     changes[:, linear.places] += linear.nuisance
-    fitted = changes @ estimate.weighed.gain
-    roots = [estimate.noise_root - fitted @ estimate.noise_root, changes @ _fixed_root(estimate)]
-    residual = estimate.points.u - estimate.predicted
-    difference = linear.direct @ (residual + estimate.oval)
-    variance = np.sum((linear.direct @ np.hstack(roots)) ** 2, axis=1)
+    moved = linear.direct @ changes
+    noise = estimate.scattered(linear.direct) - moved @ estimate.scattered(estimate.weighed.gain)
+    difference = linear.direct @ (estimate.points.u - estimate.predicted)
+    variance = np.sum(np.hstack([noise, moved @ _fixed_root(estimate)]) ** 2, axis=1)
     rings = ring_areas(division.g.r)
     of_a = abs(difference[0]) / np.sqrt(variance[0])
     of_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
@@ -576,7 +575,7 @@ def _misfit_columns(estimate: ProfileEstimate, gain: FloatArray) -> FloatArray:
 
 def _fixed_root(estimate: ProfileEstimate) -> FloatArray:
     """Square root of what of the posterior's covariance does not scatter from scan to scan."""
-    random = estimate.weighed.gain @ estimate.noise_root
+    random = estimate.scattered(estimate.weighed.gain)
     return square_root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
 
 

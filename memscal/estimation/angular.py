@@ -40,8 +40,8 @@ _PER_BLUR = 10
 #: Radial departures that move no voltage by this share of its noise are not told from angular ones.
 _RESOLVED = 0.1
 #: Expected sizes of an order, over the Gaussian's L2 norm.
-_STRENGTHS = np.geomspace(0.003, 2.0, 30)
-_FIRST, _SWEEPS = 0.1, 3
+_STRENGTHS = np.geomspace(0.003, 2.0, 16)
+_FIRST, _SWEEPS = 0.1, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +71,15 @@ class AngularDepartures:
         for scan, reference in enumerate(model.references):
             rows = points.scan == scan
             x, y = points.x[rows] - centres[scan, 0], points.y[rows] - centres[scan, 1]
-            k, table = model.k, self._table(float(np.hypot(x, y).max(initial=self.blur)))
-            blurred = (np.exp(-0.5 * (self.blur * k) ** 2) * reference.values)[:, None]
-            nodes, across = reference.wavenumbers, np.multiply.outer(k, self.radius)
-            radial = [nodes.synthesise(blurred * bessel(m, across), table, order=m) for m in ORDERS]
+            k, tables = model.k, [model.table(m) for m in ORDERS]
+            measure = reference.wavenumbers.weights * reference.values
+            measure = measure * np.exp(-0.5 * (self.blur * k) ** 2)
+            rings = np.multiply.outer(k, self.radius)
+            radial = [
+                matrix @ (measure[:, None] * bessel(m, rings))
+                for m, (_, matrix) in zip(ORDERS, tables, strict=True)
+            ]
+            table = tables[0][0]
             columns[rows] = points.load[rows, None] * self._around(x, y, table, radial)
         return columns
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,14 +101,12 @@ class ForwardModel:
                     columns[-1][inside] = _unit_range(position[inside])
         return np.stack(columns, axis=1)
 
-    @cached_property
-    def elliptic_tables(self) -> tuple[FloatArray, list[FloatArray]]:
-        """Radii (t,) to twice the span, and Bessel functions of even order there, (t, nodes)."""
-        points = self.points
-        span = float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
-        table = np.linspace(0.0, 2 * span, int(np.ceil(2 * span * self.k[-1] / _TABLE_PHASE)) + 4)
-        products = np.multiply.outer(table, self.k)
-        return table, [bessel(2 * m, products) for m in range(_HARMONICS)]
+    def table(self, order: int) -> tuple[FloatArray, FloatArray]:
+        """Radii (t,) that reach beyond the scans, and a Bessel function there, (t, nodes)."""
+        span = np.hypot(np.ptp(self.points.x), np.ptp(self.points.y))
+        # Rounded up, so that parts of one raster share their tables.
+        reach = 1.25e-3 * np.ceil(1e3 * span)
+        return bessel_table(order, float(reach), self.k.tobytes())
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
@@ -187,6 +185,14 @@ class ForwardModel:
         return [(self.points.scan == i, measure) for i, measure in enumerate(measures)]
 
 
+@lru_cache(maxsize=32)
+def bessel_table(order: int, reach: float, nodes: bytes) -> tuple[FloatArray, FloatArray]:
+    """Even radii out to ``reach`` (m), and a Bessel function there for wavenumbers, (t, nodes)."""
+    k = np.frombuffer(nodes)
+    radii = np.linspace(0.0, reach, int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 4)
+    return radii, bessel(order, np.multiply.outer(radii, k))
+
+
 def _unit_range(positions: FloatArray) -> FloatArray:
     middle = (positions.max() + positions.min()) / 2
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
@@ -201,7 +207,7 @@ def _unit_range(positions: FloatArray) -> FloatArray:
 _HARMONICS = 5
 _LARGEST = 0.95
 #: Phase (rad) of the last wavenumber from one radius of a table to the next.
-_TABLE_PHASE = 0.2
+_TABLE_PHASE = 0.25
 _STEP = 1e-4
 
 
@@ -246,11 +252,11 @@ def _responses(
     from scipy.interpolate import CubicSpline
 
     points, count = model.points, len(places)
-    table, harmonics = model.elliptic_tables
     radius, toward, across = geometry.radius, *geometry.towards
     angle = np.arctan2(-across, -toward)
     totals, (slope, turn) = np.zeros((count, radius.size)), np.zeros((2, radius.size))
-    for m, bessel_ in enumerate(harmonics):
+    for m in range(_HARMONICS):
+        table, matrix = model.table(2 * m)
         kernels, tilts = np.empty((model.k.size, count)), np.empty(count)
         for i, (sigma, *e) in enumerate(places):
             e1, e2 = _bounded(np.array(e))
@@ -260,7 +266,7 @@ def _responses(
         for scan, reference in enumerate(model.references):
             rows = points.scan == scan
             measure = reference.wavenumbers.weights * reference.values
-            spline = CubicSpline(table, bessel_ @ (measure[:, None] * kernels))
+            spline = CubicSpline(table, matrix @ (measure[:, None] * kernels))
             phase = 2 * m * np.subtract.outer(angle[rows], tilts)
             load = (1 if m == 0 else 2) * points.load[rows]
             profiles = spline(radius[rows])

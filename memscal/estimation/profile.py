@@ -58,9 +58,12 @@ class ProfileEstimate:
     @property
     def noise_root(self) -> FloatArray:
         """Square root of the voltages' covariance, shape (n, n), in V."""
-        factor = self.points.decorrelation
-        root = np.diag(self.noise / np.sqrt(self.outlier_weight))
-        return root if factor is None else root @ np.linalg.inv(factor)
+        return self.scattered(np.eye(self.noise.size))
+
+    def scattered(self, rows: FloatArray) -> FloatArray:
+        """Rows (m, n) times the square root of the voltages' covariance: columns of a root."""
+        scaled, factor = rows * (self.noise / self.outlier_weight**0.5), self.points.decorrelation
+        return np.asarray(scaled if factor is None else scaled @ np.linalg.inv(factor))
 
     @property
     def noise_scale(self) -> float:

@@ -82,7 +82,7 @@ class SmoothedProfile:
     def noise(self) -> FloatArray:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
         floor = _FLOOR_OF_NOISE * float(np.abs(self.signal).max())
-        electronic = np.sum((self.gain @ self.estimate.noise_root) ** 2, axis=1)
+        electronic = np.sum(self.estimate.scattered(self.gain) ** 2, axis=1)
         return np.asarray(np.sqrt(electronic + floor**2 * np.sum(self.gain**2, axis=1)))
 
 
@@ -118,7 +118,7 @@ def _joined(
     first, gain = gains[0]
     if len(gains) == 1:
         return gain
-    variances = [np.sum((g @ estimate.noise_root) ** 2, axis=1) for _, g in gains]
+    variances = [np.sum(estimate.scattered(g) ** 2, axis=1) for _, g in gains]
     pairs = list(zip(gains, variances, strict=True))
     above = np.sum([(stress / v)[:, None] * g for (stress, g), v in pairs], axis=0)
     below = np.sum([stress**2 / v for (stress, _), v in pairs], axis=0)
