@@ -246,7 +246,7 @@ def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) 
         return fields.at_points(back.values) * estimate.points.load
     k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)
     spectrum = np.interp(estimate.model.k, k, kernel, right=0.0)
-    return estimate.model.signal(estimate.gaussian.geometry, spectrum)
+    return estimate.model.signal(estimate.gaussian.geometry, spectrum) + estimate.oval
 
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:

@@ -13,9 +13,9 @@ and their convolution with a round base stress is
 :math:`\cos m\theta\,\frac{1}{2\pi}\int J_m(kq)\,e^{-b^2k^2/2}\,\hat\sigma(k)\,J_m(kR)\,k\,dk`.
 None has an integral: they do not change A.
 
-Order 1 leaves out a shift of the Gaussian, which is the centre's, and order 2 its ellipse: both are
-parameters without a prior.  The expected size of each order is the mean over its posterior, with a
-flat prior of its logarithm.
+Order 1 leaves out what the scan cannot tell from a shift of the Gaussian, which is the centre's,
+and order 2 what it cannot tell from its ellipse: both are parameters without a prior.  The expected
+size of each order is the root mean square over its posterior, its logarithm with a flat prior.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ import numpy as np
 from scipy.special import ive
 
 from memscal.axisymmetry.hankel import bessel
-from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
@@ -50,13 +49,13 @@ class AngularDepartures:
 
     radius: FloatArray  # (q,): of the rings, in m
     blur: float  # in m
-    #: (q, m) of each of ORDERS: amplitudes of the rings in each kernel, in V/Pa.
+    #: (q, m) of each cosine and sine of ORDERS: amplitudes of the rings in each kernel, in V/Pa.
     amplitudes: tuple[FloatArray, ...]
 
     @property
     def count(self) -> int:
         """How many kernels there are."""
-        return sum(2 * amplitudes.shape[1] for amplitudes in self.amplitudes)
+        return sum(amplitudes.shape[1] for amplitudes in self.amplitudes)
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Kernels at positions from the centre, shape (n,), in m: (n, count), in V/Pa/m^2."""
@@ -93,9 +92,10 @@ class AngularDepartures:
         from scipy.interpolate import CubicSpline
 
         r, angle, blocks = np.hypot(x, y), np.arctan2(y, x), []
-        for m, rings, amplitudes in zip(ORDERS, radial, self.amplitudes, strict=True):
-            values = CubicSpline(table, rings @ amplitudes)(r)
-            blocks += [np.cos(m * angle)[:, None] * values, np.sin(m * angle)[:, None] * values]
+        for i, (m, rings) in enumerate(zip(ORDERS, radial, strict=True)):
+            values = CubicSpline(table, rings)(r)
+            both = zip((np.cos, np.sin), self.amplitudes[2 * i : 2 * i + 2], strict=True)
+            blocks += [turn(m * angle)[:, None] * (values @ each) for turn, each in both]
         return np.hstack(blocks)
 
 
@@ -112,46 +112,48 @@ def angular_departures(
     # ``radial``: voltages of the fit's parameters and of all radial departures, shape (n, p).
     width = max(fit.sigma, 0.5 * model.points.step)
     radius = width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING)
-    blur, extent = _BLUR * width, _EXTENT * width
-    r = np.linspace(0.0, 2 * _CUT * extent, 800)
-    plain = AngularDepartures(radius, blur, _unit_amplitudes(r, radius, blur, extent, width))
     size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
-    plain = replace(plain, amplitudes=tuple(size * a for a in plain.amplitudes))
-    standardised = model.points.standardised
-    left, singular, _ = np.linalg.svd(standardised(radial, weights) / noise, full_matrices=False)
+    amplitudes = [np.diag(size * each) for each in _unit_amplitudes(radius, width)]
+    plain = AngularDepartures(radius, _BLUR * width, tuple(np.repeat(amplitudes, 2, axis=0)))
+
+    def standardised(values: FloatArray) -> FloatArray:
+        return model.points.standardised(values, weights) / noise
+
+    columns, flat = standardised(plain.signal(model, fit.centre)), standardised(fit.jacobian)
+    # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
+    axis = np.nonzero(model.points.free)[1]
+    shifts = flat[:, 2 : 2 + axis.size] @ np.eye(2)[axis]
+    moved, kept = [*shifts.T, *flat[:, flat.shape[1] - 2 :].T], []
+    for column, block in zip(moved, np.split(columns, 2 * len(ORDERS), axis=1), strict=False):
+        kept.append(np.linalg.svd((column @ block)[None, :])[2][1:].T)
+    kept += [np.eye(radius.size)] * (2 * len(ORDERS) - len(kept))
+    left, singular, _ = np.linalg.svd(standardised(radial), full_matrices=False)
     base = left[:, singular > _RESOLVED]
-    data = standardised(model.points.u - fit.predicted, weights) / noise
-    columns = standardised(plain.signal(model, fit.centre), weights) / noise
-    data, columns = (values - base @ (base.T @ values) for values in (data, columns))
-    strengths = _expected_strengths(columns, data, [2 * a.shape[1] for a in plain.amplitudes])
-    scaled = tuple(s * a for s, a in zip(strengths, plain.amplitudes, strict=True))
-    return replace(plain, amplitudes=scaled)
+    data = standardised(model.points.u - fit.predicted)
+    blocks = np.split(columns, 2 * len(ORDERS), axis=1)
+    free = np.hstack([block @ keep for block, keep in zip(blocks, kept, strict=True)])
+    data, free = (values - base @ (base.T @ values) for values in (data, free))
+    strengths = np.repeat(_expected_strengths(free, data, [keep.shape[1] for keep in kept]), 2)
+    parts = zip(strengths, plain.amplitudes, kept, strict=True)
+    return replace(plain, amplitudes=tuple(s * (each @ keep) for s, each, keep in parts))
 
 
-def _unit_amplitudes(
-    r: FloatArray, radius: FloatArray, blur: float, extent: float, width: float
-) -> tuple[FloatArray, ...]:
-    """Amplitudes of each order whose expected L2 norm over the plane is one."""
+def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
+    """Amplitudes (q,) of the rings of each order whose expected L2 norm over the plane is one."""
+    extent = _EXTENT * width
+    r = np.linspace(0.0, 2 * _CUT * extent, 800)
     envelope = np.sqrt(radius) * np.exp(-0.5 * (radius / extent) ** 4)
     measure = np.pi * r * np.gradient(r)  # half of the plane's: that of a squared cosine
-    gaussian, amplitudes = unit_gaussian(r, width), []
-    #: What the centre and the ellipse do to a Gaussian.
-    moved = {1: r * gaussian, 2: r**2 * gaussian}
-    for m in ORDERS:
-        rings = rings_of_order(m, r, radius, blur)
-        scale = envelope / np.sqrt(np.sum(measure @ (rings * envelope) ** 2))
-        free = np.eye(radius.size)
-        if m in moved:
-            free = np.linalg.svd(((measure * moved[m]) @ (rings * scale))[None, :])[2][1:].T
-        amplitudes.append(scale[:, None] * free)
-    return tuple(amplitudes)
+    rings = [rings_of_order(m, r, radius, _BLUR * width) * envelope for m in ORDERS]
+    return [envelope / np.sqrt(np.sum(measure @ each**2)) for each in rings]
 
 
 def _expected_strengths(columns: FloatArray, data: FloatArray, counts: list[int]) -> FloatArray:
-    """Root mean squares of the strengths over their posterior, each given the others."""
+    """Root mean square of each order's strength over its posterior, given the others'."""
     # Beside an ellipse orders mix: its shift has one of 1 and one of 3.
     square, along = columns.T @ columns, columns.T @ data
-    order, strengths = np.repeat(np.arange(len(counts)), counts), np.full(len(counts), _FIRST)
+    order = np.repeat(np.arange(len(counts)) // 2, counts)
+    strengths = np.full(len(ORDERS), _FIRST)
 
     def log_marginal(trial: FloatArray) -> float:
         size = trial[order]

@@ -195,12 +195,10 @@ def estimate_profile(
     stated = _stated_weights(points, _position_noise(model, fit))
     residual, noise = points.u - fit.predicted, _least_noise(fit)
     angular, around = angular and points.planar and not model.order, None
-    threshold, departing = 2 * OUTLIER_THRESHOLD, np.zeros_like(points.u)
-    outlier = _outliers(points, residual, stated, threshold)
+    outlier = _outliers(points, residual, stated, 2 * OUTLIER_THRESHOLD)
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
-        round_ = replace(points, u=points.u - departing)
-        fit = fit_gaussian_to_points(ForwardModel(round_, references), weights, start=fit)
+        fit = fit_gaussian_to_points(model, weights, start=fit)
         if angular:
             noise = raster_noise(points, residual) or noise
             radial = bayesian.departure_basis(model, fit, weights).signals(model, fit)
@@ -208,9 +206,6 @@ def estimate_profile(
         basis = bayesian.departure_basis(model, fit, weights, around)
         weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=noise)
         residual = weighed.residual
-        if around:
-            amplitudes = weighed.mean[basis.flat - around.count : basis.flat]
-            departing = around.signal(model, fit.centre) @ amplitudes
         updated = _outliers(points, residual, stated, OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
