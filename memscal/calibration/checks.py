@@ -111,10 +111,11 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
         uneven = assumptions.axisymmetry_test(estimate)
         meaning = (
             f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then make "
-            f"up {uneven.size:.2%} of the largest signal. A failure means that the radial profile "
-            "is only a mean over directions: use the field."
+            f"up {uneven.size:.2%} of the largest signal. It has no limit, for G over the plane "
+            "need not be round; beyond 18 the radial profile is only a mean over directions. A "
+            "failure means that the ellipse could not be fitted."
         )
-        return _added("axisymmetry", uneven, meaning)
+        return replace(_added("axisymmetry", uneven, meaning), limit=math.inf)
     extra = assumptions.symmetry_test(estimate)
     parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:

@@ -41,6 +41,7 @@ def calibration_messages(
         )
         messages.append(Message("experimental", text))
     messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
+    messages += _directions(solution.estimate, checks)
     messages += _method(solution)
     if not isinstance(solution.stress, Contact) and solution.stress.convergence is None:
         text = "The reference states no convergence: its own error is not counted."
@@ -80,6 +81,20 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
         )
         messages.append(Message(quality.NOISE_UNSTATED, text))
     return messages
+
+
+def _directions(estimate: ProfileEstimate, checks: tuple[QualityCheck, ...]) -> list[Message]:
+    """Return that a sensor is not round."""
+    fall = next((c.value for c in checks if c.name == "axisymmetry"), 0.0)
+    if fall <= quality.chi_square_limit(2):
+        return []
+    size = float(np.abs(estimate.oval).max()) / estimate.largest_signal
+    text = (
+        f"The sensor is not round: what differs between directions makes up {size:.1%} of the "
+        "largest signal. The field has it; the radial profile is a mean over directions "
+        "(predict(x, stress, y=y) takes the field)."
+    )
+    return [Message("not_round", text)]
 
 
 def _tails(estimate: ProfileEstimate) -> list[Message]:

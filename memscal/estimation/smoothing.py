@@ -246,7 +246,7 @@ def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
 #: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
 RELEVANT = 15.0
 #: ...of a raster, which has as many components as points, they are about equal at this one...
-RELEVANT_OF_RASTER = 6.0
+RELEVANT_OF_RASTER = 5.0
 #: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.
 RESOLVED = 3.0
 

@@ -17,10 +17,11 @@ import memscal
 from memscal.model.arrays import FloatArray
 
 CENTRE = (0.21e-3, -0.13e-3)
-"""Where the ellipse's centre lies in the raster, in m."""
+WIDTH = 0.65e-3
+"""Where the ellipse's centre lies in the raster, and its larger width, in m."""
 #: Share, offset along x and y (m), width along and across (m), angle (rad) of each Gaussian.
 PARTS = (
-    (0.75, 0.0, 0.0, 0.65e-3, 0.45e-3, 0.5),
+    (0.75, 0.0, 0.0, WIDTH, 0.45e-3, 0.5),
     (0.15, 0.7e-3, 0.2e-3, 0.5e-3, 0.5e-3, 0.0),
     (0.10, 1.4e-3, 0.4e-3, 0.6e-3, 0.6e-3, 0.0),
 )
