@@ -157,6 +157,17 @@ class Lattice:
         shape = (self.y.size, self.x.size)
         return np.asarray(scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area)
 
+    def sampled(self, spectrum: FloatArray) -> FloatArray:
+        """Return the field of a transform about the axis, as far as the lattice samples it."""
+        dy, dx = self.spacing
+        turns = np.add.outer(
+            scipy.fft.fftfreq(self.y.size, dy) * self.y[0],
+            scipy.fft.rfftfreq(self.x.size, dx) * self.x[0],
+        )
+        shape = (self.y.size, self.x.size)
+        field = scipy.fft.irfft2(spectrum * np.exp(2j * np.pi * turns), s=shape)
+        return np.asarray(field / self.cell_area)
+
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the central point."""
         return self.forward(scipy.fft.ifftshift(field))

@@ -98,6 +98,7 @@ class RadialSpectrum:
     wavenumbers: Wavenumbers
     values: FloatArray
     order: int = 0
+    source: bool = False  # of a source that ends, not of a stress that decays as a film's does
 
     @property
     def scalar(self) -> RadialSpectrum:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import j0
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
-from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.hankel import RadialSpectrum, radial_spline
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
@@ -179,7 +179,7 @@ class RasterFields:
             np.add.at(total, (rows, columns), departure / points.load)
             np.add.at(number, (rows, columns), 1.0)
             voltage += total / np.maximum(number, 1.0)
-        stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
+        stress = Field(grid, _stress(estimate.model.reference, grid, step))
         fit, index, reach = estimate.gaussian, (rows, columns), choice.support
         return cls(grid, Field(grid, voltage), stress, reach, step, fit, index, even)
 
@@ -242,6 +242,15 @@ class RasterFields:
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber[0], spectral[0]
+
+
+def _stress(reference: RadialSpectrum, grid: Lattice, step: float) -> FloatArray:
+    """Return the reference on a lattice; of a source, whose edge it cannot sample, what it can."""
+    if not reference.source:
+        return on_grid(reference.at, grid, step)
+    spline = radial_spline(reference.wavenumbers.k, reference.values)
+    k = grid.wavenumber
+    return grid.sampled(np.where(k <= reference.wavenumbers.k[-1], spline(k), 0.0))
 
 
 Fields: TypeAlias = LineFields | RasterFields

@@ -134,8 +134,9 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
 )
 @option("--reference", FILE, metavar="FILE")(
-    "Stress at the base of the film (memscal-reference). By default the one in the scan, or "
-    "else the rod is solved on the film."
+    "Stress at the base of the film (memscal-reference); or a source, for which film and rod are "
+    "not used: disc:R, slit:W, gaussian:S (radius, width, standard deviation: disc:0.5mm), point. "
+    "By default the one in the scan, or else the rod is solved on the film."
 )
 @option("--alternative", FILE, metavar="FILE")(
     "The same stress by another model of the film (memscal-reference): its difference is counted "
@@ -276,15 +277,17 @@ def _read(
     paths: tuple[Path, ...], reference: Path | None
 ) -> tuple[list[Scan], StressProfile | None]:
     """Read the inputs, and refuse an indenter that cannot calibrate."""
-    from memscal.estimation.reference import require_calibration_rod
+    from memscal.estimation.reference import is_source, require_calibration_rod
     from memscal.formats.scan import read_scan
 
     scans = [read_scan(path) for path in paths]
+    profile = None if reference is None else _read_reference(reference)
     for scan, path in zip(scans, paths, strict=True):
-        require_calibration_rod(scan)
+        if not is_source(profile or scan.reference):
+            require_calibration_rod(scan)
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")
-    return scans, None if reference is None else _read_reference(reference)
+    return scans, profile
 
 
 def _read_reference(path: Path) -> StressProfile:

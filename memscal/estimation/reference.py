@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,20 @@ RECTANGLE = 1 / math.sqrt(3)
 _MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
+_OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
+
+
+def is_source(stress: BaseStress | None) -> bool:
+    """Whether a reference is a source that needs no film, rod and load."""
+    return isinstance(stress, StressProfile) and stress.ideal is not None
+
+
+def of_source(scan: Scan) -> Scan:
+    """Return a scan over a source: nothing that it states of film and rod is uncertain."""
+    certain: dict[str, Any] = {f"{name}_uncertainty": None for name in _OF_FILM}
+    film = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None, **certain)
+    rod = replace(scan.indenter, radius_uncertainty=None)
+    return replace(scan, film=film, indenter=rod, load_uncertainty=None, rod_friction=None)
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
@@ -85,10 +100,11 @@ def require_same_set_up(
     # alternative may have another law and friction, which it is given for.
     differences: list[str] = []
     for scan, given in zip(scans, references, strict=True):
-        if (stress := scan.reference if given is None else given) is not None:
+        stress = scan.reference if given is None else given
+        if stress is not None and not is_source(stress):
             differences += _other_set_up(scan, stress, "reference")
     for scan, given in zip(scans, alternatives, strict=False):
-        if given is not None:
+        if given is not None and not is_source(given):
             differences += _other_set_up(scan, given, "alternative")
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
@@ -170,8 +186,10 @@ def reference_spectra(
         # Fields are lifted to squares that reach one span from the centre, to their corners.
         wavenumbers = Wavenumbers.covering(last, 1.5 * max(spans))
     return tuple(
-        RadialSpectrum(wavenumbers, _per_newton(reference, wavenumbers.k, span, order), order)
-        for reference, span in zip(references, spans, strict=True)
+        RadialSpectrum(
+            wavenumbers, _per_newton(ref, wavenumbers.k, span, order), order, is_source(ref)
+        )
+        for ref, span in zip(references, spans, strict=True)
     )
 
 
@@ -180,13 +198,18 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     if isinstance(reference, Contact):
         return _LARGEST_KH / reference.film.thickness
     k = np.linspace(0.0, _PASSED / points.step, _WAVENUMBERS)[1:]
-    values = np.abs(hankel_transform(reference.r, reference.sigma_zz, k))
+    if reference.ideal is None:
+        values = np.abs(hankel_transform(reference.r, reference.sigma_zz, k))
+    else:
+        values = np.abs(reference.ideal.transform(k))
     return float(k[values > _NOTHING * values.max()][-1])
 
 
 def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
     if isinstance(reference, Contact):
         return _base_spectrum(reference, k.tobytes(), order) / reference.load
+    if reference.ideal is not None and not order:
+        return reference.ideal.transform(k) / reference.load
     stress = reference.sigma_rz if order else reference.sigma_zz
     if stress is None or (order and not stress.any()):
         raise InputError(
@@ -224,7 +247,9 @@ def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
 
 
 def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
-    """Force that a reference (a shear: its normal stress) carries, over its load."""
+    """Force that a reference (a shear: its normal stress) carries, over its load; 1 of a source."""
+    if is_source(stress):
+        return 1.0
     if reference.order == 0:
         return reference.integral
     return 1.0 if isinstance(stress, Contact) else stress.force / stress.load

@@ -130,7 +130,12 @@ def _fitted(
     points, load = estimate.points, estimate.points.load[rows]
     y = (points.u - estimate.background)[rows] / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
-    spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
+    decay = reference
+    if reference.source:
+        # A source ends: what decays is G about it.
+        blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
+        decay = replace(reference, values=reference.values * blurred)
+    spline = _RadialSpline.through(estimate.distance[rows], decay, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
     for _ in range(_ROUNDS):
         gain = spline.gain(y, stated * weight)
@@ -168,15 +173,18 @@ class _RadialSpline:
         # At R a spline has the logarithmic slope of the tail, which goes on from there.
         ending = basis(np.array([reach]), 0)
         tied = step * (end * basis(np.array([reach]), 1) - slope * ending)
-        free = np.linalg.svd(tied)[2][1:].T
+        # A source that ends inside has no tail to go on with: the spline ends with the scan.
+        tail = not reference.source
+        free = np.linalg.svd(tied)[2][1:].T if tail else np.eye(tied.size)
         curved = basis(nodes, _ORDER) * step**_ORDER
         rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
         # What no penalty holds, a parabola, is held by next to nothing.
         rows = np.vstack([curved, _NEXT_TO_NOTHING * basis(nodes, 0)]) @ free
         rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
         bessel = 2 * np.pi * j0(np.multiply.outer(k, nodes)) * weights * nodes
-        beyond = (per_newton - bessel @ stress[:-2]) / end
-        transform = (bessel @ basis(nodes, 0) + np.outer(beyond, ending)) @ free
+        transform = bessel @ basis(nodes, 0) @ free
+        if tail:
+            transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
         return cls(basis(radius, 0) @ free, np.asarray(np.linalg.qr(rows)[1]), transform)
 
     def gain(self, y: FloatArray, weight: FloatArray) -> FloatArray:

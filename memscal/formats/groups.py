@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -30,7 +30,7 @@ from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, 
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
 from memscal.model.scan import StressSensor
-from memscal.model.stress import StressProfile
+from memscal.model.stress import IdealReference, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -355,8 +355,9 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     numerics = write_record(records.NUMERICS, profile)
     made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
     made |= write_record(records.PROFILE_NOTES, profile).children
+    ideal, table = records.IDEAL_REFERENCE, records.PROFILE
     return (
-        write_record(records.PROFILE, profile),
+        write_record(ideal, profile.ideal) if profile.ideal else write_record(table, profile),
         write_record(records.CONTACT, profile, **of),
         write_record(records.SOLVER, profile, **made),
     )
@@ -384,6 +385,10 @@ def read_profile(
     if file.has(f"{parameters}/indenter"):
         indenter = read_indenter(file, f"{parameters}/indenter")
     defaults = {} if load is None else {"load": load}
+    if file.has(f"{data}/shape"):
+        ideal = IdealReference(**read_record(records.IDEAL_REFERENCE, file, data))
+        stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
+        return replace(ideal.profile(), **stated)
     return StressProfile(
         film=film,
         indenter=indenter,

@@ -60,6 +60,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         "/entry/radial_profile_division": records.RADIAL,
         "/entry/transfer_function": records.TRANSFER,
         "/entry/reconvolution": records.RECONVOLUTION,
+        "/entry/reference": records.IDEAL_REFERENCE,
         **_MEASURED_ON,
         "/entry/process": records.PROCESS,
     },

@@ -1,21 +1,28 @@
-"""memscal-reference: a calculated stress profile at the base of the film, as HDF5."""
+"""memscal-reference: a calculated stress profile at the base of the film, as HDF5, or by name."""
 
 import os
+import re
 
+from memscal.errors import InputError
 from memscal.formats.groups import profile_groups, read_profile
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
+from memscal.formats.units import to_si
 from memscal.formats.values import require_schema
-from memscal.model.stress import StressProfile
+from memscal.model.stress import IDEAL, IdealReference, StressProfile
+
+_NAMED = re.compile(rf"({'|'.join(IDEAL)})(?::([^A-Za-zµμ]*)(.*))?")
 
 
 def read_reference(path: str | os.PathLike[str]) -> StressProfile:
-    """Read a stress profile from a memscal-reference file.
+    """Read a stress profile from a memscal-reference file, or make that of an ideal reference.
 
     Parameters
     ----------
-    path : path
-        The file; units in it are converted to SI.
+    path : path or str
+        The file; units in it are converted to SI.  A text that names no file may be ``disc:R``
+        (its radius), ``slit:W`` (its width), ``gaussian:S`` (its standard deviation), each with a
+        unit, such as ``disc:0.5mm``, or ``point``: see :class:`memscal.IdealReference`.
 
     Returns
     -------
@@ -26,6 +33,8 @@ def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     ------
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
         If the file does not hold a reference that this version can read.
+    InputError
+        If the size of an ideal reference is none.
 
     Examples
     --------
@@ -36,8 +45,26 @@ def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     ...     read_reference(f"{folder}/rod.h5").sigma_zz
     array([200000., 100000.])
     """
+    if (ideal := ideal_reference(path)) is not None:
+        return ideal.profile()
     with open_hdf5(path) as file:
         return profile_from(file)
+
+
+def ideal_reference(text: str | os.PathLike[str]) -> IdealReference | None:
+    """Return the ideal reference that a text names; nothing of a file that exists."""
+    match = None if os.path.exists(text) else _NAMED.fullmatch(os.fspath(text).strip())
+    if match is None:
+        return None
+    shape, number, unit = match.groups(default="")
+    if shape == "point" and not number:
+        return IdealReference(shape)
+    size = f"The {IDEAL[shape] or 'size'} of the reference {os.fspath(text)!r}"
+    try:
+        return IdealReference(shape, float(to_si(float(number), unit.strip(), "length", size)))
+    except ValueError:
+        cure = "Write it with its unit, as disc:0.5mm, slit:200um, gaussian:0.3mm; or point."
+        raise InputError(f"{size} is no length.", cure=cure) from None
 
 
 def profile_from(file: SafeFile) -> StressProfile:

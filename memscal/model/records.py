@@ -89,6 +89,11 @@ PROFILE = record(
     Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress", axes=_R),
     signal="sigma_zz",
 )
+IDEAL_REFERENCE = record(
+    "NXcollection",
+    Quantity("shape", "text", "shape of the reference", required=True),
+    Quantity("size", _L, "size of the reference", required=True),
+)
 CONTACT = record(
     "NXcollection",
     _LOAD[0],
