@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from memscal.errors import FitError, MemscalError
-from memscal.estimation.forward import ForwardModel
+from memscal.estimation.forward import forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints, joined_points, mistaken_unit
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
@@ -240,7 +240,7 @@ class _Search:
         joined = joined_points(points)
         weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
         with np.errstate(all="ignore"), suppress(MemscalError, np.linalg.LinAlgError):
-            model = ForwardModel(joined, reference_spectra(stresses, points))
+            model = forward_model(joined, reference_spectra(stresses, points))
             fit = fit_gaussian_to_points(model, weights)
             residual = (joined.u - fit.predicted) * np.sqrt(weights)
             if np.isfinite(residual).all():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import j0
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
-from memscal.axisymmetry.hankel import RadialSpectrum, radial_spline
+from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
@@ -95,7 +95,12 @@ class LineFields:
         reference = estimate.model.reference
         spectra = np.stack([spectrum.scalar.values, reference.scalar.values], axis=1)
         wavenumbers = reference.wavenumbers
-        both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
+        if reference.source:
+            # The grid does not sample the edge of a source, but its transform.
+            k = grid.wavenumber_axis
+            both = np.stack([grid.inverse(f.plane(k, k)) for f in (spectrum, reference)], axis=-1)
+        else:
+            both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
         return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
 
@@ -179,9 +184,13 @@ class RasterFields:
             np.add.at(total, (rows, columns), departure / points.load)
             np.add.at(number, (rows, columns), 1.0)
             voltage += total / np.maximum(number, 1.0)
-        stress = Field(grid, _stress(estimate.model.reference, grid, step))
+        reference = estimate.model.reference
+        # The lattice does not sample the edge of a source.
+        source = reference.source
+        stress = grid.sampled(reference.plane) if source else on_grid(reference.at, grid, step)
         fit, index, reach = estimate.gaussian, (rows, columns), choice.support
-        return cls(grid, Field(grid, voltage), stress, reach, step, fit, index, even)
+        pair = Field(grid, voltage), Field(grid, stress)
+        return cls(grid, *pair, reach, step, fit, index, even)
 
     @property
     def confinement(self) -> FloatArray:
@@ -242,15 +251,6 @@ class RasterFields:
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber[0], spectral[0]
-
-
-def _stress(reference: RadialSpectrum, grid: Lattice, step: float) -> FloatArray:
-    """Return the reference on a lattice; of a source, whose edge it cannot sample, what it can."""
-    if not reference.source:
-        return on_grid(reference.at, grid, step)
-    spline = radial_spline(reference.wavenumbers.k, reference.values)
-    k = grid.wavenumber
-    return grid.sampled(np.where(k <= reference.wavenumbers.k[-1], spline(k), 0.0))
 
 
 Fields: TypeAlias = LineFields | RasterFields

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import j1
 
+from memscal.axisymmetry.hankel import ACROSS
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
@@ -230,7 +231,7 @@ class Solution:
         spectrum, reach = self.estimate.spectrum, self.choice.support
         if spectrum.order:
             r = np.linspace(0.0, _FAR * reach, _RADII)
-            flux = np.abs(spectrum.at(r)) * r
+            flux = np.abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
             return float(flux[r > reach].sum() / flux.sum())
         # Within R the integral is that of R U(k) J_1(kR) dk over all k.
         k = spectrum.wavenumbers.k
@@ -241,7 +242,7 @@ class Solution:
 
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
     """Signal of the quotient at the points, in V: each scan through its own reference."""
-    if estimate.points.scans == 1:
+    if estimate.points.scans == 1 and estimate.model.reference.order != ACROSS:
         back = fourier_ratio.reconvolve(1.0, quotient, fields.stress)
         return fields.at_points(back.values) * estimate.points.load
     k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)

@@ -19,14 +19,15 @@ the sensor to the indenter,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ive, j0, j1
 
-from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
@@ -56,12 +57,12 @@ class ForwardModel:
 
     def only(self, scan: int) -> ForwardModel:
         """Return the model of one of the scans."""
-        return ForwardModel(self.points.only(scan), (self.references[scan],))
+        return replace(self, points=self.points.only(scan), references=(self.references[scan],))
 
     @property
     def order(self) -> int:
         """Zero for the normal channel; one for a tangential one, a component of a vector."""
-        return self.reference.order
+        return max(self.reference.order, 0)
 
     @property
     def axis(self) -> int:
@@ -95,6 +96,9 @@ class ForwardModel:
         unique, back = np.unique(radius, return_inverse=True)
         argument = np.multiply.outer(unique, self.k)
         towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
+        if self.reference.order == ACROSS:
+            waves = 2 * np.cos(argument) / self.k, 2 * np.sin(argument) / self.k
+            return Geometry(radius, towards, waves[0][back], waves[1][back])
         return Geometry(radius, towards, j0(argument)[back], j1(argument)[back])
 
     def cosines(self, centres: FloatArray) -> FloatArray:
@@ -141,6 +145,10 @@ class ForwardModel:
         free = np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
+    def elliptic(self, geometry: Geometry) -> Callable[[FloatArray], FloatArray]:
+        """Return the response per A of an elliptic Gaussian to its s, e1 and e2."""
+        return partial(_response, self, geometry, _bessel(geometry, self.k))
+
     def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
         """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
         x = np.multiply.outer(geometry.radius, self.k)
@@ -161,6 +169,13 @@ class ForwardModel:
         if len(measures) == 1:
             return [(slice(None), measures[0])]
         return [(self.points.scan == i, measure) for i, measure in enumerate(measures)]
+
+
+def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> ForwardModel:
+    """Return the model of scans, in two dimensions where a reference is not round."""
+    models = [reference.model for reference in references if reference.model]
+    model: ForwardModel = (models or [ForwardModel])[0](points, tuple(references))
+    return model
 
 
 def _unit_range(positions: FloatArray) -> FloatArray:
@@ -184,20 +199,17 @@ def elliptic_columns(
 ) -> FloatArray:
     """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2."""
     here = np.concatenate([[sigma], ellipticity])
-    harmonics = _bessel(geometry, model.k)
-    columns = [_response(model, geometry, harmonics, here)]
-    for step in np.diag([_STEP * sigma, _STEP, _STEP]):
-        above = _response(model, geometry, harmonics, here + step)
-        below = _response(model, geometry, harmonics, here - step)
-        columns.append((above - below) / (2 * step.sum()))
-    return np.stack(columns, axis=1)
+    response = model.elliptic(geometry)
+    steps = np.diag([_STEP * sigma, _STEP, _STEP])
+    slopes = [(response(here + s) - response(here - s)) / (2 * s.sum()) for s in steps]
+    return np.stack([response(here), *slopes], axis=1)
 
 
 def elliptic_departure(
     x: FloatArray, y: FloatArray, sigma: float, ellipticity: FloatArray
 ) -> FloatArray:
     """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
-    e1, e2 = _bounded(ellipticity)
+    e1, e2 = bounded(ellipticity)
     plane_x, plane_y = np.meshgrid(x, y)
     round_, determinant = plane_x**2 + plane_y**2, 1 - e1**2 - e2**2
     form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
@@ -206,7 +218,8 @@ def elliptic_departure(
     return np.asarray(scale * (elliptic - np.exp(-0.5 * round_ / sigma**2)))
 
 
-def _bounded(ellipticity: FloatArray) -> FloatArray:
+def bounded(ellipticity: FloatArray) -> FloatArray:
+    """Return an ellipticity (e1, e2) that an ellipse can have."""
     size = float(np.hypot(*ellipticity))
     return np.asarray(ellipticity * min(1.0, _LARGEST / size) if size > 0 else ellipticity)
 
@@ -214,7 +227,7 @@ def _bounded(ellipticity: FloatArray) -> FloatArray:
 def _response(
     model: ForwardModel, geometry: Geometry, harmonics: list[FloatArray], place: FloatArray
 ) -> FloatArray:
-    sigma, (e1, e2) = float(place[0]), _bounded(place[1:])
+    sigma, (e1, e2) = float(place[0]), bounded(place[1:])
     e = float(np.hypot(e1, e2))
     half = 0.5 * (sigma * model.k) ** 2
     # The derivatives of the radius by the centre point to it: their angle is the direction's.

@@ -124,7 +124,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     # Profiles per newton of every width, on a table for quick trials.
     spectra = (model.reference.values * kernels).T
     wavenumbers = model.reference.wavenumbers
-    tables = wavenumbers.synthesise(spectra, radii, order=model.order).T
+    tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)
     data, drift = root * points.u, root[:, None] * model.drift_columns
     best, best_cost = np.zeros(0), np.inf

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.estimation import points
 from memscal.estimation.points import ScanPoints
@@ -34,12 +34,14 @@ RECTANGLE = 1 / math.sqrt(3)
 _MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
+#: A field is taken as round where less than this share of it is not, at so many wavenumbers.
+_ROUND, _SEEN = 0.005, 33
 _OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
 
 
 def is_source(stress: BaseStress | None) -> bool:
     """Whether a reference is a source that needs no film, rod and load."""
-    return isinstance(stress, StressProfile) and stress.ideal is not None
+    return isinstance(stress, StressProfile) and stress.form is not None
 
 
 def of_source(scan: Scan) -> Scan:
@@ -179,18 +181,38 @@ def reference_spectra(
     wavenumbers: Wavenumbers | None = None,
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
-    order = data[0].order
     spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
     if wavenumbers is None:
         last = max(_last_wavenumber(*pair) for pair in zip(references, data, strict=True))
         # Fields are lifted to squares that reach one span from the centre, to their corners.
         wavenumbers = Wavenumbers.covering(last, 1.5 * max(spans))
     return tuple(
-        RadialSpectrum(
-            wavenumbers, _per_newton(ref, wavenumbers.k, span, order), order, is_source(ref)
-        )
-        for ref, span in zip(references, spans, strict=True)
+        _spectrum(pair[0], wavenumbers, pair[1], span)
+        for pair, span in zip(zip(references, data, strict=True), spans, strict=True)
     )
+
+
+def _spectrum(
+    stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints, span: float
+) -> RadialSpectrum:
+    values, order = _per_newton(stress, wavenumbers.k, span, points.order), points.order
+    if isinstance(stress, Contact) or stress.form is None:
+        return RadialSpectrum(wavenumbers, values, order)
+    if stress.ideal is not None and stress.ideal.shape == "slit":
+        if points.planar:
+            raise InputError(
+                "A slit is the reference of a raster.",
+                why="It is scanned across, along a line, and shows nothing of any other direction.",
+                cure="Give a line scan.",
+            )
+        return RadialSpectrum(wavenumbers, values, ACROSS, source=True)
+    # What a scan samples of a field is looked at.
+    seen = np.linspace(0.0, min(np.pi / points.step, wavenumbers.k[-1]), _SEEN)[1:]
+    if stress.field is None or stress.field.unevenness(seen) < _ROUND:
+        return RadialSpectrum(wavenumbers, values, source=True)
+    from memscal.estimation.field_model import FieldSpectrum
+
+    return FieldSpectrum(wavenumbers, values, source=True, field=stress.field, load=stress.load)
 
 
 def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
@@ -198,18 +220,17 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     if isinstance(reference, Contact):
         return _LARGEST_KH / reference.film.thickness
     k = np.linspace(0.0, _PASSED / points.step, _WAVENUMBERS)[1:]
-    if reference.ideal is None:
-        values = np.abs(hankel_transform(reference.r, reference.sigma_zz, k))
-    else:
-        values = np.abs(reference.ideal.transform(k))
+    form = reference.form
+    values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
+    values = np.abs(values)
     return float(k[values > _NOTHING * values.max()][-1])
 
 
 def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
     if isinstance(reference, Contact):
         return _base_spectrum(reference, k.tobytes(), order) / reference.load
-    if reference.ideal is not None and not order:
-        return reference.ideal.transform(k) / reference.load
+    if reference.form is not None and not order:
+        return reference.form.transform(k) / reference.load
     stress = reference.sigma_rz if order else reference.sigma_zz
     if stress is None or (order and not stress.any()):
         raise InputError(

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.hankel import RadialSpectrum, gauss_between
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, gauss_between
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import OUTLIER_THRESHOLD, ProfileEstimate, outlier_weights
 from memscal.model.arrays import FloatArray
@@ -128,7 +128,7 @@ def _fitted(
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
     points, load = estimate.points, estimate.points.load[rows]
-    y = (points.u - estimate.background)[rows] / load
+    y = (points.u - estimate.background - estimate.uneven)[rows] / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
     decay = reference
     if reference.source:
@@ -181,7 +181,10 @@ class _RadialSpline:
         # What no penalty holds, a parabola, is held by next to nothing.
         rows = np.vstack([curved, _NEXT_TO_NOTHING * basis(nodes, 0)]) @ free
         rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
-        bessel = 2 * np.pi * j0(np.multiply.outer(k, nodes)) * weights * nodes
+        phase = np.multiply.outer(k, nodes)
+        across = reference.order == ACROSS
+        bessel = 2 * np.cos(phase) if across else 2 * np.pi * j0(phase) * nodes
+        bessel *= weights
         transform = bessel @ basis(nodes, 0) @ free
         if tail:
             transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)

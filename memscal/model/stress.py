@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.special import j1
+from scipy.special import j0, j1
 
 from memscal.errors import InputError
 from memscal.model.arrays import (
@@ -105,6 +106,150 @@ class IdealReference:
         return StressProfile(r=r, sigma_zz=values, load=1.0, ideal=self)
 
 
+#: Sides of a field in pixels, what may be left at its border, and how even its axes are.
+_FEWEST, _MOST, _BORDER, _EVEN = 8, 2048, 0.05, 1e-3
+#: Rings of a field, to a pixel, in which its angular mean is summed up.
+_RINGS = 16
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StressField:
+    r"""A field in two dimensions that a sensor was scanned through, or that was moved over it.
+
+    The reading is :math:`A\,G \otimes` field, with the centroid of the field's moduli, its axis,
+    at the scan's position: of a sensor at rest, under a beam that moves, the field is turned by
+    180 degrees, unless it is symmetric.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,), (m,)
+        Even axes, in m, increasing.
+    values : ndarray, shape (m, n)
+        Values, less any background.
+    unit : str, default "Pa"
+        Their unit, by which that of the reading is divided.
+    load : float, optional
+        Load that produces the field, in N; else its strength is that at the scan's nominal load.
+    notes, source : str, SourceFile, optional
+        What was taken of a file, and the file.
+
+    Raises
+    ------
+    InputError
+        If axes are uneven, a value is not finite, or the field is cut off or adds up to nothing.
+
+    Examples
+    --------
+    >>> x = np.linspace(-1e-3, 1e-3, 41)
+    >>> values = np.exp(-np.add.outer(x**2 / 0.08e-6, x**2 / 0.04e-6))
+    >>> field = StressField(x=x, y=x, values=values)
+    >>> round(1e6 * float(field.transform(np.zeros(1))[0] / np.pi), 4)
+    0.0566
+    """
+
+    x: FloatArray
+    y: FloatArray
+    values: FloatArray
+    unit: str = "Pa"
+    load: float | None = None
+    notes: str = ""
+    source: SourceFile | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y"):
+            axis = finite_vector(f"{name} of the field", getattr(self, name))
+            object.__setattr__(self, name, axis)
+            if not _FEWEST <= axis.size <= _MOST:
+                raise InputError(
+                    f"The field has {axis.size} values along {name}, not {_FEWEST} to {_MOST}.",
+                    cure="Give the part that is not zero, in larger pixels if need be.",
+                )
+            require_increasing(f"{name} of the field", axis)
+            steps = np.diff(axis)
+            if np.ptp(steps) > _EVEN * steps.mean():
+                cure = "Interpolate the field to even pixels."
+                raise InputError(f"{name} of the field is not evenly spaced.", cure=cure)
+        shape, expected = np.shape(self.values), (self.y.size, self.x.size)
+        if tuple(shape) != expected:
+            raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
+        values = finite_vector("The field", np.ravel(self.values)).reshape(expected)
+        object.__setattr__(self, "values", values)
+        size = float(np.abs(values).max())
+        if not values.sum() > 1e-3 * np.abs(values).sum():
+            cure = "Change its sign, or subtract its background."
+            raise InputError("The field adds up to nothing, or to a pull.", cure=cure)
+        border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
+        if (left := float(np.abs(border).mean()) / size) > _BORDER:
+            raise InputError(
+                f"At its border the field has {left:.1%} of its largest value left.",
+                why="What lies beyond would be missing.",
+                cure="Subtract the background, or give a larger field.",
+            )
+        if self.load is not None:
+            require_positive("load of the field", self.load, "N")
+
+    def __repr__(self) -> str:
+        """Return size and unit in place of the values."""
+        return f"<StressField: {self.y.size} x {self.x.size} pixels, in {self.unit}>"
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        wide, high = (float(np.ptp(axis)) * 1e3 for axis in (self.x, self.y))
+        name = f" from {self.source.file_name}" if self.source else ""
+        return f"field of {wide:.4g} mm x {high:.4g} mm{name}"
+
+    @cached_property
+    def _offsets(self) -> tuple[FloatArray, FloatArray]:
+        """Positions along y and x from the axis of the field, in m."""
+        share = np.abs(self.values)
+        share = share / share.sum()
+        return self.y - share.sum(axis=1) @ self.y, self.x - share.sum(axis=0) @ self.x
+
+    @property
+    def cell_area(self) -> float:
+        """Area of a pixel, in m^2."""
+        return float((self.x[1] - self.x[0]) * (self.y[1] - self.y[0]))
+
+    def plane(self, ky: FloatArray, kx: FloatArray) -> FloatArray:
+        """Return the Fourier transform about the axis, (ky, kx), complex; 0 beyond the pixels'."""
+        sides = []
+        for k, offset in zip((ky, kx), self._offsets, strict=True):
+            inside = np.abs(k) <= np.pi / (offset[1] - offset[0])
+            sides.append(np.exp(-1j * np.multiply.outer(k, offset)) * inside[:, None])
+        return np.asarray(sides[0] @ self.values @ sides[1].T * self.cell_area)
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Return the Hankel transform of the mean over directions about the axis."""
+        radius = np.hypot.outer(*self._offsets).ravel()
+        ring = np.rint(radius * _RINGS / math.sqrt(self.cell_area)).astype(int)
+        total, used = np.bincount(ring, self.values.ravel()), np.bincount(ring)
+        r = (np.bincount(ring, radius) / np.maximum(used, 1))[used > 0]
+        bessel = j0(np.multiply.outer(np.asarray(k, dtype=np.float64), r))
+        return np.asarray(bessel @ total[used > 0] * self.cell_area)
+
+    def unevenness(self, k: FloatArray) -> float:
+        """Return the share of the transform up to the last of ``k`` that is not round."""
+        angle = np.arange(_RINGS) * np.pi / _RINGS
+        sides = [
+            np.exp(-1j * np.multiply.outer(np.multiply.outer(k, way).ravel(), offset))
+            for way, offset in zip((np.sin(angle), np.cos(angle)), self._offsets, strict=True)
+        ]
+        polar = np.sum((sides[0] @ self.values) * sides[1], axis=1).reshape(k.size, -1)
+        power = np.abs(polar - polar.mean(axis=1, keepdims=True)) ** 2, np.abs(polar) ** 2
+        return float(np.sqrt(np.divide(*(np.sum(k @ part) for part in power))))
+
+    def profile(self) -> "StressProfile":
+        """Return the profile that a calibration takes, with the mean over directions as table."""
+        radius, step = np.hypot.outer(*self._offsets).ravel(), math.sqrt(self.cell_area)
+        ring = np.rint(radius / step).astype(int)
+        used = np.bincount(ring)
+        mean = np.bincount(ring, self.values.ravel()) / np.maximum(used, 1)
+        r = np.asarray(step * np.flatnonzero(used), dtype=np.float64)
+        return StressProfile(
+            r=r, sigma_zz=mean[used > 0], load=self.load or 1.0, field=self, source=self.source
+        )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StressProfile:
     r"""Stress at the base of the film as a function of radius, for one load.
@@ -132,8 +277,8 @@ class StressProfile:
         Estimated relative error of ``sigma_zz``, of its maximum.
     notes, source : str, SourceFile, optional
         What was done to it and what its author wrote at its head; the file it was read from.
-    ideal : IdealReference, optional
-        The source of known form that the table is of: nothing of it is in Pa or N.
+    ideal, field : IdealReference, StressField, optional
+        The source that the table is of, in the unit of the source.
 
     Raises
     ------
@@ -165,6 +310,7 @@ class StressProfile:
     notes: str = ""
     source: SourceFile | None = None
     ideal: IdealReference | None = None
+    field: StressField | None = None
 
     def __post_init__(self) -> None:
         require_positive("load of the stress profile", self.load, "N")
@@ -193,6 +339,11 @@ class StressProfile:
             f"<StressProfile: load {self.load:.4g} N, {self.r.size} radii to "
             f"{self.r[-1] * 1e3:.4g} mm, largest stress {peak:.4g} kPa>"
         )
+
+    @property
+    def form(self) -> IdealReference | StressField | None:
+        """The source that it is of, in place of a stress below a film."""
+        return self.ideal or self.field
 
     @property
     def force(self) -> float:
