@@ -98,7 +98,8 @@ class LineFields:
         if reference.source:
             # The grid does not sample the edge of a source, but its transform.
             k = grid.wavenumber_axis
-            both = np.stack([grid.inverse(f.plane(k, k)) for f in (spectrum, reference)], axis=-1)
+            planes = (RadialSpectrum.plane(f, k, k) for f in (spectrum, reference))
+            both = np.stack([grid.inverse(plane) for plane in planes], axis=-1)
         else:
             both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))

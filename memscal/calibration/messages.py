@@ -43,12 +43,12 @@ def calibration_messages(
     messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
     messages += _method(solution)
     stress = solution.stress
-    if not isinstance(stress, Contact) and (ideal := stress.ideal) is not None:
+    if not isinstance(stress, Contact) and (form := stress.form) is not None:
         text = (
-            f"The reference is a {ideal}, taken as exact: A is the reading over its unit, "
-            f"{ideal.unit}. Film, rod and load that the scan states are not used."
+            f"The reference is a {form}, taken as exact: A is the reading over its unit, "
+            f"{form.unit}. Film and rod that the scan states are not used."
         )
-        messages.append(Message("reference", text))
+        messages.append(Message("reference", f"{text} {form.notes}".strip()))
     elif not isinstance(stress, Contact) and stress.convergence is None:
         text = "The reference states no convergence: its own error is not counted."
         messages.append(Message("convergence_unstated", text))

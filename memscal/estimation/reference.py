@@ -44,12 +44,14 @@ def is_source(stress: BaseStress | None) -> bool:
     return isinstance(stress, StressProfile) and stress.form is not None
 
 
-def of_source(scan: Scan) -> Scan:
+def of_source(scan: Scan, stress: BaseStress | None) -> Scan:
     """Return a scan over a source: nothing that it states of film and rod is uncertain."""
+    field = stress.field if isinstance(stress, StressProfile) else None
+    u = scan.load_uncertainty if field and field.load else None
     certain: dict[str, Any] = {f"{name}_uncertainty": None for name in _OF_FILM}
     film = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None, **certain)
     rod = replace(scan.indenter, radius_uncertainty=None)
-    return replace(scan, film=film, indenter=rod, load_uncertainty=None, rod_friction=None)
+    return replace(scan, film=film, indenter=rod, load_uncertainty=u, rod_friction=None)
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:

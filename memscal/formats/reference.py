@@ -1,28 +1,54 @@
 """memscal-reference: a calculated stress profile at the base of the film, as HDF5, or by name."""
 
+import hashlib
 import os
 import re
+from io import BytesIO
+from typing import Any
 
-from memscal.errors import InputError
-from memscal.formats.groups import profile_groups, read_profile
-from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
+import numpy as np
+from numpy.typing import NDArray
+
+from memscal.errors import InputError, placed
+from memscal.formats.files import read_bytes
+from memscal.formats.groups import profile_groups, read_field, read_profile
+from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
+from memscal.formats.hdf5.writer import (
+    REFERENCE_SCHEMA,
+    SCHEMA_ATTRIBUTE,
+    Group,
+    file_tree,
+    write_tree,
+)
 from memscal.formats.units import to_si
 from memscal.formats.values import require_schema
-from memscal.model.stress import IDEAL, IdealReference, StressProfile
+from memscal.model.arrays import require_positive
+from memscal.model.provenance import SourceFile
+from memscal.model.stress import IDEAL, IdealReference, StressField, StressProfile
 
-_NAMED = re.compile(rf"({'|'.join(IDEAL)})(?::([^A-Za-zµμ]*)(.*))?")
+_NAMED = re.compile(rf"({'|'.join(IDEAL)})(?::(.*))?")
+_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-zµμ]+)\s*")
+#: Files of pixels, which state no size of theirs; weights of red, green and blue in the luminance.
+_PIXELS = (".npy", ".png", ".tif", ".tiff")
+_MOST_PIXELS = 2**26
+_LUMINANCE = (0.299, 0.587, 0.114)
 
 
-def read_reference(path: str | os.PathLike[str]) -> StressProfile:
-    """Read a stress profile from a memscal-reference file, or make that of an ideal reference.
+def read_reference(
+    path: str | os.PathLike[str], *, pixel_size: float | None = None
+) -> StressProfile:
+    """Read a stress profile or a field from a file, or make that of an ideal reference.
 
     Parameters
     ----------
     path : path or str
         The file; units in it are converted to SI.  A text that names no file may be ``disc:R``
         (its radius), ``slit:W`` (its width), ``gaussian:S`` (its standard deviation), each with a
-        unit, such as ``disc:0.5mm``, or ``point``: see :class:`memscal.IdealReference`.
+        unit, such as ``disc:0.5mm``, or ``point``: see :class:`memscal.IdealReference`.  Beside a
+        memscal-reference it may be a field: HDF5 with x, y and sigma_zz, or with a NeXus plot; a
+        2-D array (.npy) or an image (PNG, TIFF), whose rows follow y and columns x.
+    pixel_size : float, optional
+        Size of the pixels of an array or image, in m.
 
     Returns
     -------
@@ -34,7 +60,8 @@ def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
         If the file does not hold a reference that this version can read.
     InputError
-        If the size of an ideal reference is none.
+        If the size of an ideal reference is none, that of pixels is missing, or a field cannot be
+        used.
 
     Examples
     --------
@@ -47,6 +74,11 @@ def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     """
     if (ideal := ideal_reference(path)) is not None:
         return ideal.profile()
+    if os.fspath(path).lower().endswith(_PIXELS):
+        return _read_pixels(path, pixel_size).profile()
+    if pixel_size is not None:
+        problem = f"A pixel size is given, but {os.fspath(path)} is no array and no image."
+        raise InputError(problem, cure="Leave it out (pixel_size, --pixel-size).")
     with open_hdf5(path) as file:
         return profile_from(file)
 
@@ -56,19 +88,68 @@ def ideal_reference(text: str | os.PathLike[str]) -> IdealReference | None:
     match = None if os.path.exists(text) else _NAMED.fullmatch(os.fspath(text).strip())
     if match is None:
         return None
-    shape, number, unit = match.groups(default="")
-    if shape == "point" and not number:
+    shape, size = match.groups()
+    if shape == "point" and size is None:
         return IdealReference(shape)
-    size = f"The {IDEAL[shape] or 'size'} of the reference {os.fspath(text)!r}"
-    try:
-        return IdealReference(shape, float(to_si(float(number), unit.strip(), "length", size)))
-    except ValueError:
-        cure = "Write it with its unit, as disc:0.5mm, slit:200um, gaussian:0.3mm; or point."
-        raise InputError(f"{size} is no length.", cure=cure) from None
+    what = f"The {IDEAL[shape] or 'size'} of the reference {os.fspath(text)!r}"
+    return IdealReference(shape, length(size or "", what))
+
+
+def length(text: str, what: str) -> float:
+    """Read a length with its unit, such as 0.5mm, in m."""
+    match = _LENGTH.fullmatch(text)
+    if match is None:
+        cure = "Give a number with a unit of length, such as 0.5mm or 200um."
+        raise InputError(f"{what}, {text!r}, is no length.", cure=cure)
+    return float(to_si(float(match[1]), match[2], "length", what))
+
+
+def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> StressField:
+    """Read a field from a 2-D array or an image."""
+    data, name = read_bytes(path), os.path.basename(os.fspath(path))
+    if pixel_size is None:
+        raise InputError(
+            f"The size of the pixels of {name} is not given.",
+            why="An array or image does not state it.",
+            cure="Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line.",
+        )
+    require_positive("pixel size", pixel_size, "m")
+    with damage_named(f"{name} cannot be read"):
+        array = name.lower().endswith(".npy")
+        values = np.load(BytesIO(data), allow_pickle=False) if array else _image(data)
+    notes = ""
+    if values.ndim == 3 and values.shape[2] in (1, 2, 3, 4):
+        colours = values.shape[2] > 2
+        notes = "Of the image's channels the first was taken."
+        if colours:
+            notes = "Of the image's colours the luminance was taken."
+        values = values[..., :3] @ _LUMINANCE if colours else values[..., 0]
+    if values.ndim != 2 or values.dtype.kind not in "biuf":
+        problem = f"{name} holds an array of shape {values.shape} and type {values.dtype}."
+        raise InputError(problem, cure="Give one of numbers, in rows along y and columns along x.")
+    y, x = (pixel_size * np.arange(count, dtype=np.float64) for count in values.shape)
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    with placed(name):
+        return StressField(x=x, y=y, values=values, unit="1", notes=notes, source=source)
+
+
+def _image(data: bytes) -> NDArray[Any]:
+    from PIL import Image
+
+    with Image.open(BytesIO(data), formats=("PNG", "TIFF")) as image:
+        if image.width * image.height > _MOST_PIXELS:
+            problem = f"The image has {image.width} x {image.height} pixels."
+            raise InputError(problem, cure="Cut out the field, or bin its pixels.")
+        return np.asarray(image.convert("RGB") if image.mode == "P" else image)
 
 
 def profile_from(file: SafeFile) -> StressProfile:
-    """Read the profile of an open memscal-reference file."""
+    """Read the profile of an open memscal-reference file, or a field of another program."""
+    if file.attribute("/", SCHEMA_ATTRIBUTE) is None:
+        path = ""
+        while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:
+            path = f"{path}/{name}"
+        return read_field(file, path).profile()
     require_schema(file, REFERENCE_SCHEMA)
     return read_profile(file, "/entry/reference", "/entry/parameters", "/entry/process")
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import j0, j1
@@ -74,6 +75,8 @@ class IdealReference:
         """Return it in words, with its size."""
         words = IDEAL[self.shape] and f" of {IDEAL[self.shape]} {self.size * 1e3:.6g} mm"
         return f"{self.shape}{words}"
+
+    notes: ClassVar[str] = ""
 
     @property
     def unit(self) -> str:
