@@ -29,6 +29,7 @@ from memscal.estimation.reference import (
     reference_profile,
     reference_spectra,
     require_calibration_rod,
+    require_one_kind,
     require_one_sensor,
     require_same_set_up,
 )
@@ -334,6 +335,7 @@ def calibrate(
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     owners: Sequence[int] | None = None
     stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
+    require_one_kind(stated, alternatives or ())
     if not any(stated) and any(s.film.law != LINEAR for s in scans):
         # Under another law than the linear one each load has a stress of its own shape.
         of_loads, owners = scans_by_load(scans)

@@ -44,6 +44,20 @@ def is_source(stress: BaseStress | None) -> bool:
     return isinstance(stress, StressProfile) and stress.form is not None
 
 
+def require_one_kind(
+    references: Sequence[BaseStress | None], alternatives: Sequence[BaseStress | None]
+) -> None:
+    """Refuse references that no one conversion constant belongs to."""
+    forms = [getattr(reference, "form", None) for reference in references]
+    kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
+    if len(kinds) > 1 or any(map(is_source, alternatives)) or (kinds != {None} and alternatives):
+        raise InputError(
+            "Sources and stresses, slits and other sources, or sources of several units are mixed.",
+            why="One conversion constant has one unit; an alternative is of a film's stress.",
+            cure="Calibrate each by itself.",
+        )
+
+
 def of_source(scan: Scan, stress: BaseStress | None) -> Scan:
     """Return a scan over a source: nothing that it states of film and rod is uncertain."""
     field = stress.field if isinstance(stress, StressProfile) else None
@@ -108,7 +122,7 @@ def require_same_set_up(
         if stress is not None and not is_source(stress):
             differences += _other_set_up(scan, stress, "reference")
     for scan, given in zip(scans, alternatives, strict=False):
-        if given is not None and not is_source(given):
+        if given is not None:
             differences += _other_set_up(scan, given, "alternative")
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
@@ -221,8 +235,10 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     """Return the wavenumber (rad/m) beyond which a reference has nothing, or none that is seen."""
     if isinstance(reference, Contact):
         return _LARGEST_KH / reference.film.thickness
-    k = np.linspace(0.0, _PASSED / points.step, _WAVENUMBERS)[1:]
     form = reference.form
+    # Of a source without an end, a Gaussian of half the step passes 1e-5 at the last wavenumber.
+    passed = _PASSED if form is None else 0.75 * _PASSED
+    k = np.linspace(0.0, passed / points.step, _WAVENUMBERS)[1:]
     values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
     values = np.abs(values)
     return float(k[values > _NOTHING * values.max()][-1])

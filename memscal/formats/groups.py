@@ -388,9 +388,10 @@ def read_field(file: SafeFile, path: str) -> StressField:
         values, unit = to_si(values, unit, "stress", file.where(at)), "Pa"
     places = [require_array(file, f"{path}/{name}", "length", ndim=1) for name in (x, y)]
     load = require_scalar(file, f"{path}/load", "force") if file.has(f"{path}/load") else None
-    named = {"unit": unit, "load": load, "source": file.source}
     with placed(file.where(path or "/")):
-        return StressField(x=places[0], y=places[1], values=values, **named)
+        return StressField(
+            x=places[0], y=places[1], values=values, unit=unit, load=load, source=file.source
+        )
 
 
 def reference_groups(profile: StressProfile) -> dict[str, Node]:
