@@ -2,7 +2,7 @@ r"""Forward model of scans through fields that are not round: by transforms over
 
 The voltage of a round kernel is :math:`U = \mathcal F^{-1}\{\hat K(|k|)\,\hat\sigma(k_x, k_y)\}`
 on a grid, and at the points by quintic splines through it; its slopes are the same of
-:math:`i k_x \hat U`.  The grid is twice as long as scan and field, so that nothing wraps around.
+:math:`i k_x \hat U`.  The grid is longer than scan and field, so that nothing wraps around.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class FieldModel(ForwardModel):
         fields = [r.field for r in self.references if isinstance(r, FieldSpectrum)]
         wide = max(float(np.ptp(axis)) for field in fields for axis in (field.x, field.y))
         h = max(np.pi / (_OVERSAMPLING * last), points.step / _PER_STEP)
-        count = scipy.fft.next_fast_len(int(np.ceil(2 * (span + wide) / h)), real=True)
+        count = scipy.fft.next_fast_len(int(np.ceil((1.5 * span + wide) / h)), real=True)
         ky = 2 * np.pi * scipy.fft.fftfreq(count, h)
         kx = 2 * np.pi * scipy.fft.rfftfreq(count, h)
         cells = np.nonzero(np.hypot.outer(ky, kx) <= last)
