@@ -382,7 +382,8 @@ def read_field(file: SafeFile, path: str) -> StressField:
     signal = (file.attribute(path, "signal") if path else None) or "sigma_zz"
     at, unit = f"{path}/{signal}", units_of(file, f"{path}/{signal}") or "1"
     if not file.has(at):
-        raise FormatError(f"{file.where(at)} is missing.", why="It should hold a field.")
+        why = "The file is no memscal-reference, and should hold a field there."
+        raise FormatError(f"{file.where(at)} is missing.", why=why)
     values = file.array(at)
     with suppress(UnitError):
         values, unit = to_si(values, unit, "stress", file.where(at)), "Pa"

@@ -12,14 +12,9 @@ from numpy.typing import NDArray
 from memscal.errors import InputError, placed
 from memscal.formats.files import read_bytes
 from memscal.formats.groups import profile_groups, read_field, read_profile
+from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
-from memscal.formats.hdf5.writer import (
-    REFERENCE_SCHEMA,
-    SCHEMA_ATTRIBUTE,
-    Group,
-    file_tree,
-    write_tree,
-)
+from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
 from memscal.formats.values import require_schema
 from memscal.model.arrays import require_positive
@@ -117,13 +112,10 @@ def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> Stre
     with damage_named(f"{name} cannot be read"):
         array = name.lower().endswith(".npy")
         values = np.load(BytesIO(data), allow_pickle=False) if array else _image(data)
-    notes = ""
-    if values.ndim == 3 and values.shape[2] in (1, 2, 3, 4):
-        colours = values.shape[2] > 2
-        notes = "Of the image's channels the first was taken."
-        if colours:
-            notes = "Of the image's colours the luminance was taken."
-        values = values[..., :3] @ _LUMINANCE if colours else values[..., 0]
+    notes, channels = "", values.shape[2] if values.ndim == 3 and not array else 0
+    if channels in (2, 3, 4):
+        notes = "Of the image the luminance was taken."
+        values = values[..., :3] @ _LUMINANCE if channels > 2 else values[..., 0]
     if values.ndim != 2 or values.dtype.kind not in "biuf":
         problem = f"{name} holds an array of shape {values.shape} and type {values.dtype}."
         raise InputError(problem, cure="Give one of numbers, in rows along y and columns along x.")
@@ -145,7 +137,7 @@ def _image(data: bytes) -> NDArray[Any]:
 
 def profile_from(file: SafeFile) -> StressProfile:
     """Read the profile of an open memscal-reference file, or a field of another program."""
-    if file.attribute("/", SCHEMA_ATTRIBUTE) is None:
+    if file.attribute("/", writer.SCHEMA_ATTRIBUTE) is None:
         path = ""
         while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:
             path = f"{path}/{name}"

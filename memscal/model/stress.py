@@ -30,9 +30,8 @@ _IDEAL_RADII, _IDEAL_REACH, _EDGE = 121, 6.0, 1e-6
 class IdealReference:
     r"""A source of known form in place of a stress: no film, rod or load is needed.
 
-    Of value 1 in a disc or slit and at the peak of a Gaussian, so that the conversion constant is
-    the reading per unit of the source; a point has unit integral, and the conversion constant is
-    the reading's integral over the plane.  The transforms, in m^2 (of a slit, in m, across it), are
+    It is 1 in a disc or slit and at the peak of a Gaussian, and A is the reading per unit of it; a
+    point has unit integral, and A is the reading's integral over the plane.  The transforms are
 
     .. math::
 
@@ -42,10 +41,10 @@ class IdealReference:
     Parameters
     ----------
     shape : str
-        ``"disc"``, ``"slit"`` (far longer than G is wide, across a line scan), ``"gaussian"`` or
+        ``"disc"``, ``"slit"`` (far longer than G is wide, across a line), ``"gaussian"``,
         ``"point"``.
     size : float
-        Radius of a disc, width of a slit, standard deviation of a Gaussian, in m; 0 of a point.
+        Radius R of a disc, width W of a slit, standard deviation S of a Gaussian, in m.
 
     Raises
     ------
@@ -54,13 +53,13 @@ class IdealReference:
 
     Examples
     --------
-    >>> disc = IdealReference("disc", 0.5e-3)
-    >>> float(disc.transform(np.zeros(1))[0] / np.pi)
+    >>> float(IdealReference("disc", 0.5e-3).transform(np.zeros(1))[0] / np.pi)
     2.5e-07
     """
 
     shape: str
     size: float = 0.0
+    notes: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         if self.shape not in IDEAL:
@@ -76,52 +75,45 @@ class IdealReference:
         words = IDEAL[self.shape] and f" of {IDEAL[self.shape]} {self.size * 1e3:.6g} mm"
         return f"{self.shape}{words}"
 
-    notes: ClassVar[str] = ""
-
     @property
     def unit(self) -> str:
         """The unit of the source, by which that of the reading is divided."""
         return "1/m^2" if self.shape == "point" else "1"
 
     def transform(self, k: FloatArray) -> FloatArray:
-        """Return the Fourier transform at ``k`` (rad/m)."""
-        phase = np.asarray(k, dtype=np.float64) * self.size
+        """Return the Fourier transform at ``k`` (rad/m), in m^2; of a slit across it, in m."""
+        phase, square = np.asarray(k, dtype=np.float64) * self.size, math.pi * self.size**2
         if self.shape == "disc":
-            ratio = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
-            return np.asarray(math.pi * self.size**2 * ratio)
+            far = phase != 0
+            return square * np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=far)
         if self.shape == "slit":
             return np.asarray(self.size * np.sinc(phase / (2 * math.pi)))
-        if self.shape == "gaussian":
-            return np.asarray(2 * math.pi * self.size**2 * np.exp(-0.5 * phase**2))
-        return np.ones_like(phase)
+        return np.asarray(np.exp(-0.5 * phase**2) * (2 * square or 1.0))
 
     def profile(self) -> "StressProfile":
         """Return the profile that a calibration takes, with a table to draw; a point has none."""
-        half = {"slit": self.size / 2, "gaussian": _IDEAL_REACH * self.size}
-        end = half.get(self.shape, self.size) or 1.0
-        r = np.linspace(0.0, end, _IDEAL_RADII)
-        values = (
-            np.exp(-0.5 * (r / self.size) ** 2) if self.shape == "gaussian" else np.ones(r.size)
+        ends = {"slit": self.size / 2, "gaussian": _IDEAL_REACH * self.size, "point": 1.0}
+        t = np.append(np.linspace(0.0, 1.0, _IDEAL_RADII), 1 + _EDGE)
+        heights = {"gaussian": np.exp(-0.5 * (_IDEAL_REACH * t) ** 2), "point": 0 * t}
+        values = heights.get(self.shape, np.where(t <= 1, 1.0, 0.0))
+        return StressProfile(
+            r=ends.get(self.shape, self.size) * t, sigma_zz=values, load=1.0, ideal=self
         )
-        if self.shape in ("disc", "slit"):
-            r, values = np.append(r, end * (1 + _EDGE)), np.append(values, 0.0)
-        values *= self.shape != "point"
-        return StressProfile(r=r, sigma_zz=values, load=1.0, ideal=self)
 
 
-#: Sides of a field in pixels, what may be left at its border, and how even its axes are.
-_FEWEST, _MOST, _BORDER, _EVEN = 8, 2048, 0.05, 1e-3
+#: Sides of a field in pixels, what may be left at its border, how even its axes are, and the
+#: least share of its sum in that of its moduli.
+_FEWEST, _MOST, _BORDER, _EVEN, _LEAST = 8, 2048, 0.05, 1e-3, 1e-3
 #: Rings of a field, to a pixel, in which its angular mean is summed up.
 _RINGS = 16
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StressField:
-    r"""A field in two dimensions that a sensor was scanned through, or that was moved over it.
+    r"""A field in two dimensions that takes the place of a stress: U is :math:`A\,G \otimes` it.
 
-    The reading is :math:`A\,G \otimes` field, with the centroid of the field's moduli, its axis,
-    at the scan's position: of a sensor at rest, under a beam that moves, the field is turned by
-    180 degrees, unless it is symmetric.
+    The centroid of its moduli is at the scan's position.  Of a beam that moves over a sensor at
+    rest, give the field turned by 180 degrees, unless it is symmetric.
 
     Parameters
     ----------
@@ -144,8 +136,7 @@ class StressField:
     Examples
     --------
     >>> x = np.linspace(-1e-3, 1e-3, 41)
-    >>> values = np.exp(-np.add.outer(x**2 / 0.08e-6, x**2 / 0.04e-6))
-    >>> field = StressField(x=x, y=x, values=values)
+    >>> field = StressField(x=x, y=x, values=np.exp(-np.add.outer(x**2, 2 * x**2) / 0.08e-6))
     >>> round(1e6 * float(field.transform(np.zeros(1))[0] / np.pi), 4)
     0.0566
     """
@@ -162,38 +153,28 @@ class StressField:
         for name in ("x", "y"):
             axis = finite_vector(f"{name} of the field", getattr(self, name))
             object.__setattr__(self, name, axis)
-            if not _FEWEST <= axis.size <= _MOST:
-                raise InputError(
-                    f"The field has {axis.size} values along {name}, not {_FEWEST} to {_MOST}.",
-                    cure="Give the part that is not zero, in larger pixels if need be.",
-                )
             require_increasing(f"{name} of the field", axis)
             steps = np.diff(axis)
-            if np.ptp(steps) > _EVEN * steps.mean():
-                cure = "Interpolate the field to even pixels."
-                raise InputError(f"{name} of the field is not evenly spaced.", cure=cure)
+            if not _FEWEST <= axis.size <= _MOST or np.ptp(steps) > _EVEN * steps.mean():
+                problem = f"{name} of the field has {axis.size} values, or uneven ones"
+                cure = "Cut out what is not zero, and interpolate it to even pixels."
+                raise InputError(f"{problem}: not {_FEWEST} to {_MOST} even ones.", cure=cure)
         shape, expected = np.shape(self.values), (self.y.size, self.x.size)
         if tuple(shape) != expected:
             raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
         values = finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
-        size = float(np.abs(values).max())
-        if not values.sum() > 1e-3 * np.abs(values).sum():
-            cure = "Change its sign, or subtract its background."
-            raise InputError("The field adds up to nothing, or to a pull.", cure=cure)
         border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
-        if (left := float(np.abs(border).mean()) / size) > _BORDER:
+        left = np.abs(border).mean() / max(np.abs(values).max(), np.finfo(float).tiny)
+        if left > _BORDER or not values.sum() > _LEAST * np.abs(values).sum():
             raise InputError(
-                f"At its border the field has {left:.1%} of its largest value left.",
-                why="What lies beyond would be missing.",
-                cure="Subtract the background, or give a larger field.",
+                f"The field adds up to {values.sum():.3g}, with {left:.1%} of its largest value "
+                "left at its border.",
+                why="A field adds up to more than zero, and is zero where it ends.",
+                cure="Change its sign, subtract the background, or give a larger field.",
             )
         if self.load is not None:
             require_positive("load of the field", self.load, "N")
-
-    def __repr__(self) -> str:
-        """Return size and unit in place of the values."""
-        return f"<StressField: {self.y.size} x {self.x.size} pixels, in {self.unit}>"
 
     def __str__(self) -> str:
         """Return it in words."""
@@ -221,14 +202,19 @@ class StressField:
             sides.append(np.exp(-1j * np.multiply.outer(k, offset)) * inside[:, None])
         return np.asarray(sides[0] @ self.values @ sides[1].T * self.cell_area)
 
+    def _rings(self, per_pixel: int) -> tuple[FloatArray, ...]:
+        """Return mean radius, sum and number of the pixels in rings about the axis."""
+        radius = np.hypot.outer(*self._offsets).ravel()
+        ring = np.rint(radius * per_pixel / math.sqrt(self.cell_area)).astype(int)
+        summed = radius, self.values.ravel(), np.ones(radius.size)
+        sums = [np.bincount(ring, weights) for weights in summed]
+        radii, totals, counts = (part[sums[2] > 0] for part in sums)
+        return radii / counts, totals, counts
+
     def transform(self, k: FloatArray) -> FloatArray:
         """Return the Hankel transform of the mean over directions about the axis."""
-        radius = np.hypot.outer(*self._offsets).ravel()
-        ring = np.rint(radius * _RINGS / math.sqrt(self.cell_area)).astype(int)
-        total, used = np.bincount(ring, self.values.ravel()), np.bincount(ring)
-        r = (np.bincount(ring, radius) / np.maximum(used, 1))[used > 0]
-        bessel = j0(np.multiply.outer(np.asarray(k, dtype=np.float64), r))
-        return np.asarray(bessel @ total[used > 0] * self.cell_area)
+        r, total, _ = self._rings(_RINGS)
+        return np.asarray(j0(np.multiply.outer(k, r)) @ total * self.cell_area)
 
     def unevenness(self, k: FloatArray) -> float:
         """Return the share of the transform up to the last of ``k`` that is not round."""
@@ -238,19 +224,15 @@ class StressField:
             for way, offset in zip((np.sin(angle), np.cos(angle)), self._offsets, strict=True)
         ]
         polar = np.sum((sides[0] @ self.values) * sides[1], axis=1).reshape(k.size, -1)
-        power = np.abs(polar - polar.mean(axis=1, keepdims=True)) ** 2, np.abs(polar) ** 2
-        return float(np.sqrt(np.divide(*(np.sum(k @ part) for part in power))))
+        uneven = polar - polar.real.mean(axis=1, keepdims=True)
+        powers = [np.sum(k @ np.abs(part) ** 2) for part in (uneven, polar)]
+        return float(np.sqrt(powers[0] / powers[1]))
 
     def profile(self) -> "StressProfile":
         """Return the profile that a calibration takes, with the mean over directions as table."""
-        radius, step = np.hypot.outer(*self._offsets).ravel(), math.sqrt(self.cell_area)
-        ring = np.rint(radius / step).astype(int)
-        used = np.bincount(ring)
-        mean = np.bincount(ring, self.values.ravel()) / np.maximum(used, 1)
-        r = np.asarray(step * np.flatnonzero(used), dtype=np.float64)
-        return StressProfile(
-            r=r, sigma_zz=mean[used > 0], load=self.load or 1.0, field=self, source=self.source
-        )
+        r, total, count = self._rings(1)
+        mean, load = np.asarray(total / count), self.load or 1.0
+        return StressProfile(r=r, sigma_zz=mean, load=load, field=self, source=self.source)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -347,6 +329,11 @@ class StressProfile:
     def form(self) -> IdealReference | StressField | None:
         """The source that it is of, in place of a stress below a film."""
         return self.ideal or self.field
+
+    @property
+    def unit(self) -> str:
+        """The unit of its values: Pa, or that of the source."""
+        return self.form.unit if self.form else "Pa"
 
     @property
     def force(self) -> float:
