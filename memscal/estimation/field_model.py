@@ -60,7 +60,7 @@ class FieldModel(ForwardModel):
         ky = 2 * np.pi * scipy.fft.fftfreq(count, h)
         kx = 2 * np.pi * scipy.fft.rfftfreq(count, h)
         cells = np.nonzero(np.hypot.outer(ky, kx) <= last)
-        # Middle of the grid; a quintic spline through values has these coefficients (Unser 1999).
+        # Middle of the grid; a quintic spline through values has these coefficients.
         turn = [np.exp(-0.5j * k * count * h) * 120 for k in (ky, kx)]
         spline = [66 + 52 * np.cos(k * h) + 2 * np.cos(2 * k * h) for k in (ky, kx)]
         factor = np.multiply.outer(turn[0] / spline[0], turn[1] / spline[1]) / h**2

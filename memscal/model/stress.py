@@ -207,7 +207,7 @@ class StressField:
         radius = np.hypot.outer(*self._offsets).ravel()
         ring = np.rint(radius * per_pixel / math.sqrt(self.cell_area)).astype(int)
         summed = radius, self.values.ravel(), np.ones(radius.size)
-        sums = [np.bincount(ring, weights) for weights in summed]
+        sums = [np.asarray(np.bincount(ring, part), dtype=np.float64) for part in summed]
         radii, totals, counts = (part[sums[2] > 0] for part in sums)
         return radii / counts, totals, counts
 
