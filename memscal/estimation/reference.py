@@ -35,7 +35,7 @@ _MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
 #: A field is taken as round where less than this share of it is not, at so many wavenumbers.
-_ROUND, _SEEN = 0.005, 33
+_ROUND, _SEEN = 0.005, 17
 _OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
 
 

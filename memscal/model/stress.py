@@ -104,8 +104,8 @@ class IdealReference:
 #: Sides of a field in pixels, what may be left at its border, how even its axes are, and the
 #: least share of its sum in that of its moduli.
 _FEWEST, _MOST, _BORDER, _EVEN, _LEAST = 8, 2048, 0.05, 1e-3, 1e-3
-#: Rings of a field, to a pixel, in which its angular mean is summed up.
-_RINGS = 16
+#: Rings of a field, to a pixel, in which its angular mean is summed up; directions over half a turn.
+_RINGS, _WAYS = 16, 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -218,7 +218,7 @@ class StressField:
 
     def unevenness(self, k: FloatArray) -> float:
         """Return the share of the transform up to the last of ``k`` that is not round."""
-        angle = np.arange(_RINGS) * np.pi / _RINGS
+        angle = np.arange(_WAYS) * np.pi / _WAYS
         sides = [
             np.exp(-1j * np.multiply.outer(np.multiply.outer(k, way).ravel(), offset))
             for way, offset in zip((np.sin(angle), np.cos(angle)), self._offsets, strict=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.bounds import RARE
+from helpers.bounds import FULL, RARE
 from helpers.scans import EXACT_FILM, EXACT_ROD
 from PIL import Image
 from scipy.integrate import quad
@@ -96,7 +96,7 @@ def test_a_and_width_are_found_by_both_routes(kind: str) -> None:
     assert exact.other.parameters["conversion_constant"] == pytest.approx(A, rel=2e-4)
     assert exact.conversion_constant == pytest.approx(A, rel=5e-3)
     assert exact.gaussian_sigma == pytest.approx(SIGMA, rel=2e-4)
-    seeds, z = 6, {}
+    seeds, z = (60 if FULL else 6), {}
     for seed in range(seeds):
         a = memscal.calibrate(scanned(kind, seed=seed), reference=NAMES[kind]).apparatus
         for name, p, truth in (
