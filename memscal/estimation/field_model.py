@@ -54,7 +54,7 @@ class FieldModel(ForwardModel):
         points, last = self.points, float(self.k[-1])
         span = max(float(np.ptp(points.x)), float(np.ptp(points.y)))
         fields = [r.field for r in self.references if isinstance(r, FieldSpectrum)]
-        wide = max(float(np.ptp(axis)) for field in fields for axis in (field.x, field.y))
+        wide = max((np.ptp(axis) for f in fields for axis in (f.x, f.y)), default=0.0)
         h = max(np.pi / (_OVERSAMPLING * last), points.step / _PER_STEP)
         count = scipy.fft.next_fast_len(int(np.ceil((1.5 * span + wide) / h)), real=True)
         ky = 2 * np.pi * scipy.fft.fftfreq(count, h)
