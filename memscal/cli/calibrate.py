@@ -116,6 +116,8 @@ Examples:
   memscal calibrate scan.h5
   memscal calibrate scan.h5 -o sensor.apparatus.h5 --figure scan.png --report scan.html
   memscal calibrate scan.h5 --reference fem.h5 --json --sweep
+  memscal calibrate scan.h5 --reference disc:0.5mm
+  memscal calibrate scan.h5 --reference beam.png --pixel-size 5um
   memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
   memscal calibrate scan.h5 --method bayesian --monte-carlo 1000
   memscal calibrate scan.h5 --channel xz

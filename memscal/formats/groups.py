@@ -375,6 +375,12 @@ def _form(form: IdealReference | StressField) -> Group:
     return Group("NXdata", axes, {"signal": "field", "axes": ("y", "x")})
 
 
+def _read_form(file: SafeFile, path: str) -> IdealReference | StressField | None:
+    if file.has(f"{path}/shape"):
+        return IdealReference(**read_record(records.IDEAL_REFERENCE, file, path))
+    return read_field(file, path) if file.has(f"{path}/field") else None
+
+
 def read_field(file: SafeFile, path: str) -> StressField:
     """Read a field from an NXdata group, or from one that holds x, y and sigma_zz or field."""
     axes = file.attribute(path, "axes") if path else None
@@ -417,13 +423,9 @@ def read_profile(
     if file.has(f"{parameters}/indenter"):
         indenter = read_indenter(file, f"{parameters}/indenter")
     defaults = {} if load is None else {"load": load}
-    if file.has(f"{data}/shape"):
-        ideal = IdealReference(**read_record(records.IDEAL_REFERENCE, file, data))
+    if (form := _read_form(file, data)) is not None:
         stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
-        return replace(ideal.profile(), **stated)
-    if file.has(f"{data}/field"):
-        stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
-        return replace(read_field(file, data).profile(), **stated)
+        return replace(form.profile(), **stated)
     return StressProfile(
         film=film,
         indenter=indenter,

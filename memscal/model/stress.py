@@ -104,7 +104,7 @@ class IdealReference:
 #: Sides of a field in pixels, what may be left at its border, how even its axes are, and the
 #: least share of its sum in that of its moduli.
 _FEWEST, _MOST, _BORDER, _EVEN, _LEAST = 8, 2048, 0.05, 1e-3, 1e-3
-#: Rings of a field, to a pixel, in which its angular mean is summed up; directions over half a turn.
+#: Rings of a field, to a pixel, in which its mean is summed up; directions over half a turn.
 _RINGS, _WAYS = 16, 8
 
 
