@@ -82,6 +82,8 @@ from .model.provenance import SourceFile as SourceFile
 from .model.scan import Places as Places
 from .model.scan import Scan as Scan
 from .model.scan import StressSensor as StressSensor
+from .model.stress import IdealReference as IdealReference
+from .model.stress import StressField as StressField
 from .model.stress import StressProfile as StressProfile
 from .planning.design import Design as Design
 from .planning.design import Plan as Plan

@@ -157,6 +157,15 @@ class Lattice:
         shape = (self.y.size, self.x.size)
         return np.asarray(scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area)
 
+    def sampled(self, plane: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
+        """Return a field by its transform (ky, kx) about the axis, as far as this samples it."""
+        dy, dx = self.spacing
+        ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
+        kx = 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
+        spectrum = plane(ky, kx) * np.exp(1j * np.add.outer(ky * self.y[0], kx * self.x[0]))
+        field = scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size))
+        return np.asarray(field / self.cell_area)
+
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the central point."""
         return self.forward(scipy.fft.ifftshift(field))

@@ -27,6 +27,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.special import j0, j1, jv
@@ -54,6 +55,10 @@ def ring_areas(r: FloatArray) -> FloatArray:
     weights = 2 * np.pi * r * np.gradient(r)
     weights[0] += np.pi * (r[1] - r[0]) ** 2 / 6
     return np.asarray(weights)
+
+
+#: Order of a transform across lines: U(x) is the integral of U(k) cos(kx) dk/pi.
+ACROSS = -1
 
 
 @lru_cache(maxsize=8)
@@ -87,7 +92,8 @@ class Wavenumbers:
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
-        matrix = bessel(order, np.multiply.outer(np.asarray(r, dtype=np.float64), self.k))
+        phase = np.multiply.outer(np.asarray(r, dtype=np.float64), self.k)
+        matrix = 2 * np.cos(phase) / self.k if order == ACROSS else bessel(order, phase)
         return np.asarray(matrix @ (spectrum.T * self.weights).T)
 
 
@@ -97,12 +103,14 @@ class RadialSpectrum:
 
     wavenumbers: Wavenumbers
     values: FloatArray
-    order: int = 0
+    order: int = 0  # ACROSS: of a field that is the same along lines, by the distance from one
+    source: bool = False  # of a source that ends, not of a stress that decays as a film's does
+    model: ClassVar[Any] = None  # of scans through it, where it is not the one of round fields
 
     @property
     def scalar(self) -> RadialSpectrum:
         r"""The scalar itself; of a vector field :math:`v = -\nabla\phi` its potential."""
-        if self.order == 0:
+        if self.order <= 0:
             return self
         return RadialSpectrum(self.wavenumbers, self.values / self.wavenumbers.k)
 
@@ -115,6 +123,11 @@ class RadialSpectrum:
     def at(self, r: FloatArray) -> FloatArray:
         """Evaluate the function, or the vector's radial component, at radii ``r`` (m)."""
         return self.wavenumbers.synthesise(self.values, r, order=self.order)
+
+    def plane(self, ky: FloatArray, kx: FloatArray) -> FloatArray:
+        """Transform over the plane, (ky, kx); zero beyond the last node."""
+        k, nodes = np.hypot.outer(ky, kx), self.wavenumbers.k
+        return np.where(k <= nodes[-1], radial_spline(nodes, self.values)(k), 0.0)
 
 
 def radial_spline(

@@ -24,10 +24,13 @@ from memscal.errors import InputError, MemscalError
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import loads_differ, scans_by_load
 from memscal.estimation.reference import (
+    is_source,
+    of_source,
     press_neo_hookean,
     reference_profile,
     reference_spectra,
     require_calibration_rod,
+    require_one_kind,
     require_one_sensor,
     require_same_set_up,
 )
@@ -45,7 +48,7 @@ from memscal.model.film import LINEAR
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
+from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
@@ -166,8 +169,10 @@ def _reconvolution(solution: Solution) -> Reconvolution:
 #: Methods whose derivatives are complete.
 _LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
-Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
-"""A base stress, the path of a file that holds one, or nothing: the rod is solved."""
+Reference: TypeAlias = (
+    StressProfile | StressField | IdealReference | Contact | str | PathLike[str] | None
+)
+"""A base stress, an ideal reference, the path or name of one, or nothing: the rod is solved."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -242,6 +247,7 @@ def calibrate(
     method: str | Method = "white-noise",
     centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
+    pixel_size: float | None = None,
     free: str | Sequence[str] = (),
     seed: int = 0,
     override: bool = False,
@@ -258,9 +264,13 @@ def calibrate(
     scan : Scan or path, or a sequence of them
         Voltage against the rod's position.  Several scans of one sensor, at other loads, with
         other rods or films, along x or y, are fitted together.
-    reference : StressProfile, Contact or path, optional
+    reference : StressProfile, Contact, IdealReference, path or str, optional
         Stress at the base of the film, one for each scan.  By default the one that travels with
-        the scan; without that, the rod is solved on the film.
+        the scan; without that, the rod is solved on the film.  ``"disc:0.5mm"``, ``"slit:200um"``,
+        ``"gaussian:0.3mm"`` and ``"point"`` are sources in place of a stress, of which A is the
+        reading per unit (:class:`memscal.IdealReference`), as is a :class:`memscal.StressField` or
+        the file of one: film and rod are not used, and loads are strengths relative to the load of
+        the first scan.
     alternative : StressProfile, Contact or path, optional
         The same by another model of the film.  Its difference is counted as a rectangular
         uncertainty of the model's form, ``model_form``, in place of the neo-Hookean film's.
@@ -286,6 +296,8 @@ def calibrate(
         by an F test at 1/1000 (check ``repeat_centres``); a message says so.
     correlations : mapping of (str, str) to float, optional
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
+    pixel_size : float, optional
+        Size of the pixels of a reference that is an array or image, in m.
     free : str or sequence of str
         ``"thickness"`` estimates the thickness of the film from scans with several rods, or at
         several loads on a film of a stated law that is not linear; what the film states is its
@@ -317,15 +329,20 @@ def calibrate(
     True
     """
     scans, pairs = require_one_sensor(opened_scans(scan)), correlations or {}
-    for rod_scan in scans:
-        require_calibration_rod(rod_scan)
-    references = _references(reference, scans)
+    references = _references(reference, scans, pixel_size)
+    for rod_scan, given in zip(scans, references, strict=True):
+        if not is_source(given or rod_scan.reference):
+            require_calibration_rod(rod_scan)
     known = film_law, mooney_rivlin_ratio, rod_friction
-    scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
+    scans = tuple(
+        of_source(s, r or s.reference) if is_source(r or s.reference) else _of_law(s, r, known)
+        for s, r in zip(scans, references, strict=True)
+    )
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     owners: Sequence[int] | None = None
     stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
+    require_one_kind(stated, alternatives or ())
     if not any(stated) and any(s.film.law != LINEAR for s in scans):
         # Under another law than the linear one each load has a stress of its own shape.
         of_loads, owners = scans_by_load(scans)
@@ -357,7 +374,7 @@ def calibrate(
     if freed is not None:
         messages = (*freed.messages, *messages)
         configuration["free"] = freed.record
-    if loads_differ([s.load for s in solution.scans]):
+    if loads_differ([s.load for s in solution.scans]) and not is_source(solution.stress):
         from memscal.calibration.film_inference import weigh_laws
 
         if (compared := weigh_laws(solution)) is not None:
@@ -406,7 +423,9 @@ def _of_law(
 
 
 def _references(
-    reference: Reference | Sequence[Reference], scans: Sequence[Scan]
+    reference: Reference | Sequence[Reference],
+    scans: Sequence[Scan],
+    pixel_size: float | None = None,
 ) -> list[BaseStress | None]:
     """Read a reference for each scan; a single one is that of all scans."""
     if isinstance(reference, Sequence) and not isinstance(reference, str):
@@ -415,20 +434,27 @@ def _references(
             problem = f"{len(reference)} references were given, but there {count}."
             cure = "Give one for each scan, in their order, or one for all."
             raise InputError(problem, cure=cure)
-        return [_read(item) for item in reference]
-    return [_read(reference)] * len(scans)
+        return [_read(item, scans[0].load, pixel_size) for item in reference]
+    return [_read(reference, scans[0].load, pixel_size)] * len(scans)
 
 
-def _read(reference: Reference) -> BaseStress | None:
+def _read(reference: Reference, load: float, pixel_size: float | None) -> BaseStress | None:
+    """Read a reference; a source has its own strength at the nominal load of the first scan."""
     if isinstance(reference, str | PathLike):
         from memscal.formats.reference import read_reference
 
-        return read_reference(reference)
+        reference = read_reference(reference, pixel_size=pixel_size)
+    elif isinstance(reference, IdealReference | StressField):
+        reference = reference.profile()
+    if isinstance(reference, StressProfile) and (form := reference.form) is not None:
+        stated = form.load if isinstance(form, StressField) else None
+        return replace(reference, load=stated or load)
     if reference is None or isinstance(reference, StressProfile | Contact):
         return reference
     raise InputError(
         f"The reference is a {type(reference).__name__}.",
-        cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
+        cure="Give a contact from memscal.indent(), a StressProfile, a StressField, an ideal one "
+        "such as disc:0.5mm, or the path of a file.",
     )
 
 

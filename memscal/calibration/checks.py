@@ -15,7 +15,7 @@ from memscal.estimation import assumptions
 from memscal.estimation import residuals as unexplained
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import carried_force
+from memscal.estimation.reference import carried_force, is_source
 from memscal.estimation.residuals import FEWEST_RESIDUALS, Residuals, TestOutcome
 from memscal.estimation.smoothing import RESOLVED
 from memscal.mechanics.press_rod import press_rod
@@ -115,7 +115,8 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
             "need not be round; beyond 18 the radial profile is only a mean over directions. A "
             "failure means that the ellipse could not be fitted."
         )
-        return replace(_added("axisymmetry", uneven, meaning), limit=math.inf)
+        p_value = float(chdtrc(uneven.count, uneven.fall))
+        return check("axisymmetry", uneven.fall, math.inf, meaning, p_value)
     extra = assumptions.symmetry_test(estimate)
     parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:
@@ -261,7 +262,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_agreements(solution, results),
         *_shape(solution, results.parameters),
         *_set_up(solution),
-        _indentation(solution, results),
+        *([] if is_source(solution.stress) else [_indentation(solution, results)]),
         *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
@@ -417,7 +418,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "noise is not what the uncertainties take it for: look at the points that the messages "
         "name.",
     }
-    return [check(name, *values[name], meanings[name]) for name in values]
+    of_film = ("width_over_thickness", "reference_force") if is_source(solution.stress) else ()
+    return [check(name, *values[name], meanings[name]) for name in values if name not in of_film]
 
 
 def _indentation(solution: Solution, results: Results) -> QualityCheck:

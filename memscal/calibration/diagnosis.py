@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 
 from memscal.errors import FitError, MemscalError
-from memscal.estimation.forward import ForwardModel
+from memscal.estimation.forward import forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints, joined_points, mistaken_unit
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
-from memscal.estimation.reference import reference_spectra
+from memscal.estimation.reference import is_source, reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
@@ -148,7 +148,9 @@ class _Search:
         """Lengths that make the reference narrower than the scan."""
         h = min(scan.film.thickness for scan in self.scans)
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
-        stretch = _grid(_LONGEST_SPAN * h / span)
+        # A source has no film: it is scaled up to a third of the longest span.
+        thick = span / 3 if is_source(self.stresses[0]) else h
+        stretch = _grid(_LONGEST_SPAN * thick / span)
         positions = _Length("positions", "data/x", 1.0, stretch)
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
             return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
@@ -240,7 +242,7 @@ class _Search:
         joined = joined_points(points)
         weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
         with np.errstate(all="ignore"), suppress(MemscalError, np.linalg.LinAlgError):
-            model = ForwardModel(joined, reference_spectra(stresses, points))
+            model = forward_model(joined, reference_spectra(stresses, points))
             fit = fit_gaussian_to_points(model, weights)
             residual = (joined.u - fit.predicted) * np.sqrt(weights)
             if np.isfinite(residual).all():
@@ -258,6 +260,10 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
             film = replace(film, thickness=film.thickness * factor)
         return press_rod(replace(film, law="", mooney_rivlin_ratio=None), rod, _LOAD)
     profile = stress.profile() if isinstance(stress, Contact) else stress
+    if profile.ideal is not None:
+        return replace(profile, ideal=replace(profile.ideal, size=profile.ideal.size * factor))
+    if (field := profile.field) is not None:
+        return replace(profile, field=replace(field, x=field.x * factor, y=field.y * factor))
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
     zz = profile.sigma_zz / factor**2
     return replace(profile, r=profile.r * factor, sigma_zz=zz, sigma_rz=shear)

@@ -93,7 +93,13 @@ class LineFields:
         reference = estimate.model.reference
         spectra = np.stack([spectrum.scalar.values, reference.scalar.values], axis=1)
         wavenumbers = reference.wavenumbers
-        both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
+        if reference.source:
+            # The grid does not sample the edge of a source, but its transform.
+            k = grid.wavenumber_axis
+            planes = (RadialSpectrum.plane(f, k, k) for f in (spectrum, reference))
+            both = np.stack([grid.inverse(plane) for plane in planes], axis=-1)
+        else:
+            both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
         return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
 
@@ -169,10 +175,15 @@ class RasterFields:
         y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
-        stress = on_grid(estimate.model.reference.at, grid, step)
-        central = _about_zero(grid)
+        reference, central = estimate.model.reference, _about_zero(grid)
+        round_ = on_grid(reference.at, grid, step)
+        # The lattice does not sample the edge of a source.
+        stress = grid.sampled(reference.plane) if reference.source else round_
         voltage = on_grid(smoothed.spectrum.at, grid, step)
         voltage += grid.convolve(estimate.oval_kernel(*central.axes), stress)
+        if reference.model:
+            # The profile is that of the field's mean over directions.
+            voltage += grid.convolve(on_grid(estimate.radial, central, step), stress - round_)
         if rows.size:
             # A point that is missing keeps what was fitted; an outlier keeps most of it.
             departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight

@@ -11,7 +11,7 @@ from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate, point_messages
-from memscal.estimation.reference import RECTANGLE
+from memscal.estimation.reference import RECTANGLE, is_source
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import is_tabulated
 from memscal.model import checks as quality
@@ -43,10 +43,18 @@ def calibration_messages(
     messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
     messages += _directions(solution.estimate, checks)
     messages += _method(solution)
-    if not isinstance(solution.stress, Contact) and solution.stress.convergence is None:
+    stress = solution.stress
+    if not isinstance(stress, Contact) and (form := stress.form) is not None:
+        text = (
+            f"The reference is a {form}, taken as exact: A is the reading over its unit, "
+            f"{form.unit}. Film and rod that the scan states are not used."
+        )
+        messages.append(Message("reference", f"{text} {form.notes}".strip()))
+    elif not isinstance(stress, Contact) and stress.convergence is None:
         text = "The reference states no convergence: its own error is not counted."
         messages.append(Message("convergence_unstated", text))
-    messages += _law(solution, results) + _unstated(solution, results)
+    if not is_source(stress):
+        messages += _law(solution, results) + _unstated(solution, results)
     if scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import j1
 
+from memscal.axisymmetry.hankel import ACROSS
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
@@ -20,6 +21,7 @@ from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation import points
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.forward import ForwardModel
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
@@ -81,7 +83,7 @@ def solved(
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
     other: Method = WhiteNoise() if isinstance(method, Bayesian) else Bayesian()
-    divisible = smoothed is not None and fields.even
+    divisible = smoothed is not None and fields.even and _of_round_fields(estimate)
     beside = deconvolve(estimate, band, fields, other) if both and divisible else None
     result = deconvolve(estimate, band, fields, method)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
@@ -166,7 +168,18 @@ def prepare_fields(
     """Lift the profile of lines or several scans, or place a raster (evenly if it is divided)."""
     if smoothed is not None and estimate.points.as_raster:
         return RasterFields.place(estimate, smoothed, choice, divided)
+    if divided and not _of_round_fields(estimate):
+        raise InputError(
+            "The reference is a field that is not round, which a line does not show.",
+            why="A division needs the voltage over the plane, as one raster has it.",
+            cure='Use method="bayesian" (--method bayesian), or scan one raster.',
+        )
     return LineFields.lift(estimate, (smoothed or estimate).spectrum, choice)
+
+
+def _of_round_fields(estimate: ProfileEstimate) -> bool:
+    """Whether the fields can be divided: they are round, or those of a raster."""
+    return type(estimate.model) is ForwardModel or estimate.points.as_raster
 
 
 @dataclass(frozen=True)
@@ -230,7 +243,7 @@ class Solution:
         spectrum, reach = self.estimate.spectrum, self.choice.support
         if spectrum.order:
             r = np.linspace(0.0, _FAR * reach, _RADII)
-            flux = np.abs(spectrum.at(r)) * r
+            flux = np.abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
             return float(flux[r > reach].sum() / flux.sum())
         # Within R the integral is that of R U(k) J_1(kR) dk over all k.
         k = spectrum.wavenumbers.k
@@ -241,7 +254,7 @@ class Solution:
 
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
     """Signal of the quotient at the points, in V: each scan through its own reference."""
-    if estimate.points.scans == 1:
+    if estimate.points.scans == 1 and estimate.model.reference.order != ACROSS:
         back = fourier_ratio.reconvolve(1.0, quotient, fields.stress)
         return fields.at_points(back.values) * estimate.points.load
     k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)

@@ -116,6 +116,8 @@ Examples:
   memscal calibrate scan.h5
   memscal calibrate scan.h5 -o sensor.apparatus.h5 --figure scan.png --report scan.html
   memscal calibrate scan.h5 --reference fem.h5 --json --sweep
+  memscal calibrate scan.h5 --reference disc:0.5mm
+  memscal calibrate scan.h5 --reference beam.png --pixel-size 5um
   memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
   memscal calibrate scan.h5 --method bayesian --monte-carlo 1000
   memscal calibrate scan.h5 --channel xz
@@ -134,8 +136,13 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
 )
 @option("--reference", FILE, metavar="FILE")(
-    "Stress at the base of the film (memscal-reference). By default the one in the scan, or "
-    "else the rod is solved on the film."
+    "Stress at the base of the film (memscal-reference); or a source, for which film and rod are "
+    "not used: disc:R, slit:W, gaussian:S (radius, width, standard deviation: disc:0.5mm), point. "
+    "Or a field: HDF5, .npy, PNG, TIFF. By default the one in the scan, or else the rod is solved "
+    "on the film."
+)
+@option("--pixel-size", metavar="LENGTH")(
+    "Size of the pixels of a reference that is an array or image, such as 5um."
 )
 @option("--alternative", FILE, metavar="FILE")(
     "The same stress by another model of the film (memscal-reference): its difference is counted "
@@ -239,7 +246,7 @@ def command(
     outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
     regulariser = _chosen_method(method, options, seed, channel)
     settings["correlations"] = dict(_correlation(text) for text in correlations)
-    data, profile = _read(scans, reference)
+    data, profile = _read(scans, reference, settings.pop("pixel_size"))
     other = None if alternative is None else _read_reference(alternative)
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs, force=force, inputs=inputs)
@@ -273,23 +280,25 @@ def command(
 
 
 def _read(
-    paths: tuple[Path, ...], reference: Path | None
+    paths: tuple[Path, ...], reference: Path | None, pixel_size: str | None
 ) -> tuple[list[Scan], StressProfile | None]:
     """Read the inputs, and refuse an indenter that cannot calibrate."""
-    from memscal.estimation.reference import require_calibration_rod
+    from memscal.estimation.reference import is_source, require_calibration_rod
     from memscal.formats.scan import read_scan
 
     scans = [read_scan(path) for path in paths]
+    profile = None if reference is None else _read_reference(reference, pixel_size)
     for scan, path in zip(scans, paths, strict=True):
-        require_calibration_rod(scan)
+        if not is_source(profile or scan.reference):
+            require_calibration_rod(scan)
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")
-    return scans, None if reference is None else _read_reference(reference)
+    return scans, profile
 
 
-def _read_reference(path: Path) -> StressProfile:
+def _read_reference(path: Path, pixel_size: str | None = None) -> StressProfile:
     from memscal.errors import InputError
-    from memscal.formats.reference import read_reference
+    from memscal.formats.reference import length, read_reference
 
     if path.suffix.lower() in (".csv", ".txt", ".tsv", ".dat"):
         raise InputError(
@@ -299,7 +308,8 @@ def _read_reference(path: Path) -> StressProfile:
             "--r-unit mm --sigma sigma_zz --sigma-unit Pa --load 1 "
             f"-o {path.with_suffix('.h5')}",
         )
-    return read_reference(path)
+    size = None if pixel_size is None else length(pixel_size, "The pixel size")
+    return read_reference(path, pixel_size=size)
 
 
 def _rehearse(

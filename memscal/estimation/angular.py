@@ -59,43 +59,24 @@ class AngularDepartures:
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Kernels at positions from the centre, shape (n,), in m: (n, count), in V/Pa/m^2."""
-        table = self._table(float(np.hypot(x, y).max(initial=self.blur)))
-        radial = [rings_of_order(m, table, self.radius, self.blur) for m in ORDERS]
-        return self._around(x, y, table, radial)
-
-    def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
-        """Voltages of the kernels at the points, for centres (scans, 2) in m: (n, count), in V."""
-        points = model.points
-        columns = np.zeros((points.u.size, self.count))
-        for scan, reference in enumerate(model.references):
-            rows = points.scan == scan
-            x, y = points.x[rows] - centres[scan, 0], points.y[rows] - centres[scan, 1]
-            k, tables = model.k, [model.table(m) for m in ORDERS]
-            measure = reference.wavenumbers.weights * reference.values
-            measure = measure * np.exp(-0.5 * (self.blur * k) ** 2)
-            rings = np.multiply.outer(k, self.radius)
-            radial = [
-                matrix @ (measure[:, None] * bessel(m, rings))
-                for m, (_, matrix) in zip(ORDERS, tables, strict=True)
-            ]
-            table = tables[0][0]
-            columns[rows] = points.load[rows, None] * self._around(x, y, table, radial)
-        return columns
-
-    def _table(self, reach: float) -> FloatArray:
-        intervals = int(np.ceil(reach * _PER_BLUR / self.blur)) + 3
-        return np.linspace(0.0, intervals * self.blur / _PER_BLUR, intervals + 1)
-
-    def _around(
-        self, x: FloatArray, y: FloatArray, table: FloatArray, radial: list[FloatArray]
-    ) -> FloatArray:
         from scipy.interpolate import CubicSpline
 
         r, angle, blocks = np.hypot(x, y), np.arctan2(y, x), []
-        for i, (m, rings) in enumerate(zip(ORDERS, radial, strict=True)):
-            values = CubicSpline(table, rings)(r)
+        step = self.blur / _PER_BLUR
+        table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
+        for i, m in enumerate(ORDERS):
+            values = CubicSpline(table, rings_of_order(m, table, self.radius, self.blur))(r)
             both = zip((np.cos, np.sin), self.amplitudes[2 * i : 2 * i + 2], strict=True)
             blocks += [turn(m * angle)[:, None] * (values @ each) for turn, each in both]
+        return np.hstack(blocks)
+
+    def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
+        """Voltages of the kernels at the points, for centres (scans, 2) in m: (n, count), in V."""
+        blurred, blocks = np.exp(-0.5 * (self.blur * model.k) ** 2)[:, None], []
+        for i, m in enumerate(ORDERS):
+            rings = blurred * bessel(m, np.multiply.outer(model.k, self.radius))
+            cosines, sines = self.amplitudes[2 * i : 2 * i + 2]
+            blocks.append(model.around(m, rings @ cosines, rings @ sines, centres))
         return np.hstack(blocks)
 
 

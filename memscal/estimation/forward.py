@@ -19,15 +19,15 @@ the sensor to the indenter,
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ive, j0, j1
 
-from memscal.axisymmetry.hankel import RadialSpectrum, bessel
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
@@ -39,16 +39,17 @@ class Geometry:
     radius: FloatArray  # (n,), in m
     towards: FloatArray  # (2, n): derivatives of the radius by the centre's x and y
     k: FloatArray  # (nodes,), in rad/m
+    across: bool  # whether the scan crosses a slit: with cosines in place of Bessel functions
 
     @cached_property
     def bessel0(self) -> FloatArray:
         """Bessel function of order zero of all products k R, shape (n, nodes)."""
-        return self._of_products(j0)
+        return 2 * self._of_products(np.cos) / self.k if self.across else self._of_products(j0)
 
     @cached_property
     def bessel1(self) -> FloatArray:
-        """The same of order one."""
-        return self._of_products(j1)
+        """The same of order one: its negative derivative by k R."""
+        return 2 * self._of_products(np.sin) / self.k if self.across else self._of_products(j1)
 
     def _of_products(self, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
         # Repeats share their positions: each Bessel function is computed once.
@@ -71,12 +72,12 @@ class ForwardModel:
 
     def only(self, scan: int) -> ForwardModel:
         """Return the model of one of the scans."""
-        return ForwardModel(self.points.only(scan), (self.references[scan],))
+        return replace(self, points=self.points.only(scan), references=(self.references[scan],))
 
     @property
     def order(self) -> int:
         """Zero for the normal channel; one for a tangential one, a component of a vector."""
-        return self.reference.order
+        return max(self.reference.order, 0)
 
     @property
     def axis(self) -> int:
@@ -114,7 +115,7 @@ class ForwardModel:
         dx, dy = self.points.x - centre[0], self.points.y - centre[1]
         radius = np.hypot(dx, dy)
         towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
-        return Geometry(radius, towards, self.k)
+        return Geometry(radius, towards, self.k, self.reference.order == ACROSS)
 
     def cosines(self, centres: FloatArray) -> FloatArray:
         """Cosines between a channel's component and the points, for trial centres (m, 2)."""
@@ -163,6 +164,56 @@ class ForwardModel:
         scan, free = self.points.scan, np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
+    def elliptic(
+        self, geometry: Geometry, places: list[FloatArray]
+    ) -> tuple[list[FloatArray], FloatArray]:
+        """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
+        from scipy.interpolate import CubicSpline
+
+        points, count = self.points, len(places)
+        radius, toward, across = geometry.radius, *geometry.towards
+        angle = np.arctan2(-across, -toward)
+        totals, (slope, turn) = np.zeros((count, radius.size)), np.zeros((2, radius.size))
+        for m in range(_HARMONICS):
+            table, matrix = self.table(2 * m)
+            kernels, tilts = np.empty((self.k.size, count)), np.empty(count)
+            for i, (sigma, *e) in enumerate(places):
+                e1, e2 = bounded(np.array(e))
+                half, size = 0.5 * (sigma * self.k) ** 2, float(np.hypot(e1, e2))
+                kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
+                tilts[i] = 0.5 * np.arctan2(e2, e1)
+            for scan, reference in enumerate(self.references):
+                rows = points.scan == scan
+                measure = reference.wavenumbers.weights * reference.values
+                spline = CubicSpline(table, matrix @ (measure[:, None] * kernels))
+                phase = 2 * m * np.subtract.outer(angle[rows], tilts)
+                load = (1 if m == 0 else 2) * points.load[rows]
+                profiles = spline(radius[rows])
+                totals[:, rows] += (load[:, None] * np.cos(phase) * profiles).T
+                slope[rows] += load * np.cos(phase[:, 0]) * spline(radius[rows], 1)[:, 0]
+                turn[rows] -= 2 * m * load * np.sin(phase[:, 0]) * profiles[:, 0]
+        around = np.stack([-geometry.towards[1], geometry.towards[0]])
+        turned = np.divide(turn, radius, out=np.zeros_like(turn), where=radius > 0)
+        return list(totals), geometry.towards * slope + around * turned
+
+    def around(
+        self, m: int, cosines: FloatArray, sines: FloatArray, centres: FloatArray
+    ) -> FloatArray:
+        """Voltages of kernels with cos or sin of m times the angle: (n, both), in V."""
+        # ``cosines`` and ``sines``: their transforms of order m, (nodes, a) and (nodes, b), V/Pa.
+        from scipy.interpolate import CubicSpline
+
+        geometry, (table, matrix) = self.geometry(centres), self.table(m)
+        angle = m * np.arctan2(-geometry.towards[1], -geometry.towards[0])
+        kernels = np.hstack([cosines, sines])
+        columns = np.empty((angle.size, kernels.shape[1]))
+        for rows, measure in self._measures:
+            spline = CubicSpline(table, matrix @ (measure[:, None] * kernels))
+            columns[rows] = spline(geometry.radius[rows]) * self.points.load[rows, None]
+        columns[:, : cosines.shape[1]] *= np.cos(angle)[:, None]
+        columns[:, cosines.shape[1] :] *= np.sin(angle)[:, None]
+        return columns
+
     def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
         """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
         x = np.multiply.outer(geometry.radius, self.k)
@@ -193,6 +244,13 @@ def bessel_table(order: int, reach: float, nodes: bytes) -> tuple[FloatArray, Fl
     return radii, bessel(order, np.multiply.outer(radii, k))
 
 
+def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> ForwardModel:
+    """Return the model of scans, in two dimensions where a reference is not round."""
+    models = [reference.model for reference in references if reference.model]
+    model: ForwardModel = (models or [ForwardModel])[0](points, tuple(references))
+    return model
+
+
 def _unit_range(positions: FloatArray) -> FloatArray:
     middle = (positions.max() + positions.min()) / 2
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
@@ -219,7 +277,7 @@ def elliptic_columns(
     here = np.concatenate([[sigma], ellipticity])
     steps = np.diag([_STEP * sigma, _STEP, _STEP])
     places = [here, *(here + step for step in steps), *(here - step for step in steps)]
-    (values, *others), shift = _responses(model, geometry, places)
+    (values, *others), shift = model.elliptic(geometry, places)
     slopes = [
         (above - below) / (2 * step.sum())
         for above, below, step in zip(others[:3], others[3:], steps, strict=True)
@@ -231,7 +289,7 @@ def elliptic_departure(
     x: FloatArray, y: FloatArray, sigma: float, ellipticity: FloatArray
 ) -> FloatArray:
     """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
-    e1, e2 = _bounded(ellipticity)
+    e1, e2 = bounded(ellipticity)
     plane_x, plane_y = np.meshgrid(x, y)
     round_, determinant = plane_x**2 + plane_y**2, 1 - e1**2 - e2**2
     form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
@@ -240,39 +298,7 @@ def elliptic_departure(
     return np.asarray(scale * (elliptic - np.exp(-0.5 * round_ / sigma**2)))
 
 
-def _bounded(ellipticity: FloatArray) -> FloatArray:
+def bounded(ellipticity: FloatArray) -> FloatArray:
+    """Return an ellipticity (e1, e2) that an ellipse can have."""
     size = float(np.hypot(*ellipticity))
     return np.asarray(ellipticity * min(1.0, _LARGEST / size) if size > 0 else ellipticity)
-
-
-def _responses(
-    model: ForwardModel, geometry: Geometry, places: list[FloatArray]
-) -> tuple[list[FloatArray], FloatArray]:
-    """Responses (n,) of elliptic Gaussians, and the slopes (2, n) of the first by the centre."""
-    from scipy.interpolate import CubicSpline
-
-    points, count = model.points, len(places)
-    radius, toward, across = geometry.radius, *geometry.towards
-    angle = np.arctan2(-across, -toward)
-    totals, (slope, turn) = np.zeros((count, radius.size)), np.zeros((2, radius.size))
-    for m in range(_HARMONICS):
-        table, matrix = model.table(2 * m)
-        kernels, tilts = np.empty((model.k.size, count)), np.empty(count)
-        for i, (sigma, *e) in enumerate(places):
-            e1, e2 = _bounded(np.array(e))
-            half, size = 0.5 * (sigma * model.k) ** 2, float(np.hypot(e1, e2))
-            kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
-            tilts[i] = 0.5 * np.arctan2(e2, e1)
-        for scan, reference in enumerate(model.references):
-            rows = points.scan == scan
-            measure = reference.wavenumbers.weights * reference.values
-            spline = CubicSpline(table, matrix @ (measure[:, None] * kernels))
-            phase = 2 * m * np.subtract.outer(angle[rows], tilts)
-            load = (1 if m == 0 else 2) * points.load[rows]
-            profiles = spline(radius[rows])
-            totals[:, rows] += (load[:, None] * np.cos(phase) * profiles).T
-            slope[rows] += load * np.cos(phase[:, 0]) * spline(radius[rows], 1)[:, 0]
-            turn[rows] -= 2 * m * load * np.sin(phase[:, 0]) * profiles[:, 0]
-    around = np.stack([-geometry.towards[1], geometry.towards[0]])
-    turned = np.divide(turn, radius, out=np.zeros_like(turn), where=radius > 0)
-    return list(totals), geometry.towards * slope + around * turned

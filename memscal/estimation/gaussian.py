@@ -91,6 +91,8 @@ def _require_parity(
 
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
+#: Where no film blurs: so many from half a step to a quarter of the span.
+_SOURCE_WIDTHS = 8
 
 
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
@@ -114,11 +116,15 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
     radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
     widths = _smoothing_length(model) * np.array(_STARTING_WIDTHS)
+    if model.reference.source:
+        # A source may be far narrower than G.
+        widest = 0.25 * np.hypot(np.ptp(points.x), np.ptp(points.y))
+        widths = np.geomspace(0.5 * points.step, widest, _SOURCE_WIDTHS)
     kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
     # Profiles per newton of every width, on a table for quick trials.
     spectra = (model.reference.values * kernels).T
     wavenumbers = model.reference.wavenumbers
-    tables = wavenumbers.synthesise(spectra, radii, order=model.order).T
+    tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)
     data, drift = root * points.u, root[:, None] * model.drift_columns
     best, best_cost = np.zeros(0), np.inf
@@ -171,7 +177,9 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
 def _smoothing_length(model: ForwardModel) -> float:
     r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
     values = model.reference.scalar.values
-    return float(1 / model.k[int(np.argmax(values / values[0] < 0.5))])
+    # A point's never falls.
+    fallen = np.append(values / values[0] < 0.5, True)
+    return float(1 / model.k[min(int(np.argmax(fallen)), model.k.size - 1)])
 
 
 def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:

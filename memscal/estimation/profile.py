@@ -12,7 +12,7 @@ from memscal.errors import FitError
 from memscal.estimation import bayesian
 from memscal.estimation.angular import angular_departures
 from memscal.estimation.bayesian import DepartureBasis, WeighedFit
-from memscal.estimation.forward import ForwardModel, elliptic_departure
+from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.raster_noise import isolated, raster_noise
@@ -159,6 +159,15 @@ class ProfileEstimate:
         return np.asarray(self.predicted - self.background - radial)
 
     @property
+    def uneven(self) -> FloatArray:
+        """What references that are not round add to the voltages, shape (n,), in V."""
+        mean = ForwardModel(self.points, self.model.references)
+        if type(self.model) is ForwardModel:
+            return np.zeros_like(self.points.u)
+        whole = self.model.signal(self.model.geometry(self.centres), self.kernel)
+        return np.asarray(whole - mean.signal(mean.geometry(self.centres), self.kernel))
+
+    @property
     def offset(self) -> FloatArray:
         """Position of each point from its scan's centre, shape (2, n), in m."""
         positions = np.stack([self.points.x, self.points.y])
@@ -190,7 +199,7 @@ def estimate_profile(
 ) -> ProfileEstimate:
     """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     # With ``angular`` also what of a sensor that was scanned over the plane is not round.
-    model = ForwardModel(points, references)
+    model = forward_model(points, references)
     fit = fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
     residual, noise = points.u - fit.predicted, _least_noise(fit)
@@ -245,7 +254,7 @@ def log_marginal_likelihood(
         factor = points.decorrelation
         points = replace(points, decorrelation=white if factor is None else white @ factor)
         volume = float(np.log1p(singular**2).sum())
-    model = ForwardModel(points, estimate.model.references)
+    model = forward_model(points, estimate.model.references)
     fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     if not fit.has_width(weights, noise):
         # The flat prior of ln(width) has no end there, where the width changes no voltage.

@@ -5,10 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.estimation import points
 from memscal.estimation.points import ScanPoints
@@ -33,6 +34,38 @@ RECTANGLE = 1 / math.sqrt(3)
 _MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
+#: A field is taken as round where less than this share of it is not, at so many wavenumbers.
+_ROUND, _SEEN = 0.005, 17
+_OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
+
+
+def is_source(stress: BaseStress | None) -> bool:
+    """Whether a reference is a source that needs no film, rod and load."""
+    return isinstance(stress, StressProfile) and stress.form is not None
+
+
+def require_one_kind(
+    references: Sequence[BaseStress | None], alternatives: Sequence[BaseStress | None]
+) -> None:
+    """Refuse references that no one conversion constant belongs to."""
+    forms = [getattr(reference, "form", None) for reference in references]
+    kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
+    if len(kinds) > 1 or any(map(is_source, alternatives)) or (kinds != {None} and alternatives):
+        raise InputError(
+            "Sources and stresses, slits and other sources, or sources of several units are mixed.",
+            why="One conversion constant has one unit; an alternative is of a film's stress.",
+            cure="Calibrate each by itself.",
+        )
+
+
+def of_source(scan: Scan, stress: BaseStress | None) -> Scan:
+    """Return a scan over a source: nothing that it states of film and rod is uncertain."""
+    field = stress.field if isinstance(stress, StressProfile) else None
+    u = scan.load_uncertainty if field and field.load else None
+    certain: dict[str, Any] = {f"{name}_uncertainty": None for name in _OF_FILM}
+    film = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None, **certain)
+    rod = replace(scan.indenter, radius_uncertainty=None)
+    return replace(scan, film=film, indenter=rod, load_uncertainty=u, rod_friction=None)
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
@@ -85,7 +118,8 @@ def require_same_set_up(
     # alternative may have another law and friction, which it is given for.
     differences: list[str] = []
     for scan, given in zip(scans, references, strict=True):
-        if (stress := scan.reference if given is None else given) is not None:
+        stress = scan.reference if given is None else given
+        if stress is not None and not is_source(stress):
             differences += _other_set_up(scan, stress, "reference")
     for scan, given in zip(scans, alternatives, strict=False):
         if given is not None:
@@ -163,30 +197,58 @@ def reference_spectra(
     wavenumbers: Wavenumbers | None = None,
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
-    order = data[0].order
     spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
     if wavenumbers is None:
         last = max(_last_wavenumber(*pair) for pair in zip(references, data, strict=True))
         # Fields are lifted to squares that reach one span from the centre, to their corners.
         wavenumbers = Wavenumbers.covering(last, 1.5 * max(spans))
     return tuple(
-        RadialSpectrum(wavenumbers, _per_newton(reference, wavenumbers.k, span, order), order)
-        for reference, span in zip(references, spans, strict=True)
+        _spectrum(pair[0], wavenumbers, pair[1], span)
+        for pair, span in zip(zip(references, data, strict=True), spans, strict=True)
     )
+
+
+def _spectrum(
+    stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints, span: float
+) -> RadialSpectrum:
+    values, order = _per_newton(stress, wavenumbers.k, span, points.order), points.order
+    if isinstance(stress, Contact) or stress.form is None:
+        return RadialSpectrum(wavenumbers, values, order)
+    if stress.ideal is not None and stress.ideal.shape == "slit":
+        if points.planar:
+            raise InputError(
+                "A slit is the reference of a raster.",
+                why="It is scanned across, along a line, and shows nothing of any other direction.",
+                cure="Give a line scan.",
+            )
+        return RadialSpectrum(wavenumbers, values, ACROSS, source=True)
+    # What a scan samples of a field is looked at.
+    seen = np.linspace(0.0, min(np.pi / points.step, wavenumbers.k[-1]), _SEEN)[1:]
+    if stress.field is None or stress.field.unevenness(seen) < _ROUND:
+        return RadialSpectrum(wavenumbers, values, source=True)
+    from memscal.estimation.field_model import FieldSpectrum
+
+    return FieldSpectrum(wavenumbers, values, source=True, field=stress.field, load=stress.load)
 
 
 def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     """Return the wavenumber (rad/m) beyond which a reference has nothing, or none that is seen."""
     if isinstance(reference, Contact):
         return _LARGEST_KH / reference.film.thickness
-    k = np.linspace(0.0, _PASSED / points.step, _WAVENUMBERS)[1:]
-    values = np.abs(hankel_transform(reference.r, reference.sigma_zz, k))
+    form = reference.form
+    # Of a source without an end, a Gaussian of half the step passes 1e-5 at the last wavenumber.
+    passed = _PASSED if form is None else 0.75 * _PASSED
+    k = np.linspace(0.0, passed / points.step, _WAVENUMBERS)[1:]
+    values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
+    values = np.abs(values)
     return float(k[values > _NOTHING * values.max()][-1])
 
 
 def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
     if isinstance(reference, Contact):
         return _base_spectrum(reference, k.tobytes(), order) / reference.load
+    if reference.form is not None and not order:
+        return reference.form.transform(k) / reference.load
     stress = reference.sigma_rz if order else reference.sigma_zz
     if stress is None or (order and not stress.any()):
         raise InputError(
@@ -224,7 +286,9 @@ def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
 
 
 def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
-    """Force that a reference (a shear: its normal stress) carries, over its load."""
+    """Force that a reference (a shear: its normal stress) carries, over its load; 1 of a source."""
+    if is_source(stress):
+        return 1.0
     if reference.order == 0:
         return reference.integral
     return 1.0 if isinstance(stress, Contact) else stress.force / stress.load

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.hankel import RadialSpectrum, gauss_between
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, gauss_between
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import OUTLIER_THRESHOLD, ProfileEstimate, outlier_weights
 from memscal.model.arrays import FloatArray
@@ -70,8 +70,8 @@ class SmoothedProfile:
 
     @cached_property
     def signal(self) -> FloatArray:
-        """Voltages less background, and less what is not round of the sensor, shape (n,), in V."""
-        return self.estimate.points.u - self.estimate.background - self.estimate.oval
+        """Voltages of what is round alone, shape (n,), in V."""
+        return _round_signal(self.estimate)
 
     @cached_property
     def spectrum(self) -> RadialSpectrum:
@@ -93,7 +93,7 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     gains, groups = [], dict[bytes, list[int]]()
     for scan, reference in enumerate(references):
         groups.setdefault(reference.values.tobytes(), []).append(scan)
-    signal = points.u - estimate.background - estimate.oval
+    signal = _round_signal(estimate)
     for scans in groups.values():
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
@@ -105,6 +105,11 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
         gain[:, rows] = of_scans / load
         gains.append((references[scans[0]].values, gain))
     return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
+
+
+def _round_signal(estimate: ProfileEstimate) -> FloatArray:
+    """Voltages less background and what of sensor and reference is not round, (n,), in V."""
+    return estimate.points.u - estimate.background - estimate.oval - estimate.uneven
 
 
 def _joined(
@@ -136,7 +141,12 @@ def _fitted(
     points, load = estimate.points, estimate.points.load[rows]
     y = signal / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
-    spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
+    decay = reference
+    if reference.source:
+        # A source ends: what decays is G about it.
+        blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
+        decay = replace(reference, values=reference.values * blurred)
+    spline = _RadialSpline.through(estimate.distance[rows], decay, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
     for _ in range(_ROUNDS):
         gain = spline.gain(y, stated * weight)
@@ -178,15 +188,21 @@ class _RadialSpline:
         # At R a spline has the logarithmic slope of the tail, which goes on from there.
         ending = basis(np.array([reach]), 0)
         tied = step * (end * basis(np.array([reach]), 1) - slope * ending)
-        free = np.linalg.svd(tied)[2][1:].T
+        # A source that ends inside has no tail to go on with: the spline ends with the scan.
+        tail = not reference.source
+        free = np.linalg.svd(tied)[2][1:].T if tail else np.eye(tied.size)
         curved = basis(nodes, _ORDER) * step**_ORDER
         rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
         # What no penalty holds, a parabola, is held by next to nothing.
         rows = np.vstack([curved, _NEXT_TO_NOTHING * basis(nodes, 0)]) @ free
         rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
-        bessel = 2 * np.pi * j0(np.multiply.outer(k, nodes)) * weights * nodes
-        beyond = (per_newton - bessel @ stress[:-2]) / end
-        transform = (bessel @ basis(nodes, 0) + np.outer(beyond, ending)) @ free
+        phase = np.multiply.outer(k, nodes)
+        across = reference.order == ACROSS
+        bessel = 2 * np.cos(phase) if across else 2 * np.pi * j0(phase) * nodes
+        bessel *= weights
+        transform = bessel @ basis(nodes, 0) @ free
+        if tail:
+            transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
         return cls(basis(radius, 0) @ free, np.asarray(np.linalg.qr(rows)[1]), transform)
 
     def gain(self, y: FloatArray, weight: FloatArray) -> FloatArray:

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError, placed
+from memscal.errors import FormatError, InputError, UnitError, placed
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import Attribute, Group, Node, Number, si, to_json
@@ -30,7 +31,7 @@ from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, 
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
 from memscal.model.scan import StressSensor
-from memscal.model.stress import StressProfile
+from memscal.model.stress import IdealReference, StressField, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -355,11 +356,49 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     numerics = write_record(records.NUMERICS, profile)
     made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
     made |= write_record(records.PROFILE_NOTES, profile).children
+    data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
     return (
-        write_record(records.PROFILE, profile),
+        data,
         write_record(records.CONTACT, profile, **of),
         write_record(records.SOLVER, profile, **made),
     )
+
+
+def _form(form: IdealReference | StressField) -> Group:
+    """Return an ideal reference, or a field as NXdata in its own unit."""
+    if isinstance(form, IdealReference):
+        return write_record(records.IDEAL_REFERENCE, form)
+    axes: dict[str, Node] = {name: si(getattr(form, name), "length", (name,)) for name in "xy"}
+    axes["field"] = Number(form.values, form.unit, ("y", "x"))
+    if form.load is not None:
+        axes["load"] = si(form.load, "force")
+    return Group("NXdata", axes, {"signal": "field", "axes": ("y", "x")})
+
+
+def _read_form(file: SafeFile, path: str) -> IdealReference | StressField | None:
+    if file.has(f"{path}/shape"):
+        return IdealReference(**read_record(records.IDEAL_REFERENCE, file, path))
+    return read_field(file, path) if file.has(f"{path}/field") else None
+
+
+def read_field(file: SafeFile, path: str) -> StressField:
+    """Read a field from an NXdata group, or from one that holds x, y and sigma_zz or field."""
+    axes = file.attribute(path, "axes") if path else None
+    y, x = axes if isinstance(axes, tuple) and len(axes) == 2 else ("y", "x")
+    signal = (file.attribute(path, "signal") if path else None) or "sigma_zz"
+    at, unit = f"{path}/{signal}", units_of(file, f"{path}/{signal}") or "1"
+    if not file.has(at):
+        why = "The file is no memscal-reference, and should hold a field there."
+        raise FormatError(f"{file.where(at)} is missing.", why=why)
+    values = file.array(at)
+    with suppress(UnitError):
+        values, unit = to_si(values, unit, "stress", file.where(at)), "Pa"
+    places = [require_array(file, f"{path}/{name}", "length", ndim=1) for name in (x, y)]
+    load = require_scalar(file, f"{path}/load", "force") if file.has(f"{path}/load") else None
+    with placed(file.where(path or "/")):
+        return StressField(
+            x=places[0], y=places[1], values=values, unit=unit, load=load, source=file.source
+        )
 
 
 def reference_groups(profile: StressProfile) -> dict[str, Node]:
@@ -384,6 +423,9 @@ def read_profile(
     if file.has(f"{parameters}/indenter"):
         indenter = read_indenter(file, f"{parameters}/indenter")
     defaults = {} if load is None else {"load": load}
+    if (form := _read_form(file, data)) is not None:
+        stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
+        return replace(form.profile(), **stated)
     return StressProfile(
         film=film,
         indenter=indenter,

@@ -38,12 +38,12 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
     writer.SCAN_SCHEMA: {
         "/entry": records.EXPERIMENT,
         "/entry/data": records.SCAN_DATA,
-        "/entry/reference": records.PROFILE,
+        "/entry/reference": records.REFERENCE_DATA,
         **_MEASURED_ON,
         "/entry/synthetic": records.SYNTHETIC,
     },
     writer.REFERENCE_SCHEMA: {
-        "/entry/reference": records.PROFILE,
+        "/entry/reference": records.REFERENCE_DATA,
         "/entry/parameters": records.CONTACT,
         "/entry/parameters/indenter": records.INDENTER,
         "/entry/parameters/film": records.FILM,
@@ -60,6 +60,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         "/entry/radial_profile_division": records.RADIAL,
         "/entry/transfer_function": records.TRANSFER,
         "/entry/reconvolution": records.RECONVOLUTION,
+        "/entry/reference": records.REFERENCE_DATA,
         **_MEASURED_ON,
         "/entry/process": records.PROCESS,
     },

@@ -1,21 +1,49 @@
-"""memscal-reference: a calculated stress profile at the base of the film, as HDF5."""
+"""memscal-reference: a calculated stress profile at the base of the film, as HDF5, or by name."""
 
+import hashlib
 import os
+import re
+from io import BytesIO
+from typing import Any
 
-from memscal.formats.groups import profile_groups, read_profile
-from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+import numpy as np
+from numpy.typing import NDArray
+
+from memscal.errors import InputError, placed
+from memscal.formats.files import read_bytes
+from memscal.formats.groups import profile_groups, read_field, read_profile
+from memscal.formats.hdf5 import writer
+from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
+from memscal.formats.units import to_si
 from memscal.formats.values import require_schema
-from memscal.model.stress import StressProfile
+from memscal.model.arrays import require_positive
+from memscal.model.provenance import SourceFile
+from memscal.model.stress import IDEAL, IdealReference, StressField, StressProfile
+
+_NAMED = re.compile(rf"({'|'.join(IDEAL)})(?::(.*))?")
+_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-zµμ]+)\s*")
+#: Files of pixels, which state no size of theirs; weights of red, green and blue in the luminance.
+_PIXELS = (".npy", ".png", ".tif", ".tiff")
+_MOST_PIXELS = 2**26
+_LUMINANCE = (0.299, 0.587, 0.114)
 
 
-def read_reference(path: str | os.PathLike[str]) -> StressProfile:
-    """Read a stress profile from a memscal-reference file.
+def read_reference(
+    path: str | os.PathLike[str], *, pixel_size: float | None = None
+) -> StressProfile:
+    """Read a stress profile or a field from a file, or make that of an ideal reference.
 
     Parameters
     ----------
-    path : path
-        The file; units in it are converted to SI.
+    path : path or str
+        The file; units in it are converted to SI.  A text that names no file may be ``disc:R``
+        (its radius), ``slit:W`` (its width), ``gaussian:S`` (its standard deviation), each with a
+        unit, such as ``disc:0.5mm``, or ``point``: see :class:`memscal.IdealReference`.  Beside a
+        memscal-reference it may be a field: HDF5 with x, y and sigma_zz, or with a NeXus plot; a
+        2-D array (.npy) or an image (PNG, TIFF), whose rows follow y and columns x.
+    pixel_size : float, optional
+        Size of the pixels of an array or image, in m.
 
     Returns
     -------
@@ -26,6 +54,9 @@ def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     ------
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
         If the file does not hold a reference that this version can read.
+    InputError
+        If the size of an ideal reference is none, that of pixels is missing, or a field cannot be
+        used.
 
     Examples
     --------
@@ -36,12 +67,81 @@ def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     ...     read_reference(f"{folder}/rod.h5").sigma_zz
     array([200000., 100000.])
     """
+    if (ideal := ideal_reference(path)) is not None:
+        return ideal.profile()
+    if os.fspath(path).lower().endswith(_PIXELS):
+        return _read_pixels(path, pixel_size).profile()
+    if pixel_size is not None:
+        problem = f"A pixel size is given, but {os.fspath(path)} is no array and no image."
+        raise InputError(problem, cure="Leave it out (pixel_size, --pixel-size).")
     with open_hdf5(path) as file:
         return profile_from(file)
 
 
+def ideal_reference(text: str | os.PathLike[str]) -> IdealReference | None:
+    """Return the ideal reference that a text names; nothing of a file that exists."""
+    match = None if os.path.exists(text) else _NAMED.fullmatch(os.fspath(text).strip())
+    if match is None:
+        return None
+    shape, size = match.groups()
+    if shape == "point" and size is None:
+        return IdealReference(shape)
+    what = f"The {IDEAL[shape] or 'size'} of the reference {os.fspath(text)!r}"
+    return IdealReference(shape, length(size or "", what))
+
+
+def length(text: str, what: str) -> float:
+    """Read a length with its unit, such as 0.5mm, in m."""
+    match = _LENGTH.fullmatch(text)
+    if match is None:
+        cure = "Give a number with a unit of length, such as 0.5mm or 200um."
+        raise InputError(f"{what}, {text!r}, is no length.", cure=cure)
+    return float(to_si(float(match[1]), match[2], "length", what))
+
+
+def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> StressField:
+    """Read a field from a 2-D array or an image."""
+    data, name = read_bytes(path), os.path.basename(os.fspath(path))
+    if pixel_size is None:
+        raise InputError(
+            f"The size of the pixels of {name} is not given.",
+            why="An array or image does not state it.",
+            cure="Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line.",
+        )
+    require_positive("pixel size", pixel_size, "m")
+    with damage_named(f"{name} cannot be read"):
+        array = name.lower().endswith(".npy")
+        values = np.load(BytesIO(data), allow_pickle=False) if array else _image(data)
+    notes, channels = "", values.shape[2] if values.ndim == 3 and not array else 0
+    if channels in (2, 3, 4):
+        notes = "Of the image the luminance was taken."
+        values = values[..., :3] @ _LUMINANCE if channels > 2 else values[..., 0]
+    if values.ndim != 2 or values.dtype.kind not in "biuf":
+        problem = f"{name} holds an array of shape {values.shape} and type {values.dtype}."
+        raise InputError(problem, cure="Give one of numbers, in rows along y and columns along x.")
+    y, x = (pixel_size * np.arange(count, dtype=np.float64) for count in values.shape)
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    with placed(name):
+        return StressField(x=x, y=y, values=values, unit="1", notes=notes, source=source)
+
+
+def _image(data: bytes) -> NDArray[Any]:
+    from PIL import Image
+
+    with Image.open(BytesIO(data), formats=("PNG", "TIFF")) as image:
+        if image.width * image.height > _MOST_PIXELS:
+            problem = f"The image has {image.width} x {image.height} pixels."
+            raise InputError(problem, cure="Cut out the field, or bin its pixels.")
+        return np.asarray(image.convert("RGB") if image.mode == "P" else image)
+
+
 def profile_from(file: SafeFile) -> StressProfile:
-    """Read the profile of an open memscal-reference file."""
+    """Read the profile of an open memscal-reference file, or a field of another program."""
+    if file.attribute("/", writer.SCHEMA_ATTRIBUTE) is None:
+        path = ""
+        while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:
+            path = f"{path}/{name}"
+        return read_field(file, path).profile()
     require_schema(file, REFERENCE_SCHEMA)
     return read_profile(file, "/entry/reference", "/entry/parameters", "/entry/process")
 

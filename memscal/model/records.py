@@ -89,6 +89,20 @@ PROFILE = record(
     Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress", axes=_R),
     signal="sigma_zz",
 )
+IDEAL_REFERENCE = record(
+    "NXcollection",
+    Quantity("shape", "text", "shape of the reference", required=True),
+    Quantity("size", _L, "size of the reference", required=True),
+)
+REFERENCE_DATA = record(
+    "NXdata",
+    *PROFILE.quantities,
+    *IDEAL_REFERENCE.quantities,
+    Quantity("x", _L, "position along x", "x", _X),
+    Quantity("y", _L, "position along y", "y", ("y",)),
+    Quantity("values", _ONE, "field", axes=_YX, stored="field"),
+)
+"""What the group of a reference may hold: a profile, an ideal reference, or a field."""
 CONTACT = record(
     "NXcollection",
     _LOAD[0],

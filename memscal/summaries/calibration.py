@@ -230,6 +230,8 @@ def rehearsal_table(
 def _origin(stress: StressProfile | Contact) -> str:
     if isinstance(stress, Contact):
         return "the rod, solved on the film"
+    if stress.form is not None:
+        return f"a {stress.form}"
     if stress.source is not None:
         return stress.source.file_name
     return "the one in the scan" + (f" ({stress.solver})" if stress.solver else "")

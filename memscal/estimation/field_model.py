@@ -1,0 +1,152 @@
+r"""Forward model of scans through fields that are not round: by transforms over the plane.
+
+The voltage of a round kernel is :math:`U = \mathcal F^{-1}\{\hat K(|k|)\,\hat\sigma(k_x, k_y)\}`
+on a grid, and at the points by quintic splines through it; its slopes are the same of
+:math:`i k_x \hat U`.  The grid is longer than scan and field, so that nothing wraps around.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, cast
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.estimation.forward import ForwardModel, Geometry, bounded
+from memscal.model.arrays import FloatArray
+from memscal.model.stress import StressField
+
+#: Points of the grid for each half wave of the last wavenumber, and at most for each step.
+_OVERSAMPLING, _PER_STEP = 2.0, 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneGeometry(Geometry):
+    """Places of the points about trial centres; no Bessel functions."""
+
+    places: FloatArray  # (2, n): rows and columns of the grid
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """Grid on which voltages are transformed, and the part of its wavenumbers that is used."""
+
+    count: int
+    spacing: float
+    ky: FloatArray  # (c,): of the cells up to the last wavenumber
+    kx: FloatArray
+    cells: tuple[NDArray[np.intp], ...]
+    # (scans, c): transform of each reference, with what makes splines of it.
+    stress: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FieldModel(ForwardModel):
+    """Voltages at the points of scans through fields."""
+
+    @cached_property
+    def _plane(self) -> _Plane:
+        points, last = self.points, float(self.k[-1])
+        span = max(float(np.ptp(points.x)), float(np.ptp(points.y)))
+        fields = [r.field for r in self.references if isinstance(r, FieldSpectrum)]
+        wide = max((np.ptp(axis) for f in fields for axis in (f.x, f.y)), default=0.0)
+        h = max(np.pi / (_OVERSAMPLING * last), points.step / _PER_STEP)
+        count = scipy.fft.next_fast_len(int(np.ceil((1.5 * span + wide) / h)), real=True)
+        ky = 2 * np.pi * scipy.fft.fftfreq(count, h)
+        kx = 2 * np.pi * scipy.fft.rfftfreq(count, h)
+        cells = np.nonzero(np.hypot.outer(ky, kx) <= last)
+        # Middle of the grid; a quintic spline through values has these coefficients.
+        turn = [np.exp(-0.5j * k * count * h) * 120 for k in (ky, kx)]
+        spline = [66 + 52 * np.cos(k * h) + 2 * np.cos(2 * k * h) for k in (ky, kx)]
+        factor = np.multiply.outer(turn[0] / spline[0], turn[1] / spline[1]) / h**2
+        stress = np.stack([(r.plane(ky, kx) * factor)[cells] for r in self.references])
+        return _Plane(count, h, ky[cells[0]], kx[cells[1]], cells, stress)
+
+    def geometry(self, centres: FloatArray) -> PlaneGeometry:
+        """Return distances and places on the grid for trial centres, shape (scans, 2), in m."""
+        centre = np.atleast_2d(centres)[self.points.scan].T
+        offset = np.stack([self.points.x - centre[0], self.points.y - centre[1]])
+        radius = np.hypot(*offset)
+        places = offset[::-1] / self._plane.spacing + self._plane.count / 2
+        towards = -offset / np.where(radius > 0, radius, 1.0)
+        return PlaneGeometry(radius, towards, self.k, False, places)
+
+    def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
+        """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
+        columns = [self._read(geometry, k) for k in self._on_cells(np.atleast_2d(kernel.T))]
+        return columns[0] if kernel.ndim == 1 else np.stack(columns, axis=1)
+
+    def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
+        """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
+        (spectrum,), plane = self._on_cells(kernel[None]), self._plane
+        slopes = [self._read(geometry, -1j * k * spectrum) for k in (plane.kx, plane.ky)]
+        return np.stack(slopes)
+
+    def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
+        """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
+        shift = self.shift_derivative(geometry, kernel)
+        return np.asarray(np.sum(geometry.towards * shift, axis=0))
+
+    def elliptic(
+        self, geometry: Geometry, places: list[FloatArray]
+    ) -> tuple[list[FloatArray], FloatArray]:
+        """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
+        kx, ky, kernels = self._plane.kx, self._plane.ky, []
+        for sigma, *e in places:
+            e1, e2 = bounded(np.array(e))
+            square = (1 + e1) * kx**2 + 2 * e2 * kx * ky + (1 - e1) * ky**2
+            kernels.append(np.exp(-0.5 * sigma**2 * square))
+        shift = [self._read(geometry, -1j * k * kernels[0]) for k in (kx, ky)]
+        return [self._read(geometry, kernel) for kernel in kernels], np.stack(shift)
+
+    def around(
+        self, m: int, cosines: FloatArray, sines: FloatArray, centres: FloatArray
+    ) -> FloatArray:
+        """Voltages of kernels with cos or sin of m times the angle: (n, both), in V."""
+        geometry, angle = self.geometry(centres), m * np.arctan2(self._plane.ky, self._plane.kx)
+        columns = [
+            self._read(geometry, (-1j) ** m * turn(angle) * spectrum)
+            for turn, kernels in ((np.cos, cosines), (np.sin, sines))
+            for spectrum in self._on_cells(kernels.T)
+        ]
+        return np.stack(columns, axis=1)
+
+    def _on_cells(self, kernels: FloatArray) -> FloatArray:
+        """Interpolate kernels (m, nodes) to the cells of the plane."""
+        from scipy.interpolate import CubicSpline
+
+        wavenumbers = np.hypot(self._plane.ky, self._plane.kx)
+        return np.asarray(CubicSpline(self.k, kernels, axis=1)(wavenumbers))
+
+    def _read(self, geometry: Geometry, spectrum: FloatArray) -> FloatArray:
+        """Read voltages (n,) at the points for a kernel's transform on the cells."""
+        from scipy.ndimage import map_coordinates
+
+        plane, places = self._plane, cast(PlaneGeometry, geometry).places
+        values, shape = np.zeros(self.points.u.size), (plane.count, plane.count)
+        for scan, stress in enumerate(plane.stress):
+            rows = self.points.scan == scan
+            whole = np.zeros((plane.count, plane.count // 2 + 1), dtype=complex)
+            whole[plane.cells] = spectrum * stress
+            splines = scipy.fft.irfft2(whole, s=shape)
+            values[rows] = map_coordinates(
+                splines, places[:, rows], order=5, mode="grid-wrap", prefilter=False
+            )
+        return np.asarray(values * self.points.load)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FieldSpectrum(RadialSpectrum):
+    """A field per newton by the transform of its mean over directions, and by itself."""
+
+    field: StressField
+    load: float
+    model: ClassVar[type[ForwardModel]] = FieldModel
+
+    def plane(self, ky: FloatArray, kx: FloatArray) -> FloatArray:
+        """Transform over the plane, (ky, kx), complex."""
+        return self.field.plane(ky, kx) / self.load

@@ -1,0 +1,215 @@
+"""References without a film: disc, slit, Gaussian, point, and fields in two dimensions.
+
+The scans are closed forms of their own: a Gaussian sensor sees of a disc a non-central
+chi-square probability, of a slit a difference of normal ones, of a Gaussian a wider Gaussian.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.bounds import FULL, RARE
+from helpers.scans import EXACT_FILM, EXACT_ROD
+from PIL import Image
+from scipy.integrate import quad
+from scipy.special import chndtr, j0, ndtr
+from scipy.stats import chi2, norm
+
+import memscal
+from memscal.errors import InputError, MemscalError
+
+A, SIGMA, CENTRE, SIZE = 2.0, 0.3e-3, (0.05e-3, -0.03e-3), 0.4e-3
+LONG, SHORT, TURNED = 0.5e-3, 0.25e-3, 0.4
+LOBE, SHARE = (0.3e-3, 0.5e-3), 0.3
+PIXEL = 25e-6
+NAMES = {"disc": "disc:0.4mm", "slit": "slit:400um", "gaussian": "gaussian:0.4mm", "point": "point"}
+
+
+def elliptic(x, y, long: float, short: float):
+    """Elliptic Gaussian of unit integral, turned."""
+    along = np.cos(TURNED) * x + np.sin(TURNED) * y
+    across = np.cos(TURNED) * y - np.sin(TURNED) * x
+    form = (along / long) ** 2 + (across / short) ** 2
+    return np.exp(-form / 2) / (2 * np.pi * long * short)
+
+
+def reading(kind: str, x, y):
+    """What a Gaussian sensor reads per A, at positions from its centre."""
+    r = np.hypot(x, y)
+    if kind == "disc":
+        return chndtr((SIZE / SIGMA) ** 2, 2, (r / SIGMA) ** 2)
+    if kind == "slit":
+        return ndtr((x + SIZE / 2) / SIGMA) - ndtr((x - SIZE / 2) / SIGMA)
+    long, short = {"point": (0, 0), "gaussian": (SIZE, SIZE), "ellipse": (LONG, SHORT)}[kind]
+    # The ellipse has a lobe to one side; the centroid of both is at the scan's position.
+    share = SHARE if kind == "ellipse" else 0.0
+    x, y = (axis + lobe * share / (1 + share) for axis, lobe in zip((x, y), LOBE, strict=True))
+    seen = elliptic(x, y, np.hypot(long, SIGMA), np.hypot(short, SIGMA))
+    wide = np.hypot(SHORT, SIGMA)
+    seen += share * elliptic(x - LOBE[0], y - LOBE[1], wide, wide)
+    return seen * (2 * np.pi * long * short if long else 1.0)
+
+
+def scanned(kind: str, *, raster: bool = False, noise: float = 0.005, seed: int = 0, n: int = 49):
+    x = np.linspace(-2.5e-3, 2.5e-3, n)
+    plane = np.meshgrid(x, x) if raster else (x, np.full(n, CENTRE[1]))
+    u = A * reading(kind, plane[0] - CENTRE[0], plane[1] - CENTRE[1])
+    deviation = noise * u.max()
+    u = 0.99 * u + 0.01 * (u + u.max()) + np.random.default_rng(seed).normal(0, deviation, u.shape)
+    return memscal.Scan(
+        x=x, y=x if raster else None, u_zz=u, load=1.3, film=EXACT_FILM, indenter=EXACT_ROD,
+        u_zz_errors=np.full(u.shape, deviation) if noise else None,
+    )  # fmt: skip
+
+
+def field(long: float = LONG, short: float = SHORT) -> memscal.StressField:
+    x = np.arange(-80, 81) * PIXEL
+    plane = np.meshgrid(x, x)
+    values = elliptic(*plane, long, short)
+    if long != short:
+        values += SHARE * elliptic(plane[0] - LOBE[0], plane[1] - LOBE[1], SHORT, SHORT)
+    values *= 2 * np.pi * long * short
+    return memscal.StressField(x=x, y=x + 1e-3, values=values, unit="uT")
+
+
+@pytest.mark.parametrize("kind", ["disc", "gaussian", "slit"])
+def test_transforms_are_those_of_the_source(kind: str) -> None:
+    ideal = memscal.IdealReference(kind, SIZE)
+    for k in (0.0, 3e3, 11e3):
+        if kind == "slit":
+            expected = quad(lambda x, k=k: np.cos(k * x), -SIZE / 2, SIZE / 2)[0]
+        else:
+            end = SIZE if kind == "disc" else 8 * SIZE
+            height = (
+                (lambda r: 1.0) if kind == "disc" else (lambda r: np.exp(-((r / SIZE) ** 2) / 2))
+            )
+            integrand = lambda r, k=k, h=height: 2 * np.pi * h(r) * r * j0(k * r)  # noqa: E731
+            expected = quad(integrand, 0, end, epsabs=1e-14)[0]
+        scale = ideal.transform(np.zeros(1))[0]
+        assert ideal.transform(np.array([k]))[0] == pytest.approx(expected, abs=1e-7 * scale)
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_a_and_width_are_found_by_both_routes(kind: str) -> None:
+    exact = memscal.calibrate(scanned(kind, noise=0.0), reference=NAMES[kind]).apparatus
+    assert exact.other.parameters["conversion_constant"] == pytest.approx(A, rel=2e-4)
+    assert exact.conversion_constant == pytest.approx(A, rel=5e-3)
+    assert exact.gaussian_sigma == pytest.approx(SIGMA, rel=2e-4)
+    seeds, z = (60 if FULL else 6), {}
+    for seed in range(seeds):
+        a = memscal.calibrate(scanned(kind, seed=seed), reference=NAMES[kind]).apparatus
+        for name, p, truth in (
+            ("division", a.parameters, ("conversion_constant", A)),
+            ("bayesian", a.other.parameters, ("conversion_constant", A)),
+            ("width", a.parameters, ("gaussian_sigma", SIGMA)),
+        ):
+            z.setdefault(name, []).append((p[truth[0]] - truth[1]) / p.uncertainty(truth[0]))
+    for name, values in z.items():
+        assert abs(np.mean(values)) < norm.isf(RARE) / np.sqrt(seeds), name
+        assert np.square(values).sum() < chi2.isf(RARE, seeds), name
+
+
+def test_film_rod_and_load_change_nothing() -> None:
+    scan = scanned("disc", seed=1)
+    other = replace(scan, film=replace(EXACT_FILM, thickness=5e-6, law=""), load=7.0)
+    first, second = (memscal.calibrate(s, reference="disc:0.4mm").apparatus for s in (scan, other))
+    np.testing.assert_allclose(second.parameters.values, first.parameters.values, rtol=1e-9)
+    np.testing.assert_allclose(second.parameters.covariance, first.parameters.covariance, 1e-6)
+
+
+def test_loads_are_strengths_relative_to_the_nominal_one() -> None:
+    scan = scanned("disc", noise=0.0)
+    strength = np.linspace(0.8, 1.2, scan.x.size)
+    weaker = replace(
+        scan, u_zz=strength * (scan.u_zz - 0.01 * scan.u_zz.max()), normal_load=1.3 * strength
+    )
+    a = memscal.calibrate(weaker, reference="disc:0.4mm", method="bayesian").apparatus
+    assert a.conversion_constant == pytest.approx(A, rel=2e-3)
+
+
+def test_a_round_field_is_its_radial_profile() -> None:
+    scan, round_field = scanned("gaussian", raster=True, n=21), field(SIZE, SIZE)
+    of_field = memscal.calibrate(scan, reference=round_field).apparatus
+    ideal = memscal.calibrate(scan, reference="gaussian:0.4mm").apparatus
+    for name in ("conversion_constant", "gaussian_sigma"):
+        difference = abs(of_field.parameters[name] - ideal.parameters[name])
+        assert difference < 0.1 * ideal.parameters.uncertainty(name)
+
+
+@pytest.mark.parametrize(("raster", "method"), [(True, "white-noise"), (False, "bayesian")])
+def test_a_field_that_is_not_round_is_seen_by_a_round_sensor(raster: bool, method: str) -> None:
+    scan = scanned("ellipse", raster=raster, seed=3, n=25 if raster else 49)
+    a = memscal.calibrate(scan, reference=field(), method=method).apparatus
+    assert a.passed
+    for p in (a.parameters, a.other.parameters if raster else a.parameters):
+        assert abs(p["conversion_constant"] - A) < 4 * p.uncertainty("conversion_constant")
+        assert p.uncertainty("conversion_constant") < 0.03 * A
+    assert abs(a.gaussian_sigma - SIGMA) < 4 * a.parameters.uncertainty("gaussian_sigma")
+    if raster:
+        assert abs(a.parameters["ellipticity"]) < 4 * a.parameters.uncertainty("ellipticity")
+
+
+@pytest.mark.parametrize("form", [memscal.IdealReference("slit", SIZE), field()])
+def test_the_artifact_keeps_the_reference(tmp_path: Path, form) -> None:
+    kind = "ellipse" if isinstance(form, memscal.StressField) else "slit"
+    a = memscal.calibrate(scanned(kind, seed=2), reference=form, method="bayesian").apparatus
+    a.save(tmp_path / "a.h5")
+    kept = memscal.load_apparatus(tmp_path / "a.h5").reference
+    if kind == "slit":
+        assert kept.ideal == form
+    else:
+        np.testing.assert_allclose(kept.field.values, form.values)
+        np.testing.assert_allclose(kept.field.x, form.x, atol=1e-15)
+        assert kept.field.unit == "uT"
+
+
+def test_fields_are_read_from_arrays_and_images(tmp_path: Path) -> None:
+    values = field().values / field().values.max()
+    np.save(tmp_path / "f.npy", values)
+    grey = (255 * values).astype(np.uint8)
+    Image.fromarray((65535 * values).astype(np.uint16)).save(tmp_path / "f.png")
+    Image.fromarray(values.astype(np.float32)).save(tmp_path / "f.tif")
+    Image.fromarray(np.stack([grey, grey, grey, 255 + 0 * grey], axis=-1)).save(tmp_path / "c.png")
+    for name, scale in (("f.npy", 1), ("f.png", 65535), ("f.tif", 1), ("c.png", 255)):
+        kept = memscal.read_reference(tmp_path / name, pixel_size=PIXEL).field
+        np.testing.assert_allclose(kept.values / scale, values, atol=1 / 255)
+        assert np.ptp(kept.x) == pytest.approx(160 * PIXEL)
+        assert ("luminance" in kept.notes) == (name == "c.png")
+
+
+BAD = {
+    "nan.npy": np.full((9, 9), np.nan), "pull.npy": -field().values, "flat.npy": np.ones((20, 20)),
+    "line.npy": np.ones(9), "empty.npy": np.ones((0, 9)), "text.npy": np.full((9, 9), "a"),
+    "huge.npy": np.ones((3000, 9)), "objects.npy": np.array([[None]]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*BAD, "cut.npy", "cut.png", "no.npy"])
+def test_what_is_no_field_is_refused(tmp_path: Path, name: str) -> None:
+    if name in BAD:
+        np.save(tmp_path / name, BAD[name], allow_pickle=True)
+    elif name != "no.npy":
+        (tmp_path / name).write_bytes(b"\x93NUMPY" if name.endswith("npy") else b"\x89PNG\r\n")
+    with pytest.raises(MemscalError):
+        memscal.read_reference(tmp_path / name, pixel_size=PIXEL)
+
+
+@pytest.mark.parametrize(
+    ("reference", "said"),
+    [
+        ("disc:0.5", "no length"), ("disc:", "no length"), ("disc:-1mm", "above zero"),
+        ("disc:1s", "length"), ("point:1mm", "no size"), ("disk:1mm", "cannot be read"),
+        (["disc:1mm", None], "2 references"), (field(), "not round"),
+    ],
+)  # fmt: skip
+def test_what_is_no_reference_is_refused(reference, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        memscal.calibrate(scanned("ellipse"), reference=reference)
+
+
+def test_a_slit_is_not_the_reference_of_a_raster_nor_beside_a_stress() -> None:
+    with pytest.raises(InputError, match="slit"):
+        memscal.calibrate(scanned("disc", raster=True, n=9), reference="slit:1mm")
+    with pytest.raises(InputError, match="mixed"):
+        memscal.calibrate([scanned("disc"), scanned("slit")], reference=["disc:1mm", "slit:1mm"])
