@@ -21,14 +21,13 @@ integrated with nodes that crowd there, others by a plain Gauss rule; both to ab
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprd
 
 from memscal.model.arrays import FloatArray
-from memscal.model.field_mesh import FieldMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +70,37 @@ class FilmField(Protocol):
         """Return the radial displacement of the surface in m, positive outward."""
 
 
-@runtime_checkable
-class MeshedField(Protocol):
-    """A field that was solved on a mesh, and can be shown on it."""
+class FieldByOrder:
+    """A film's field (:class:`FilmField`) by one function for normal (0) and radial (1) each."""
 
-    def mesh(self) -> FieldMesh:
-        """Return displacement and stress on the mesh."""
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa."""
+        return self._base(r, 0)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa."""
+        return self._base(r, 1)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        """Return the transform of order zero of the normal stress at ``k`` (rad/m), in N."""
+        return self._spectrum(k, 0)
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        """Return the transform of order one of the base shear at ``k`` (rad/m), in N."""
+        return self._spectrum(k, 1)
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m."""
+        return self._surface(r, 0)
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m."""
+        return self._surface(r, 1)
+
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
+        raise NotImplementedError
+
+    _spectrum = _surface = _base
 
 
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.

@@ -33,7 +33,7 @@ from scipy.sparse import block_array, csc_array, csr_array
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
-from memscal.mechanics.surface import SurfaceCompliance
+from memscal.mechanics.surface import FieldByOrder, SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
@@ -347,53 +347,27 @@ class ElementFilm:
 
 
 @dataclass(frozen=True, eq=False)
-class ElementField:
-    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`."""
+class ElementField(FieldByOrder):
+    """The field in a film under a traction, zero beyond the film's edge at ``radius`` (m)."""
 
     film: ElasticFilm
     radius: float
     system: MixedSystem
     solution: FloatArray  # displacements in film thicknesses, mean pressures in shear moduli
 
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa; zero beyond the film's edge."""
-        return self._at_base(0, r)
-
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa; zero beyond its edge."""
-        return self._at_base(1, r)
-
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of the base stress at ``k`` (rad/m), in N, to 1e-5 of the load."""
-        r = self._fine_radii
-        return hankel_transform(r, self.base_normal(r), np.ravel(k)).reshape(np.shape(k))
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        r = self._fine_radii
-        return hankel_transform(r, self.base_shear(r), np.ravel(k), order=1).reshape(np.shape(k))
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m, positive into the film."""
-        return self._at_surface(1, r)
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return the radial displacement of the surface in m; see :meth:`depression`."""
-        return self._at_surface(0, r)
-
     def mesh(self) -> FieldMesh:
         """Return displacement and stress inside the film, on quadratic triangles."""
         return field_mesh(self.system, self.solution, self.film)
 
-    @property
-    def _fine_radii(self) -> FloatArray:
-        """Radii at which the base's tractions are tabulated for their spectra, in m."""
+    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        """Return a transform of the base's tractions, to 1e-5 of the load."""
         nodes = self.system.side(1.0)[0].r * self.film.thickness
         index = np.arange(_PER_NODE * (nodes.size - 1) + 1) / _PER_NODE
-        return np.interp(index, np.arange(nodes.size), nodes)
+        r = np.interp(index, np.arange(nodes.size), nodes)
+        return hankel_transform(r, self._base(r, order), np.ravel(k), order=order).reshape(k.shape)
 
     @cached_property
-    def _base(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
+    def _tractions(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
         """Normal and radial traction at the base, in Pa, at radii in film thicknesses."""
         from scipy.sparse.linalg import spsolve
 
@@ -405,19 +379,18 @@ class ElementField:
         shear = np.append(0.0, spsolve(mass[1:, 1:], held[1:]))
         return smooth(line, -spsolve(mass, pushed), 1), smooth(line, shear, -1)
 
-    def _at_base(self, component: int, r: FloatArray) -> FloatArray:
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(r, dtype=np.float64))
-        values = self._base[component](np.minimum(flat, self.radius) / self.film.thickness)
+        values = self._tractions[order](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
-    def _at_surface(self, component: int, r: FloatArray) -> FloatArray:
-        """Return the displacement outward (0) or inward (1) at ``r``, in m."""
+    def _surface(self, r: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(r, dtype=np.float64))
         if np.any(flat > self.radius):
             raise DomainError(
                 f"There is no surface at {flat.max():g} m: the film ends at {self.radius:g} m.",
                 cure="Ask for smaller radii, or give a wider film.",
             )
-        line, *unknowns = self.system.side(0.0)
-        values = line.at(flat / self.film.thickness) @ self.solution[unknowns[component]]
+        line, outward, inward = self.system.side(0.0)
+        values = line.at(flat / self.film.thickness) @ self.solution[outward if order else inward]
         return np.asarray(self.film.thickness * values).reshape(np.shape(r))

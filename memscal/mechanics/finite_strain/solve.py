@@ -30,6 +30,7 @@ from memscal.mechanics.finite_strain.pressing import (
 )
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
+from memscal.mechanics.surface import FieldByOrder
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
@@ -279,8 +280,8 @@ class _Request:
 
 
 @dataclass(frozen=True, eq=False)
-class FiniteStrainField:
-    """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`."""
+class FiniteStrainField(FieldByOrder):
+    """The field in a film at finite strain; zero beyond the film's edge."""
 
     # An element of the bonded base does not deform: its Cauchy traction is the nominal one.
     # ``depression`` and ``outward`` are functions of a point's radius *before* the deformation.
@@ -311,30 +312,15 @@ class FiniteStrainField:
         r, w, u = elements.nodes[0][nodes], -x[nodes + elements.n], x[nodes]
         return r / _MM, w / _MM, u / _MM
 
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa, compression positive; 0 beyond the film."""
-        return _interpolated(self.base[0], self.base[1], r, parity=1)
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
+        return _interpolated(self.base[0], self.base[1 + order], r, parity=-1 if order else 1)
 
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa, positive outward."""
-        return _interpolated(self.base[0], self.base[2], r, parity=-1)
+    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        r, traction = self.base[0], self.base[1 + order]
+        return hankel_transform(r, traction, np.ravel(k), order=order).reshape(np.shape(k))
 
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-        return hankel_transform(self.base[0], self.base[1], np.ravel(k)).reshape(np.shape(k))
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        r, shear = self.base[0], self.base[2]
-        return hankel_transform(r, shear, np.ravel(k), order=1).reshape(np.shape(k))
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return how far the points at ``r`` before deformation (m) moved into the film, in m."""
-        return _interpolated(self.surface[0], self.surface[1], r, parity=0)
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return how far the points at ``r`` before deformation (m) moved outward, in m."""
-        return _interpolated(self.surface[0], self.surface[2], r, parity=0)
+    def _surface(self, r: FloatArray, order: int) -> FloatArray:
+        return _interpolated(self.surface[0], self.surface[1 + order], r, parity=0)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
