@@ -120,6 +120,7 @@ EXPANDED = 2.0
 #: How strongly points are drawn that are not distinct from zero.
 _PALE = 0.25
 _LEAST_LIMIT = 3.5
+_BARS = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
 
 
 def _draw_points(
@@ -131,21 +132,8 @@ def _draw_points(
     clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
-            points = (r[shown], s[shown], u[shown])
-            _draw_errorbar(axes, at_load, colour, points, label=label or "_points", alpha=alpha)
-
-
-def _draw_errorbar(
-    axes: Axes,
-    at_load: LoadComparison,
-    colour: str,
-    points: tuple[FloatArray, FloatArray, FloatArray],
-    **style: Any,
-) -> None:
-    """Draw x, y and the standard uncertainty of y, in the marker of the lubrication."""
-    look = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7, **style}
-    x, y, u = points
-    axes.errorbar(x, y, u, **mark(at_load.lubrication, colour), **look)
+            look = mark(at_load.lubrication, colour) | _BARS | {"alpha": alpha}
+            axes.errorbar(r[shown], s[shown], u[shown], label=label or "_points", **look)
 
 
 def share_limits(panels: Sequence[Axes]) -> None:
@@ -229,8 +217,7 @@ def draw_residuals(
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
     looks = load_looks(comparison)
-    colours = [looks[at_load.load][0] for at_load in loads]
-    _plot_residuals(axes, loads, index, colours)
+    _plot_residuals(axes, loads, index, [looks[at_load.load][0] for at_load in loads])
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(comparison.friction[index])}}})/u$")
 
@@ -291,15 +278,15 @@ def _draw_set(
     unit: float,
 ) -> None:
     """Draw stress less that of some profile at its radii, in a unit (Pa)."""
-    profile, black = at_load.profile, COLOURS["measured"]
+    profile, look = at_load.profile, mark(at_load.lubrication, COLOURS["measured"]) | _BARS
     # As far as the frictionless profile exceeds a twentieth of its top.
     strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
     r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    points = (profile.r / MM, (profile.s_zz - less) / unit, profile.s_zz_errors / unit)
-    _draw_errorbar(axes, at_load, black, points, label="_points")
+    stress, errors = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
+    axes.errorbar(profile.r / MM, stress, errors, label="_points", **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
 
 

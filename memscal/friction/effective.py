@@ -40,8 +40,8 @@ def bracketed_share(
     return float(np.mean((below <= measured) & (measured <= above)))
 
 
-#: Level of one standard deviation of a normal distribution.
-_ONE_SIGMA = 0.6827
+#: Level of an interval, and that of one standard deviation of a normal distribution.
+_LEVEL, _ONE_SIGMA = 0.95, 0.6827
 _STEPS = 40
 
 
@@ -53,7 +53,6 @@ def profile_estimate(
     *,
     reason: Callable[[Interval], str],
     two_sided: bool = False,
-    level: float = 0.95,
     unit: str = "",
 ) -> BoundedEstimate:
     """Return best value and interval of chi-square (m,) along an increasing bounded coordinate."""
@@ -72,7 +71,7 @@ def profile_estimate(
             0.0 if low is None else value_at(low), None if high is None else value_at(high), at
         )
 
-    wide, narrow = interval(level), interval(_ONE_SIGMA)
+    wide, narrow = interval(_LEVEL), interval(_ONE_SIGMA)
     # There is no value without an upper end, with ``two_sided`` without both; ``reason`` says why.
     if wide.high is None or (two_sided and not wide.two_sided):
         value = spread = None
@@ -315,8 +314,11 @@ def dry_against_lubricated(
     dry, wet = ((side.u - of_side.signal[0])[places] for side, of_side, places in both)
     covariance = sum(_covariance(side, p)[np.ix_(places, places)] for side, p, places in both)
     flat = np.column_stack([sides[0].flat, predicted[0].slope[0] * sides[0].side])[kept[0]]
-    chi_square = _chi_square(dry - wet, np.asarray(covariance), flat)
-    degrees = kept[0].size - flat.shape[1]
+    root = np.linalg.cholesky(np.asarray(covariance))
+    basis = np.linalg.qr(np.linalg.solve(root, flat))[0]
+    left = np.linalg.solve(root, dry - wet)
+    left = left - basis @ (basis.T @ left)
+    chi_square, degrees = float(left @ left), left.size - flat.shape[1]
     difference, errors = _difference(profiles, sides, predicted, kept, sensor, conversion_share)
     top = profiles[0].maximum - profiles[1].maximum
     random = (random_uncertainty(profile.maximum_budget) for profile in profiles)
@@ -351,14 +353,6 @@ def _covariance(points: LoadPoints, predicted: Predicted) -> FloatArray:
     noise = np.diag(np.diag(noise)) if points.correlation is None else noise * points.correlation
     moved = (predicted.slope[0] * points.x_errors) ** 2
     return np.asarray(noise + np.diag((predicted.by_load[0] * points.load_errors) ** 2 + moved))
-
-
-def _chi_square(values: FloatArray, covariance: FloatArray, flat: FloatArray) -> float:
-    root = np.linalg.cholesky(covariance)
-    basis = np.linalg.qr(np.linalg.solve(root, flat))[0]
-    left = np.linalg.solve(root, values)
-    left = left - basis @ (basis.T @ left)
-    return float(left @ left)
 
 
 def _difference(

@@ -18,25 +18,18 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.errors import ConvergenceError, DomainError, InputError, MemscalError
+from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_table, table_key
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import (
-    FloatArray,
-    finite_vector,
-    freeze_arrays,
-    frozen_array,
-    require_positive,
-)
+from memscal.model.arrays import FloatArray, FrozenArrays, finite_vector, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
@@ -61,7 +54,7 @@ _NUMBERS = ("depths", "contact_radii", "convergence")
 
 
 @dataclass(frozen=True, eq=False)
-class ProfileFamily:
+class ProfileFamily(FrozenArrays):
     r"""Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers.
 
     Spectra are :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, with ``order`` one
@@ -84,34 +77,6 @@ class ProfileFamily:
     order: int = 0
     slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "loads", "values", "spectra", "by_load", *_NUMBERS)
-        changes = {source: frozen_array(change) for source, change in self.changes.items()}
-        object.__setattr__(self, "changes", MappingProxyType(changes))
-        require_positive("scale of a profile family", self.scale)
-        table = (self.values.size, self.loads.size)
-        whole = (*table, self.wavenumbers.k.size)
-        arrays = {name: getattr(self, name) for name in ("spectra", "by_load", *_NUMBERS)}
-        arrays |= {f"changes[{name!r}]": change for name, change in self.changes.items()}
-        for name, array in arrays.items():
-            shape = table if name in _NUMBERS else whole
-            if array.shape != shape:
-                raise InputError(
-                    f"{name} of a profile family has shape {array.shape}, not {shape}."
-                )
-        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
-        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
-            raise InputError(
-                f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
-                why="They increase strictly, from 0 or above.",
-                cure="Sort them, and give each once.",
-            )
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out what was computed on demand; a mapping proxy cannot be pickled."""
-        state = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return state | {"changes": dict(self.changes)}
-
     @cached_property
     def coordinates(self) -> FloatArray:
         """Bounded coordinates of the values, shape (M,)."""
@@ -130,8 +95,6 @@ class ProfileFamily:
 
     def value_at(self, coordinate: float) -> float:
         """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`."""
-        if not 0 <= coordinate <= 1:
-            raise InputError(f"A bounded coordinate is {coordinate:g}, but it lies from 0 to 1.")
         return math.inf if coordinate == 1 else self.scale * coordinate / (1 - coordinate)
 
     def values_at(self, coordinates: Iterable[float]) -> FloatArray:
@@ -179,17 +142,16 @@ class ProfileFamily:
     @cached_property
     def _pieces(self) -> Any:
         """Interpolant of spectra, derivatives and changes, shape (2 + sources, L, K)."""
-        from scipy.interpolate import PchipInterpolator
+        from scipy.interpolate import PchipInterpolator, PPoly
 
         stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
+        if self.values.size == 1:  # a constant
+            return PPoly(stack[None], [0.0, 1.0])
         return PchipInterpolator(self.coordinates, stack, axis=0)
 
     def _interpolated(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Return spectra, derivatives and changes at coordinates (V,): (V, 2 + sources, L, K)."""
-        if self.values.size > 1:
-            return np.asarray(self._pieces(t, derivative))
-        stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
-        return np.repeat(stack * (not derivative), t.size, axis=0)
+        return np.asarray(self._pieces(t, derivative))
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
@@ -275,11 +237,7 @@ class LoadingPath:
 def solve_paths(
     paths: Sequence[LoadingPath], k: FloatArray, *, workers: int
 ) -> list[dict[str, FloatArray]]:
-    """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes.
-
-    ``spectra`` (L, K) in N with ``by_load`` and ``by_wavenumber``, derivatives by the logarithms
-    (zero where not needed), and ``depths``, ``contact_radii``, ``convergence`` (L,).
-    """
+    """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes."""
     several = min(workers, len(paths))
     if several < 2:
         return [_solve(path, k) for path in paths]
@@ -288,6 +246,7 @@ def solve_paths(
 
 
 def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
+    """Return spectra (L, K) in N, derivatives by logarithms (zero where not needed), numbers."""
     count = len(path.loads)
     factors = np.array([1.0, *_NEIGHBOURS] if path.derivatives else [1.0])
     visited = np.multiply.outer(factors, np.array(path.loads))
@@ -336,21 +295,16 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
                 strain="linear",
                 rings=rings,
             )
-        except ConvergenceError as error:
+        except (ConvergenceError, DomainError) as error:
             failure = error
-        except DomainError as error:
-            raise _named(path, error) from error
-    raise _named(path, failure) from failure
-
-
-def _named(path: LoadingPath, error: DomainError | ConvergenceError) -> MemscalError:
-    """Return the error with what it was about."""
+            if isinstance(error, DomainError):
+                break
     problem = (
         f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm with a film of "
         f"{path.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(path.loads):g} N "
-        f"(friction {path.friction:g}, {path.loading} loading): {error.problem}"
+        f"(friction {path.friction:g}, {path.loading} loading): {failure.problem}"
     )
-    return type(error)(problem, why=error.why, cure=error.cure)
+    raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
 
 
 #: Raised where the same request gives other numbers within one version.

@@ -382,13 +382,13 @@ def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Des
     name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
-    goal = f"{_in_words(name, targets[name])} is out of reach by the {search.name} alone"
+    goal, reached = (_in_words(name, value) for value in (targets[name], _reached(best, name)))
     length = best.plan.step if search.name == "step" else best.plan.half_range
     count = f"a {search.name} of {length * 1e3:.4g} mm"
     if search.name == "repeats":
         count = f"{best.plan.repeats} repeats"
-    reached = f"{_in_words(name, _reached(best, name))}, with {count}"
-    problem = f"{goal[0].upper()}{goal[1:]}: the best is {reached}."
+    out_of_reach = f"is out of reach by the {search.name} alone: the best is {reached}"
+    problem = f"{goal[0].upper()}{goal[1:]} {out_of_reach}, with {count}."
     if name == "resolved_wavenumber":
         step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
         if best.resolved_wavenumber >= 0.99 * sampled:
