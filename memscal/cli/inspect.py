@@ -56,21 +56,16 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
     arrays = [_array_row(item) for item in contents["arrays"]]
     yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
-    checks = [
-        (
-            check["name"].replace("_", " "),
-            *(_number(check[name], ".3g") for name in ("value", "limit")),
-            "passed" if check["passed"] else "FAILED",
-        )
-        for check in contents["checks"]
-    ]
-    failed = frozenset(i for i, check in enumerate(contents["checks"]) if not check["passed"])
-    yield Table("Quality checks", ("check", "value", "limit", "result"), checks, failed)
-    meanings = [
-        (check["name"].replace("_", " "), check["meaning"])
-        for check in contents["checks"]
-        if not check["passed"]
-    ]
+    checks, failed, meanings = [], set(), []
+    for i, check in enumerate(contents["checks"]):
+        name, numbers = check["name"].replace("_", " "), (check["value"], check["limit"])
+        result = "passed" if check["passed"] else "FAILED"
+        checks.append((name, *(_number(number, ".3g") for number in numbers), result))
+        if not check["passed"]:
+            failed.add(i)
+            meanings.append((name, check["meaning"]))
+    columns = ("check", "value", "limit", "result")
+    yield Table("Quality checks", columns, checks, frozenset(failed))
     yield Table("What the failures mean", ("", ""), meanings)
     yield Table("Provenance", ("", ""), list(_provenance(contents["provenance"])))
 

@@ -240,10 +240,18 @@ def command(
         return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
     output = output or Path("synthetic_scan.h5")
     prove_writable([output], force=force)
-    scan = _simulate(options)
 
     from memscal.formats.scan import write_scan
+    from memscal.simulation.rod_scan import simulate
 
+    loads = options["loads"] or (1.0,)
+    scan = simulate(
+        load=loads[0] if len(loads) == 1 else loads,
+        half_range=si(options["half_range"], -3),
+        points=options["points"],
+        raster=options["raster"],
+        **_shared_settings(options),
+    )
     write_scan(scan, output, overwrite=force)
     if as_json:
         emit_json({"schema_version": "1", **_described(scan, output)})
@@ -293,16 +301,3 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     note("The scans are synthetic: nothing in them was measured.")
     message(f"Written: {', '.join(map(str, scans))}")
     return DONE
-
-
-def _simulate(options: Mapping[str, Any]) -> Scan:
-    from memscal.simulation.rod_scan import simulate
-
-    loads = options["loads"] or (1.0,)
-    return simulate(
-        load=loads[0] if len(loads) == 1 else loads,
-        half_range=si(options["half_range"], -3),
-        points=options["points"],
-        raster=options["raster"],
-        **_shared_settings(options),
-    )

@@ -24,7 +24,7 @@ from memscal.friction.family import (
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter, Sphere
+from memscal.model.indenter import Indenter
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.stress import StressProfile
 
@@ -264,9 +264,9 @@ def external_family(
     profiles: Sequence[StressProfile],
     loads: ArrayLike,
     *,
+    film: ElasticFilm,
+    indenter: Indenter,
     reach: float,
-    film: ElasticFilm | None = None,
-    indenter: Indenter | None = None,
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
@@ -278,32 +278,21 @@ def external_family(
     loading = _common_loading(tables)
     frictions = np.array(sorted({_friction(profile) for profile in tables}))
     grid = _grid(tables, frictions, nominal)
-    film = film or next((p.film for p in tables if p.film is not None), None)
-    indenter = indenter or next((p.indenter for p in tables if p.indenter is not None), None)
-    # Where no film is known: a stress halves over about the film's thickness.
-    thickness = film.thickness if film else min(_half_width(profile) for profile in tables)
-    nodes = base_wavenumbers(thickness, reach)
+    nodes = base_wavenumbers(film.thickness, reach)
     spectra = np.array(
         [[hankel_transform(cell.r, cell.sigma_zz, nodes.k) for cell in row] for row in grid]
     )
     spectra *= (nominal / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
-    by_load, changes = spectra, {}
-    notes = "No film and sphere are known: the stress counts as proportional to the load."
-    if film is not None and isinstance(indenter, Sphere):
-        ours = amontons_family(
-            film,
-            indenter,
-            nominal,
-            friction=[float(mu) for mu in frictions],
-            loading=loading or "incremental",
-            reach=reach,
-            cache=cache,
-            workers=workers,
-        )
-        # What the tables have beside the contacts solved here counts as proportional to the load.
-        by_load = ours.by_load + (spectra - ours.spectra)
-        changes = dict(ours.changes)
-        notes = "Sensitivities are those of the contacts that memscal calculates."
+    ours = amontons_family(
+        film,
+        indenter,
+        nominal,
+        friction=[float(mu) for mu in frictions],
+        loading=loading or "incremental",
+        reach=reach,
+        cache=cache,
+        workers=workers,
+    )
     return ProfileFamily(
         name="external",
         loading=loading,
@@ -312,12 +301,13 @@ def external_family(
         values=frictions,
         scale=FRICTION_SCALE,
         spectra=spectra,
-        by_load=by_load,
-        changes=changes,
+        # What the tables have beside the contacts solved here counts as proportional to the load.
+        by_load=ours.by_load + (spectra - ours.spectra),
+        changes=ours.changes,
         depths=_numbers(grid, "depth"),
         contact_radii=_numbers(grid, "contact_radius"),
         convergence=_numbers(grid, "convergence"),
-        notes=(notes,),
+        notes=("Sensitivities are those of the contacts that memscal calculates.",),
     )
 
 
@@ -400,11 +390,6 @@ def _friction(profile: StressProfile) -> float:
 
 def _name(profile: StressProfile) -> str:
     return profile.source.file_name if profile.source else f"A table for {profile.load:g} N"
-
-
-def _half_width(profile: StressProfile) -> float:
-    below = np.flatnonzero(profile.sigma_zz < profile.sigma_zz.max() / 2)
-    return float(profile.r[below[below > np.argmax(profile.sigma_zz)][0]])
 
 
 def _numbers(grid: Sequence[Sequence[StressProfile]], name: str) -> FloatArray:

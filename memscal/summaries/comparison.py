@@ -109,11 +109,9 @@ _OF_ONE_SCAN = {"noise", "load_scatter", "position"}
 
 
 def correlated(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
-    """Return the coefficients of all loads that have a standard uncertainty, by what they are of.
-
-    Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
-    is common to them; each source moves all coefficients to the same side.
-    """
+    """Return the coefficients of all loads that have a standard uncertainty, by their names."""
+    # Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
+    # is common to them; each source moves all coefficients to the same side.
     joint = [entry for entry in _joint(comparison) if entry[2].standard_uncertainty is not None]
     if not joint:
         raise InputError(

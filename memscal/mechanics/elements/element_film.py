@@ -143,13 +143,6 @@ class MixedSystem:
         return skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP4()), intorder=_QUADRATURE)
 
     @cached_property
-    def pressure(self) -> Any:
-        """Basis of the mean pressure."""
-        import skfem
-
-        return self.displacement.with_element(skfem.ElementTriP3())
-
-    @cached_property
     def matrix(self) -> csr_array:
         """All equations, symmetric: those of the displacement, then those of the pressure."""
         import skfem
@@ -175,8 +168,9 @@ class MixedSystem:
         def compression(p: Any, q: Any, w: Any) -> Any:
             return -softness * p * q * w.x[0]
 
-        coupled = squeeze.assemble(self.displacement, self.pressure)
-        stiff, soft = distortion.assemble(self.displacement), compression.assemble(self.pressure)
+        pressure = self.displacement.with_element(skfem.ElementTriP3())
+        coupled = squeeze.assemble(self.displacement, pressure)
+        stiff, soft = distortion.assemble(self.displacement), compression.assemble(pressure)
         return csr_array(block_array([[stiff, coupled.T], [coupled, soft]]))
 
     @cached_property
@@ -239,7 +233,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=points)
     moved, pressed = np.split(solution, [basis.N])
     gradient = at_nodes.interpolate(moved).grad
-    squeeze = np.asarray(at_nodes.with_element(system.pressure.elem).interpolate(pressed))
+    squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
     r, depth = system.displacement.doflocs[:, nodes]
     displacement = np.empty((nodes.size, 2))
     displacement[index, 0], displacement[index, 1] = solution[outward], -solution[inward]

@@ -19,7 +19,6 @@ from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.film_elements import Finer
 from memscal.mechanics.finite_strain.pressing import (
-    Goal,
     NewtonError,
     Path,
     Pressed,
@@ -116,8 +115,7 @@ def solve_finite_strain(
     """Press a rod (edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m)."""
     # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
     # the wall; under a sphere that sticks nothing in the contact moves radially.
-    by_load = isinstance(targets[0], Load)
-    goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
+    goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
     tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
@@ -129,7 +127,7 @@ def follow_depths(
     film: ElasticFilm, rod: Rod, depths: Sequence[float], *, sticking: bool, finer: Finer = (1, 1)
 ) -> Iterator[Contact]:
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
-    goals = [Goal(depth * _MM, False) for depth in depths]
+    goals = [Depth(depth * _MM) for depth in depths]
     radius = _FREE_EDGE * film.thickness * _MM
     return _Request(film, rod, goals, sticking, radius, None, finer).reached(1.0)
 
@@ -140,7 +138,7 @@ class _Request:
 
     film: ElasticFilm
     indenter: Rod | Sphere
-    goals: list[Goal]
+    goals: Sequence[Target]
     sticking: bool
     radius: float
     edge: float | None
@@ -216,19 +214,19 @@ class _Request:
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 
-    def _depth(self, goal: Goal) -> float:
+    def _depth(self, goal: Target) -> float:
         """Return a rod's depth at a goal, that on a half-space at a load, in mm."""
-        if not goal.is_load:
+        if isinstance(goal, Depth):
             return goal.value
         stiffness = 2 * self.film.contact_modulus / 1e6 * self.indenter.extent * _MM
         return min(goal.value / stiffness, self.film.thickness * _MM)
 
-    def _hertz_radius(self, goal: Goal) -> float:
+    def _hertz_radius(self, goal: Target) -> float:
         """Return a contact radius of a sphere that is not exceeded, in mm."""
         # At a load that on a half-space; at a depth that of an incompressible film, which rises
         # beside the contact.
         R = self.indenter.extent * _MM
-        if goal.is_load:
+        if isinstance(goal, Load):
             return float(np.cbrt(0.75 * goal.value * R / (self.film.contact_modulus / 1e6)))
         return float(1.6 * np.sqrt(goal.value * R))
 

@@ -234,9 +234,9 @@ def _stick_radius(
     request: RingRequest, rings: FloatArray, state: ContactState, contact_radius: float
 ) -> float:
     """Return the radius in m within which the film sticks."""
-    sticking = np.flatnonzero(state.sticking(request.friction) & (state.pressure > 0))
+    sticking = np.flatnonzero(state.touching & (state.slip == 0) & (state.pressure > 0))
     last = int(sticking.max(initial=0))
-    if last == 0:
+    if last == 0 or request.friction == 0:
         return 0.0
     if last + 1 >= rings.size or not state.touching[last + 1]:
         return contact_radius
