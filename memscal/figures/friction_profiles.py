@@ -196,20 +196,18 @@ def draw_profiles(
     else:
         axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
         axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
-        _annotate_curves(axes, comparison, loads[0])
+        ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
+        lines = [lubricated_words(loads[0].lubrication)]
+        lines += [f"{loads[0].loading} loading"] if loads[0].loading else []
+        lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
+        _note(axes, "\n".join(lines), (0.97, 0.95))
     axes.set_ylabel("stress at the base (kPa)")
     legend_above(axes, columns=4 if not logarithmic else 2)
 
 
-def _annotate_curves(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    """Name the scan and the curves inside the frame, where no data are."""
-    ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
-    lines = [lubricated_words(at_load.lubrication)]
-    lines += [f"{at_load.loading} loading"] if at_load.loading else []
-    lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
-    axes.annotate(
-        "\n".join(lines), (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize=7
-    )
+def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
+    """Write inside the frame, left of and below a place at its upper right, where no data are."""
+    axes.annotate(text, corner, xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def draw_residuals(
@@ -250,7 +248,10 @@ def friction_set_figure(
             _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
             column[0].set_ylim(bottom=0)
             _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
-            _draw_best(column[2], comparison, at_load)
+            best = int(np.argmin(at_load.chi_square))
+            _plot_residuals(column[2], [at_load], best, [COLOURS["measured"]])
+            name = friction_name(comparison.friction[best])
+            _note(column[2], rf"least $\chi^2$: $\mu$ = {name}", (0.96, 0.9))
         share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:
@@ -288,13 +289,6 @@ def _draw_set(
     stress, errors = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
     axes.errorbar(profile.r / MM, stress, errors, label="_points", **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
-
-
-def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    best = int(np.argmin(at_load.chi_square))
-    _plot_residuals(axes, [at_load], best, [COLOURS["measured"]])
-    label = rf"least $\chi^2$: $\mu$ = {friction_name(comparison.friction[best])}"
-    axes.annotate(label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def _legend_of_friction(

@@ -39,15 +39,10 @@ def amontons_family(
     *,
     friction: Sequence[float] = FRICTIONS,
     loading: str = "incremental",
-    reach: float,  # largest distance from the axis at which stresses will be asked for, in m
-    cache: CacheFolder = None,
-    workers: int = 1,
-    order: int = 0,  # one for the shear at the base
+    **options: Any,  # reach, cache, workers and order of FamilySetup; so in the next functions
 ) -> ProfileFamily:
     """Return the base stresses of a sphere on a film for a range of friction coefficients."""
-    setup = FamilySetup(
-        film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
-    )
+    setup = FamilySetup(film, indenter, loads, **options)
     values = parameter_values("friction coefficients", friction)
     if loading not in ("incremental", "total"):
         raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
@@ -78,12 +73,10 @@ def elasto_plastic_family(
     *,
     friction: float,
     slip_lengths: Sequence[float] = SLIP_LENGTHS,
-    reach: float,
-    cache: CacheFolder = None,
-    workers: int = 1,
+    **options: Any,
 ) -> ProfileFamily:
     """Return incremental base stresses for slip lengths (m), from 0 (rigid) to inf (no shear)."""
-    setup = FamilySetup(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    setup = FamilySetup(film, indenter, loads, **options)
     values = parameter_values("slip lengths", slip_lengths)
     if not 0 < friction < math.inf:
         raise InputError(
@@ -115,9 +108,7 @@ def normal_compliance_family(
     *,
     lengths: Sequence[float] | None = None,
     law: str = "exponential",
-    reach: float,
-    cache: CacheFolder = None,
-    workers: int = 1,
+    **options: Any,
 ) -> ProfileFamily:
     r"""Return the base stresses without friction for a range of lengths (m) of a normal law.
 
@@ -125,7 +116,7 @@ def normal_compliance_family(
     :math:`p_1` only shifts the depth.  ``"greenwood-tripp"``: asperities of the roughness
     :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
     """
-    setup = FamilySetup(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    setup = FamilySetup(film, indenter, loads, **options)
     if law not in ("exponential", "greenwood-tripp"):
         raise InputError(f'law is {law!r}, but it is "exponential" or "greenwood-tripp".')
     if lengths is None:
@@ -267,8 +258,7 @@ def external_family(
     film: ElasticFilm,
     indenter: Indenter,
     reach: float,
-    cache: CacheFolder = None,
-    workers: int = 1,
+    **options: Any,
 ) -> ProfileFamily:
     """Return base stresses of tables by friction; each serves loads within 1 % of its own."""
     nominal = require_loads(loads)
@@ -283,16 +273,8 @@ def external_family(
         [[hankel_transform(cell.r, cell.sigma_zz, nodes.k) for cell in row] for row in grid]
     )
     spectra *= (nominal / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
-    ours = amontons_family(
-        film,
-        indenter,
-        nominal,
-        friction=[float(mu) for mu in frictions],
-        loading=loading or "incremental",
-        reach=reach,
-        cache=cache,
-        workers=workers,
-    )
+    law: dict[str, Any] = {"friction": frictions.tolist(), "loading": loading or "incremental"}
+    ours = amontons_family(film, indenter, nominal, reach=reach, **law, **options)
     return ProfileFamily(
         name="external",
         loading=loading,

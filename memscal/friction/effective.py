@@ -40,8 +40,8 @@ def bracketed_share(
     return float(np.mean((below <= measured) & (measured <= above)))
 
 
-#: Level of an interval, and that of one standard deviation of a normal distribution.
-_LEVEL, _ONE_SIGMA = 0.95, 0.6827
+#: Level of one standard deviation of a normal distribution.
+_ONE_SIGMA = 0.6827
 _STEPS = 40
 
 
@@ -53,13 +53,19 @@ def profile_estimate(
     *,
     reason: Callable[[Interval], str],
     two_sided: bool = False,
+    level: float = 0.95,
     unit: str = "",
 ) -> BoundedEstimate:
     """Return best value and interval of chi-square (m,) along an increasing bounded coordinate."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(coordinates, chi_square)
-    best = _minimum(spline, coordinates, chi_square)
+    # The lowest point of the spline next to the lowest node.
+    i = int(np.argmin(chi_square))
+    around = coordinates[max(i - 1, 0) : i + 2]
+    turns = spline.derivative().roots(extrapolate=False)
+    turns = turns[(around[0] < turns) & (turns < around[-1])]
+    best = float(min([coordinates[i], *turns], key=spline))
     least = float(spline(best))
 
     def interval(at: float) -> Interval:
@@ -71,7 +77,7 @@ def profile_estimate(
             0.0 if low is None else value_at(low), None if high is None else value_at(high), at
         )
 
-    wide, narrow = interval(_LEVEL), interval(_ONE_SIGMA)
+    wide, narrow = interval(level), interval(_ONE_SIGMA)
     # There is no value without an upper end, with ``two_sided`` without both; ``reason`` says why.
     if wide.high is None or (two_sided and not wide.two_sided):
         value = spread = None
@@ -79,16 +85,6 @@ def profile_estimate(
         value = value_at(float(np.clip(best, coordinates[0], coordinates[-1])))
         spread = (narrow.high - narrow.low) / 2 if narrow.high and narrow.low > 0 else None
     return BoundedEstimate(value, spread, wide, reason(wide), values, chi_square, least, unit=unit)
-
-
-def _minimum(spline: Any, coordinates: FloatArray, chi_square: FloatArray) -> float:
-    """Lowest point of the spline next to the lowest node."""
-    i = int(np.argmin(chi_square))
-    around = slice(max(i - 1, 0), i + 2)
-    low, high = coordinates[around][0], coordinates[around][-1]
-    turns = spline.derivative().roots(extrapolate=False)
-    candidates = [float(coordinates[i]), *(float(t) for t in turns if low < t < high)]
-    return min(candidates, key=lambda t: float(spline(t)))
 
 
 def _crossing(
@@ -233,6 +229,11 @@ def load_comparison(
     top, top_errors = _blurred(confronted.sensor, family, load, np.zeros(1), points)
     chi_square = confronted.at(family.values, index)
     ratio = profile.maximum / float(top[0, 0])
+    # Measured and calculated maximum: A and G err together.
+    on_axis = predict(points_at(np.zeros(1), points), confronted.sensor, family, load)
+    norms = [float(np.linalg.norm(column[0, 0])) for column in on_axis.columns.values()]
+    systematic = float(np.linalg.norm(norms)) / float(on_axis.signal[0, 0])
+    random = random_uncertainty(profile.maximum_budget) / profile.maximum
     return LoadComparison(
         profile=profile,
         loading=family.loading,
@@ -241,7 +242,7 @@ def load_comparison(
         p0_max=float(top[0, 0]),
         p0_max_uncertainty=float(top_errors[0, 0]),
         ratio=ratio,
-        ratio_uncertainty=_ratio_uncertainty(profile, confronted, index) * ratio,
+        ratio_uncertainty=float(np.hypot(systematic, random)) * ratio,
         calculated=calculated,
         calculated_errors=errors,
         p_max=top[:, 0],
@@ -263,15 +264,6 @@ def _blurred(
     variance = sum(squares, start=np.zeros_like(predicted.signal))
     a = sensor.conversion_constant
     return predicted.signal / a, np.sqrt(variance) / a
-
-
-def _ratio_uncertainty(profile: MeasuredProfile, confronted: Confrontation, index: int) -> float:
-    """Relative uncertainty of measured over frictionless maximum: A and G err together."""
-    axis = points_at(np.zeros(1), confronted.points[index])
-    top = predict(axis, confronted.sensor, confronted.family, confronted.loads[index])
-    norms = [float(np.linalg.norm(column[0, 0])) for column in top.columns.values()]
-    systematic = float(np.linalg.norm(norms)) / float(top.signal[0, 0])
-    return float(np.hypot(systematic, random_uncertainty(profile.maximum_budget) / profile.maximum))
 
 
 #: Loads that differ by less than this share are one.

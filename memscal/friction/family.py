@@ -55,11 +55,7 @@ _NUMBERS = ("depths", "contact_radii", "convergence")
 
 @dataclass(frozen=True, eq=False)
 class ProfileFamily(FrozenArrays):
-    r"""Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers.
-
-    Spectra are :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, with ``order`` one
-    :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the shear.
-    """
+    """Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers."""
 
     name: str  # "amontons", "elasto-plastic", "normal-compliance" or "external"
     loading: str  # "incremental", "total", or "" where it is unknown or changes nothing
@@ -67,14 +63,14 @@ class ProfileFamily(FrozenArrays):
     loads: FloatArray  # (L,), in N
     values: FloatArray  # (M,): coefficients or lengths in m, increasing from 0 or above up to inf
     scale: float  # theta_0, of the values
-    spectra: FloatArray  # (M, L, K), in N
+    spectra: FloatArray  # (M, L, K), in N: those of Contact.base_spectrum, or base_shear_spectrum
     by_load: FloatArray  # their derivatives by the logarithm of the load
     changes: Mapping[str, FloatArray]  # by one standard uncertainty of each source that states one
     depths: FloatArray  # (M, L), in m; NaN where unknown, as the next two
     contact_radii: FloatArray  # (M, L), in m
     convergence: FloatArray  # (M, L): largest relative change under refinement
     notes: tuple[str, ...] = field(default=())  # what was assumed
-    order: int = 0
+    order: int = 0  # one of the shear
     slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
 
     @cached_property
@@ -196,14 +192,6 @@ def _scaled_changes(
         for source, (derivative, value, uncertainty) in stated.items()
         if uncertainty is not None
     }
-
-
-def _poisson_ratios(film: ElasticFilm) -> tuple[float, float] | None:
-    """Return two Poisson's ratios (one-sided if incompressible) for its influence, if uncertain."""
-    if not (u := film.poisson_ratio_uncertainty):
-        return None
-    step = max(u, _SMALLEST_STEP)
-    return min(film.poisson_ratio + step, 0.5), max(film.poisson_ratio - step, 0.0)
 
 
 #: Neighbours of each load on the path, relative to it: their difference is its derivative.
@@ -340,10 +328,10 @@ class FamilySetup:
         indenter: Indenter,
         loads: ArrayLike,
         *,
-        reach: float,
-        cache: CacheFolder,
-        workers: int,
-        order: int = 0,
+        reach: float,  # largest distance from the axis at which stresses will be asked for, in m
+        cache: CacheFolder = None,
+        workers: int = 1,
+        order: int = 0,  # one for the shear at the base
     ) -> None:
         # Refused is what is no sphere, no positive load or reach (m), or no number of workers.
         require_workers(workers)
@@ -406,7 +394,10 @@ class FamilySetup:
     ) -> dict[str, FloatArray]:
         """Solve the paths and derive what follows from them: the arrays that are kept."""
         film, sphere = self.film, self.indenter
-        ratios = _poisson_ratios(film)
+        ratios = None
+        if u := film.poisson_ratio_uncertainty:
+            step, nu = max(u, _SMALLEST_STEP), film.poisson_ratio
+            ratios = min(nu + step, 0.5), max(nu - step, 0.0)  # one-sided if incompressible
         # The strength of an interface counts beside a length of film or sphere alone.
         uncertain = film.thickness_uncertainty or sphere.radius_uncertainty
         nominal, strong, *sides = self._solved(paths, (uncertain and stronger) or paths, ratios)
@@ -421,7 +412,7 @@ class FamilySetup:
             strength=(strong["spectra"] - spectra) / math.log(STRONGER),
         )
         if ratios is not None:
-            share = (film.poisson_ratio_uncertainty or 0.0) / (ratios[0] - ratios[1])
+            share = (u or 0.0) / (ratios[0] - ratios[1])
             changes["poisson_ratio"] = (sides[0]["spectra"] - sides[1]["spectra"]) * share
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 

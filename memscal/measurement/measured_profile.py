@@ -219,7 +219,8 @@ class PreparedScan:
 def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
     """Bring every point to its nominal load, and state its noise; there has to be a centre."""
     # From P_i to P by -dU/d ln P ln(P_i/P); the variance is n_i^2 + (dU/d ln P u(P_i)/P)^2.
-    prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), _stated(scan), False)
+    stated = np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
+    prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), stated, False)
     if scan.normal_load is None:
         return prepared
     errors, (x, y) = scan.normal_load_errors, scan.positions
@@ -227,26 +228,19 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
     for _ in range(_ROUNDS):
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
         distance = np.hypot(x - estimate.centre[0], y - estimate.centre[1])
-        slope = signal.slope(distance, _sticking(estimate, signal))
+        # How far the voltage nearest to the axis is on the way to a contact that sticks.
+        nearest = int(np.argmin(estimate.distance))
+        voltage = float((estimate.predicted - estimate.background)[nearest])
+        sticking = signal.sticking(float(estimate.distance[nearest]), voltage)
+        slope = signal.slope(distance, sticking)
         of_load = np.abs(slope) * load_share
-        electronic, estimated = _stated(scan), False
+        electronic, estimated = stated, False
         if scan.u_zz_errors is None and of_load.any():
             noise = _noise_of_load(estimate, of_load[np.isfinite(prepared.scan.u_zz)])
             electronic, estimated = np.full_like(slope, noise), True
         level = _at_nominal(scan, slope)
         prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, estimated)
     return prepared
-
-
-def _sticking(estimate: ProfileEstimate, signal: ContactSignal) -> float:
-    """How far the measured voltage nearest to the axis is on the way to a contact that sticks."""
-    nearest = int(np.argmin(estimate.distance))
-    voltage = float((estimate.predicted - estimate.background)[nearest])
-    return signal.sticking(float(estimate.distance[nearest]), voltage)
-
-
-def _stated(scan: Scan) -> FloatArray:
-    return np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
 
 
 def _at_nominal(scan: Scan, slope: FloatArray) -> Scan:

@@ -64,7 +64,10 @@ def compare_stress(
         )
     estimate, nodes = posterior.estimate, posterior.nodes
     model = estimate.model
-    spectrum = _per_newton(stress, model.k)
+    if isinstance(stress, Contact):
+        spectrum = stress.base_spectrum(model.k) / stress.load
+    else:
+        spectrum = hankel_transform(stress.r, stress.sigma_zz, model.k) / stress.load
     synthesis = model.reference.wavenumbers.synthesise(np.eye(nodes), r)
     calculated = scan.load * (synthesis @ spectrum)
     covariance = synthesis @ posterior.covariance[:nodes, :nodes] @ synthesis.T
@@ -82,12 +85,6 @@ def compare_stress(
         difference=float(apart.max()) / peak,
         within=float(np.mean(apart <= allowed)),
     )
-
-
-def _per_newton(stress: StressProfile | Contact, k: FloatArray) -> FloatArray:
-    if isinstance(stress, Contact):
-        return stress.base_spectrum(k) / stress.load
-    return hankel_transform(stress.r, stress.sigma_zz, k) / stress.load
 
 
 def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[float, int]:

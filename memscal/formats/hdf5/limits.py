@@ -184,10 +184,6 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> None:
             f"claims {claimed_bytes(dataset):,} bytes",
             f"More than {limit:,} bytes are not read, however small the file is.",
         )
-    _check_storage(where, dataset)
-
-
-def _check_storage(where: str, dataset: Any) -> None:
     plist = dataset.get_create_plist()
     layout = plist.get_layout()
     if layout == h5py.h5d.VIRTUAL:

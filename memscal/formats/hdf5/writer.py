@@ -131,14 +131,14 @@ DigestItem = tuple[str, "np.ndarray[Any, Any] | str | None", Mapping[str, Any]]
 
 
 def content_digest(items: Iterable[DigestItem]) -> str:
-    """Return the SHA-256 over paths, values and attributes, as hexadecimal text.
-
-    It shows accidents and careless edits; it is not a signature.
-    """
+    """Return the SHA-256 over paths, values and attributes: it shows accidents, no forgery."""
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
-        plain = {name: _plain(attribute) for name, attribute in attributes.items()}
+        plain = {
+            name: printable(value, len(value)) if isinstance(value, str) else value
+            for name, value in attributes.items()
+        }
         item = [path, kind, shape, plain, hashlib.sha256(data).hexdigest()]
         line = json.dumps(item, sort_keys=True, separators=(",", ":"))
         total.update(line.encode("ascii") + b"\n")
@@ -164,22 +164,19 @@ def _canonical(value: Any) -> tuple[str, list[int], bytes]:
     if value is None:
         return "group", [], b""
     if isinstance(value, str):
-        return "text", [], printable(value, len(value)).encode("utf-8", "replace")
+        return "text", [], _plain_text(value)
     kind = "integer" if value.dtype.kind in "iu" else "float"
     stored = np.ascontiguousarray(value, dtype="<i8" if kind == "integer" else "<f8")
     return kind, list(value.shape), stored.tobytes()
 
 
-def _plain(attribute: Any) -> Any:
-    if isinstance(attribute, str):
-        return printable(attribute, len(attribute))
-    return list(attribute) if isinstance(attribute, tuple) else attribute
-
-
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _CONTENTS = "Every path that was written, with its attributes; memscal_content_sha256 covers them."
+# Of variable length in UTF-8, as most programs write it.
+_TEXT = h5py.string_dtype("utf-8")
 # Below this a chunked and compressed dataset is larger than a plain one.
 _COMPRESS_ABOVE = 4096
+_COMPRESSION = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
 
 
 def file_tree(schema: str, entry: Group) -> Group:
@@ -214,10 +211,13 @@ def tree_to_bytes(root: Group) -> bytes:
                 for name, value in node.all_attributes.items():
                     _write_attribute(group, name, value)
             elif isinstance(node, Number):
-                _write_number(file, path, node)
+                compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
+                item = file.create_dataset(path, data=node.values, track_times=False, **compressed)
+                for name, value in _attributes(node).items():
+                    _write_attribute(item, name, value)
             else:
                 text = _plain_text(node)
-                file.create_dataset(path, data=text, dtype=_text_type(), track_times=False)
+                file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
         _attach_scales(file, root)
     return memory.getvalue()
 
@@ -230,28 +230,14 @@ def _with_contents(root: Group, text: str) -> Group:
     return replace(root, children={**root.children, "entry": entry})
 
 
-def _write_number(file: Any, path: str, node: Number) -> None:
-    storage: dict[str, Any] = {}
-    if node.values.nbytes > _COMPRESS_ABOVE:
-        storage = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
-    dataset = file.create_dataset(path, data=node.values, track_times=False, **storage)
-    for name, value in _attributes(node).items():
-        _write_attribute(dataset, name, value)
-
-
 def _write_attribute(item: Any, name: str, value: Attribute) -> None:
     if isinstance(value, int):
         item.attrs.create(name, value, dtype=np.int64)
     elif isinstance(value, tuple):
         texts = [_plain_text(text) for text in value]
-        item.attrs.create(name, np.array(texts, dtype=object), dtype=_text_type())
+        item.attrs.create(name, np.array(texts, dtype=object), dtype=_TEXT)
     else:
-        item.attrs.create(name, _plain_text(value), dtype=_text_type())
-
-
-def _text_type() -> Any:
-    """Text of variable length in UTF-8, as most programs write it."""
-    return h5py.string_dtype("utf-8")
+        item.attrs.create(name, _plain_text(value), dtype=_TEXT)
 
 
 def _plain_text(text: str) -> bytes:

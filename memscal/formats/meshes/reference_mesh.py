@@ -124,10 +124,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
 def average_over_circles(
     places: FloatArray, columns: dict[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], str]:
-    """Interpolate between places (n, 2), in m from the axis, and average over circles.
-
-    Circles of which less than half as much is inside as of others are left out: the corners.
-    """
+    """Interpolate between places (n, 2), in m from the axis, and average over circles."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
 
@@ -147,6 +144,7 @@ def average_over_circles(
             "The nodes on the base of the film lie on one line.",
             cure="Name the axis across the film (vertical; --vertical).",
         ) from error
+    # Circles of which less than half as much is inside as of others are left out: the corners.
     inside = np.isfinite(next(iter(fields.values())))
     share = inside.sum(axis=1)
     kept = share >= max(1, share.max() / 2)
