@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -170,57 +169,30 @@ _REACH = 1.1
 _NEAR = 0.01
 
 
-class LawFamilies:
-    """Families of calculated contacts of what was measured, each at its profiles' loads."""
-
-    def __init__(
-        self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
-    ) -> None:
-        scan, reach = profiles[0].scan, _REACH * max(float(profile.r[-1]) for profile in profiles)
-        self._contacts: dict[str, Any] = {"film": scan.film, "indenter": scan.indenter}
-        self._contacts |= {"reach": reach, "cache": cache, "workers": workers}
-
-    def rigid(
-        self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
-    ) -> ProfileFamily:
-        """Return incremental contacts of Amontons' law, from no friction to full stick."""
-        if calculated is not None and tuple(calculated.values[[0, -1]]) != (0.0, math.inf):
-            calculated = None
-        return _at_loads(profiles, calculated, partial(amontons_family, **self._contacts))
-
-    def slipping(
-        self,
-        profiles: Sequence[MeasuredProfile],
-        friction: float,
-        uncertainty: float | None,
-        calculated: ProfileFamily | None,
-    ) -> ProfileFamily:
-        """Return contacts of the elasto-plastic law at a macroscopic coefficient."""
-
-        def family(loads: FloatArray) -> ProfileFamily:
-            contacts = {**self._contacts, "loads": loads}
-            made = elasto_plastic_family(friction=friction, **contacts)
-            if uncertainty is None:
-                return made
-            # Only its stresses count: without uncertainties it takes a third of the time.
-            exact: Any = dict.fromkeys(
-                f"{name}_uncertainty" for name in ("young_modulus", "thickness", "poisson_ratio")
-            )
-            contacts["film"] = replace(contacts["film"], **exact)
-            more = elasto_plastic_family(friction=friction + uncertainty, **contacts)
-            change = more.spectra - made.spectra
-            return replace(made, changes={**made.changes, "macroscopic_friction": change})
-
-        return _at_loads(profiles, calculated, family)
-
-    def yielding(
-        self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
-    ) -> ProfileFamily:
-        """Return contacts without friction that yield normally."""
-        return _at_loads(profiles, calculated, partial(normal_compliance_family, **self._contacts))
+def contacts_of(
+    profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
+) -> dict[str, Any]:
+    """Return film, indenter and options by which contacts of what was measured are calculated."""
+    scan, reach = profiles[0].scan, _REACH * max(float(profile.r[-1]) for profile in profiles)
+    contacts = {"film": scan.film, "indenter": scan.indenter, "reach": reach}
+    return contacts | {"cache": cache, "workers": workers}
 
 
-def _at_loads(
+def slipping_family(friction: float, uncertainty: float | None, **contacts: Any) -> ProfileFamily:
+    """Return the elasto-plastic family at a macroscopic coefficient that may be uncertain."""
+    made = elasto_plastic_family(friction=friction, **contacts)
+    if uncertainty is None:
+        return made
+    # Only its stresses count: without uncertainties it takes a third of the time.
+    names = ("young_modulus", "thickness", "poisson_ratio")
+    exact: Any = dict.fromkeys((f"{name}_uncertainty" for name in names), None)
+    contacts["film"] = replace(contacts["film"], **exact)
+    more = elasto_plastic_family(friction=friction + uncertainty, **contacts)
+    changes = {**made.changes, "macroscopic_friction": more.spectra - made.spectra}
+    return replace(made, changes=changes)
+
+
+def family_at_loads(
     profiles: Sequence[MeasuredProfile],
     calculated: ProfileFamily | None,
     calculate: Callable[..., ProfileFamily],
@@ -249,6 +221,7 @@ _DECAYED = 1e-3
 _CARRIES = 0.05
 #: Missing tables that an error names.
 _MOST_NAMED = 6
+_Table = tuple[float, StressProfile]  # with its friction coefficient first
 
 
 def external_family(
@@ -262,11 +235,11 @@ def external_family(
 ) -> ProfileFamily:
     """Return base stresses of tables by friction; each serves loads within 1 % of its own."""
     nominal = require_loads(loads)
-    tables = [_checked(profile, reach) for profile in profiles]
+    tables = [(_checked_friction(profile, reach), profile) for profile in profiles]
     if not tables:
         raise InputError("No table of a calculated stress was given.")
     loading = _common_loading(tables)
-    frictions = np.array(sorted({_friction(profile) for profile in tables}))
+    frictions = np.array(sorted({mu for mu, _ in tables}))
     grid = _grid(tables, frictions, nominal)
     nodes = base_wavenumbers(film.thickness, reach)
     spectra = np.array(
@@ -294,7 +267,7 @@ def external_family(
 
 
 def _grid(
-    tables: Sequence[StressProfile], frictions: FloatArray, loads: FloatArray
+    tables: Sequence[_Table], frictions: FloatArray, loads: FloatArray
 ) -> list[list[StressProfile]]:
     """Return the table of each friction coefficient and load; name all that are missing."""
     grid, missing = [], []
@@ -304,7 +277,7 @@ def _grid(
         missing += [f"{load:g} N with friction {mu:g}" for load in absent]
         grid.append([cell for cell in row if cell is not None])
     if missing:
-        stated = sorted({profile.load for profile in tables})
+        stated = sorted({profile.load for _, profile in tables})
         more = len(missing) - _MOST_NAMED
         listed = missing[:_MOST_NAMED] + [f"and {more} more"] * (more > 0)
         raise InputError(
@@ -318,8 +291,8 @@ def _grid(
     return grid
 
 
-def _nearest(tables: Sequence[StressProfile], mu: float, load: float) -> StressProfile | None:
-    near = [p for p in tables if _friction(p) == mu and abs(p.load / load - 1) <= _SAME_LOAD]
+def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile | None:
+    near = [p for of, p in tables if of == mu and abs(p.load / load - 1) <= _SAME_LOAD]
     near.sort(key=lambda profile: abs(profile.load - load))
     if len(near) > 1 and near[0].load == near[1].load:
         raise InputError(
@@ -330,8 +303,8 @@ def _nearest(tables: Sequence[StressProfile], mu: float, load: float) -> StressP
     return near[0] if near else None
 
 
-def _checked(profile: StressProfile, reach: float) -> StressProfile:
-    """Refuse a table that cannot be compared."""
+def _checked_friction(profile: StressProfile, reach: float) -> float:
+    """Return a table's friction coefficient; refuse a table that cannot be compared."""
     if profile.friction_coefficient is None:
         raise InputError(
             f"{_name(profile)} does not say its friction coefficient.",
@@ -351,11 +324,11 @@ def _checked(profile: StressProfile, reach: float) -> StressProfile:
             why="The force that the base carries must be the load.",
             cure="Check the load, the units, and that the table is fine enough.",
         )
-    return profile
+    return float(profile.friction_coefficient)
 
 
-def _common_loading(tables: Sequence[StressProfile]) -> str:
-    loadings = {p.loading for p in tables if p.loading and _friction(p) > 0}
+def _common_loading(tables: Sequence[_Table]) -> str:
+    loadings = {profile.loading for mu, profile in tables if profile.loading and mu > 0}
     if len(loadings) > 1:
         raise InputError(
             "Some of the tables are for incremental loading and some for total loading.",
@@ -363,11 +336,6 @@ def _common_loading(tables: Sequence[StressProfile]) -> str:
             cure="Give the tables of one loading at a time.",
         )
     return loadings.pop() if loadings else ""
-
-
-def _friction(profile: StressProfile) -> float:
-    mu = profile.friction_coefficient
-    return math.nan if mu is None else float(mu)
 
 
 def _name(profile: StressProfile) -> str:

@@ -25,7 +25,20 @@ def comparison_checks(
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     checks: list[QualityCheck] = []
     for i, of_load in enumerate(zip(*loads.values(), strict=True), start=1):
-        checks += [_profile(i, of_load), _bracketing(i, of_load)]
+        place, outside = _place(of_load[0].profile), 1 - max(load.bracketed for load in of_load)
+        explained = (
+            f"Reduced chi-square of {place} against the friction coefficient that explains it "
+            "best. A failure means that no calculated contact does: noise or scatter larger than "
+            "stated, another shape of contact, or a film, gain or load that is not as stated."
+        )
+        bracketed = (
+            f"Share of the points of {place} that lie outside of what no friction and full stick "
+            "give, by more than 1.96 standard uncertainties. A failure means that friction alone "
+            "does not explain the stress."
+        )
+        readings = (load.by_profile for load in of_load)
+        checks.append(_reduced(f"profile_chi_square_{i}", readings, explained))
+        checks.append(check(f"bracketing_{i}", outside, _OUTSIDE, bracketed))
     for lubrication, by_loading in joint.items():
         checks.append(_together(lubrication, by_loading))
     if "lubricated" in joint:
@@ -38,28 +51,6 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
     best = min(estimates, key=lambda estimate: estimate.least)
     limit = chi_square_limit(best.degrees) / best.degrees
     return check(name, best.least / best.degrees, limit, meaning, best.p_value)
-
-
-def _profile(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
-    return _reduced(
-        f"profile_chi_square_{number}",
-        (load.by_profile for load in loads),
-        f"Reduced chi-square of {_place(loads[0].profile)} against the friction coefficient "
-        "that explains it best. A failure means that no calculated contact does: noise or scatter "
-        "larger than stated, another shape of contact, or a film, gain or load that is not as "
-        "stated.",
-    )
-
-
-def _bracketing(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
-    return check(
-        f"bracketing_{number}",
-        1 - max(load.bracketed for load in loads),
-        _OUTSIDE,
-        f"Share of the points of {_place(loads[0].profile)} that lie outside of what no friction "
-        "and full stick give, by more than 1.96 standard uncertainties. A failure means that "
-        "friction alone does not explain the stress.",
-    )
 
 
 def _together(lubrication: str, by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:

@@ -70,6 +70,13 @@ class FilmField(Protocol):
         """Return the radial displacement of the surface in m, positive outward."""
 
 
+def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return quadratic triangles (m, 6) of points (n, 2) with their nodes anticlockwise."""
+    first, second, third = np.moveaxis(points[triangles[:, :3]], 1, 0)
+    (x, y), (u, v) = (second - first).T, (third - first).T
+    return np.where((x * v < u * y)[:, None], triangles[:, [0, 2, 1, 5, 4, 3]], triangles)
+
+
 class FieldByOrder:
     """A film's field (:class:`FilmField`) by one function for normal (0) and radial (1) each."""
 

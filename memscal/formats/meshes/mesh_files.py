@@ -204,11 +204,6 @@ class Mesh:
         """The nodes that belong to the body."""
         return np.unique(np.concatenate([block.nodes.ravel() for block in self.solid]))
 
-    @property
-    def size(self) -> str:
-        """Numbers of nodes and cells, in words."""
-        return f"{len(self.points)} nodes, {sum(len(block.nodes) for block in self.solid)} cells"
-
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""

@@ -306,6 +306,7 @@ def read_reference_mesh(
         values = _at_base(mesh, frame, footing, tangential)[1]
         columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
         notes.append(_component_note(tangential, "Radial shear", f"times {turned}"))
+    size = f"{len(mesh.points)} nodes, {sum(len(block.nodes) for block in mesh.solid)} cells"
     samples = reference.Samples(
         columns=columns,
         source=mesh.source,
@@ -315,7 +316,7 @@ def read_reference_mesh(
         units=(r_unit, sigma_unit),
         sign=sign,
         spacing=frame.tolerance,
-        discretisation=f"{mesh.size}, {len(footing.nodes)} nodes on the base",
+        discretisation=f"{size}, {len(footing.nodes)} nodes on the base",
     )
     samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
     return reference.profile_of(samples, stated)

@@ -33,7 +33,7 @@ from scipy.sparse import block_array, csc_array, csr_array
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
-from memscal.mechanics.surface import FieldByOrder, SurfaceCompliance
+from memscal.mechanics.surface import FieldByOrder, SurfaceCompliance, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
@@ -229,8 +229,8 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     index = index.reshape(inward.shape)
     # The displacement's gradient and the mean pressure at the nodes of every triangle.
     basis = system.displacement
-    points = (local.T, np.ones(local.shape[0]))
-    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=points)
+    rule = (local.T, np.ones(local.shape[0]))
+    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
     moved, pressed = np.split(solution, [basis.N])
     gradient = at_nodes.interpolate(moved).grad
     squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
@@ -246,9 +246,10 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     slip = averaged(gradient[0][1] + gradient[1][0])
     mean, volume = averaged(squeeze), (radial + vertical + hoop) / 3
     stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
+    points = film.thickness * np.stack([r, 1 - depth], axis=1)
     return FieldMesh(
-        points=film.thickness * np.stack([r, 1 - depth], axis=1),
-        triangles=_quadratic_triangles(index, local, system),
+        points=points,
+        triangles=anticlockwise(points, _quadratic_triangles(index, local)),
         displacement=film.thickness * displacement,
         stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
         notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
@@ -256,23 +257,15 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     )
 
 
-def _quadratic_triangles(
-    index: NDArray[np.int64], local: FloatArray, system: MixedSystem
-) -> NDArray[np.int64]:
-    """Return four quadratic triangles for each quartic one, anticlockwise with z upward."""
+def _quadratic_triangles(index: NDArray[np.int64], local: FloatArray) -> NDArray[np.int64]:
+    """Return four quadratic triangles for each quartic one."""
     place = {tuple(np.rint(_QUARTERS * point).astype(int)): i for i, point in enumerate(local)}
     quarters = []
     for corners in _CORNERS:
         around = [*corners, corners[0]]
         middles = [((a[0] + b[0]) // 2, (a[1] + b[1]) // 2) for a, b in pairwise(around)]
         quarters.append(index[[place[node] for node in (*corners, *middles)]].T)
-    triangles = np.concatenate(quarters)
-    # With the depth as second coordinate, what turns anticlockwise there is clockwise here.
-    r, depth = system.displacement.mesh.p[:, system.displacement.mesh.t]
-    turn = (r[1] - r[0]) * (depth[2] - depth[0]) - (r[2] - r[0]) * (depth[1] - depth[0])
-    turned = np.tile(turn > 0, len(_CORNERS))
-    triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
-    return triangles
+    return np.concatenate(quarters)
 
 
 # Tractions solved together: bounds the memory.

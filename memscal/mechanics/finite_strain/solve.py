@@ -29,7 +29,7 @@ from memscal.mechanics.finite_strain.pressing import (
 )
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
-from memscal.mechanics.surface import FieldByOrder
+from memscal.mechanics.surface import FieldByOrder, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
@@ -323,15 +323,10 @@ class FiniteStrainField(FieldByOrder):
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
         elements, x = self.pressing.elements, self.pressed.x
-        basis = elements.bases[0]
-        corners = basis.doflocs[:, basis.element_dofs[:3]]
-        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        turned = first[0] * second[1] < first[1] * second[0]
-        triangles = basis.element_dofs.T.copy()
-        triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
+        points = elements.nodes.T / _MM
         return FieldMesh(
-            points=elements.nodes.T / _MM,
-            triangles=triangles,
+            points=points,
+            triangles=anticlockwise(points, elements.bases[0].element_dofs.T),
             displacement=x[: 2 * elements.n].reshape(2, -1).T / _MM,
             stress=elements.nodal_stress(x) * _MPA,
             notes=f"{elements.material.law} film at finite strain under {self.pressed.load:.6g} N",

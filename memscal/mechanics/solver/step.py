@@ -51,11 +51,6 @@ class ContactProblem:
         """Number of rings."""
         return self.heights.size
 
-    @property
-    def normal_law(self) -> NormalLaw | None:
-        """The interface's normal compliance, or ``None`` where it is rigid."""
-        return self.interface.normal_law
-
     def displacements(self, p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
         c = self.compliance
@@ -153,7 +148,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trac
     last, value = _goal_row(problem, goal, normal, rows, unit)
     matrix = np.vstack([normal[rows], radial, last])
     right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [value]])
-    if (law := problem.normal_law) is not None:
+    if (law := problem.interface.normal_law) is not None:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
         stiffness = law.stiffness(gap, problem.film)
@@ -230,7 +225,7 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    law, separation = problem.normal_law, problem.separations(start)
+    law, separation = problem.interface.normal_law, problem.separations(start)
     pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
     if held is not None:
@@ -267,7 +262,7 @@ def _revise(
     w, u = problem.displacements(p, q)
     gap = problem.heights - depth + w
     slip, tangential = _revised_slip(problem, status, tractions, u, careful)
-    law = problem.normal_law
+    law = problem.interface.normal_law
     if law is None:
         pressing = _revised_contact(status, tractions, gap, held, careful=careful)
         separation, normal = gap, bool(np.any(pressing != status.pressing))
