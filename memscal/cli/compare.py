@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,19 +24,6 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
     of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
     stems = [*of_each, "maxima", "effective-friction", "likelihood"]
     return [*stems, "interface"] if interface else stems
-
-
-def _rendered(
-    comparison: FrictionComparison, single: Sequence[Path], named: Mapping[str, Path]
-) -> dict[Path, bytes]:
-    """Return the content of the files of the one figure that shows all, and of all others."""
-    ready = out.rendered(comparison.plot, single)
-    if named:
-        from memscal.figures.friction import comparison_figures
-
-        for stem, draw in comparison_figures(comparison).items():
-            ready |= out.rendered(draw, [named[stem]])
-    return ready
 
 
 def user_cache_folder() -> Path | None:
@@ -169,7 +156,12 @@ def command(
             workers=min(2, os.cpu_count() or 1),
         )
     with out.working("Drawing"):
-        ready = _rendered(comparison, single, named)
+        ready = out.rendered(comparison.plot, single)
+        if named:
+            from memscal.figures.friction import comparison_figures
+
+            for stem, draw in comparison_figures(comparison).items():
+                ready |= out.rendered(draw, [named[stem]])
     if folder is not None:
         folder.mkdir(exist_ok=True)
     out.write_files(ready, force=force)

@@ -109,12 +109,7 @@ def normal_compliance_family(
     law: str = "exponential",
     **options: Any,
 ) -> ProfileFamily:
-    r"""Return the base stresses without friction for a range of lengths (m) of a normal law.
-
-    ``"exponential"``: :math:`p = p_1 e^{-d/\lambda}` with the length :math:`\lambda`; the pressure
-    :math:`p_1` only shifts the depth.  ``"greenwood-tripp"``: asperities of the roughness
-    :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
-    """
+    """Return the base stresses without friction for a range of lengths (m) of a normal law."""
     setup = FamilySetup(film, indenter, loads, **options)
     if law not in ("exponential", "greenwood-tripp"):
         raise InputError(f'law is {law!r}, but it is "exponential" or "greenwood-tripp".')

@@ -40,7 +40,13 @@ def comparison_checks(
         checks.append(_reduced(f"profile_chi_square_{i}", readings, explained))
         checks.append(check(f"bracketing_{i}", outside, _OUTSIDE, bracketed))
     for lubrication, by_loading in joint.items():
-        checks.append(_together(lubrication, by_loading))
+        tail, kind = (f"_{lubrication}", f"{lubrication} ") if lubrication else ("", "")
+        together = (
+            f"Reduced chi-square of all {kind}loads against one friction coefficient. A failure "
+            "while the single loads pass means that friction changes with the load: look at the "
+            "coefficient of each load, or at laws of the interface."
+        )
+        checks.append(_reduced(f"joint_chi_square{tail}", by_loading.values(), together))
     if "lubricated" in joint:
         checks.append(_frictionless(joint["lubricated"]))
     return tuple(checks)
@@ -51,16 +57,6 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
     best = min(estimates, key=lambda estimate: estimate.least)
     limit = chi_square_limit(best.degrees) / best.degrees
     return check(name, best.least / best.degrees, limit, meaning, best.p_value)
-
-
-def _together(lubrication: str, by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
-    return _reduced(
-        f"joint_chi_square{f'_{lubrication}' if lubrication else ''}",
-        by_loading.values(),
-        f"Reduced chi-square of all {f'{lubrication} ' if lubrication else ''}loads against one "
-        "friction coefficient. A failure while the single loads pass means that friction changes "
-        "with the load: look at the coefficient of each load, or at laws of the interface.",
-    )
 
 
 def _frictionless(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:

@@ -25,7 +25,7 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -267,9 +267,9 @@ def posterior_of(
     weight = np.exp(log_marginal - log_marginal.max())
     weight[weight < _NEGLIGIBLE] = 0.0
     shares = np.asarray(weight / weight.sum())
-    mean = _sum_of(shares, [fit.state for fit in fits])
-    gain = _sum_of(shares, [fit.gain for fit in fits])
-    within = _sum_of(shares, [fit.covariance for fit in fits])
+    mean = np.average([fit.state for fit in fits], axis=0, weights=shares)
+    gain = np.average([fit.gain for fit in fits], axis=0, weights=shares)
+    within = np.average([fit.covariance for fit in fits], axis=0, weights=shares)
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan, model.reference.wavenumbers)
@@ -298,16 +298,11 @@ def posterior_of(
         covariances=covariances,
         shifts=shifts,
         changes=changes,
-        residual=_sum_of(shares, [fit.residual for fit in fits]),
+        residual=np.average([fit.residual for fit in fits], axis=0, weights=shares),
         found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
         shares=dict(zip(names, shares.tolist(), strict=True)),
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
-
-
-def _sum_of(shares: FloatArray, arrays: Sequence[FloatArray]) -> FloatArray:
-    """Average arrays by their shares."""
-    return np.asarray(sum(share * array for share, array in zip(shares, arrays, strict=True)))
 
 
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:

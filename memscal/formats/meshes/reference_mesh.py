@@ -240,19 +240,12 @@ def _no_such_field(
         more = len(fields) - len(names)
         return f"{where}: " + ", ".join(names) + (f" and {more} more" if more else "")
 
-    lists = [
-        listed(fields, where)
-        for fields, where in ((points, "at the nodes"), (cells, "in the cells"))
-        if fields
-    ]
-    has = (
-        f"It has, with their numbers of components, {'; '.join(lists)}."
-        if lists
-        else ("It has no fields at all.")
-    )
+    places = {"at the nodes": points, "in the cells": cells}
+    lists = "; ".join(listed(fields, where) for where, fields in places.items() if fields)
+    has = f"has, with their numbers of components, {lists}" if lists else "has no fields at all"
     return InputError(
         f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
-        why=has,
+        why=f"It {has}.",
         cure="Give the name of the stress among them, or save the mesh with its stress.",
     )
 
