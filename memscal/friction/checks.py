@@ -11,7 +11,7 @@ from memscal.friction.family import ProfileFamily
 from memscal.friction.results import BoundedEstimate, LoadComparison
 from memscal.model import checks as quality
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
-from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.notation import format_bound
 
 #: Share of points that may lie outside of what friction can explain, beyond those of chance.
@@ -25,7 +25,10 @@ def comparison_checks(
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     checks: list[QualityCheck] = []
     for i, of_load in enumerate(zip(*loads.values(), strict=True), start=1):
-        place, outside = _place(of_load[0].profile), 1 - max(load.bracketed for load in of_load)
+        profile, outside = of_load[0].profile, 1 - max(load.bracketed for load in of_load)
+        size = np.format_float_positional(profile.load, precision=3, trim="-")
+        place = f"the {profile.lubrication} load" if profile.lubrication else "the load"
+        place = f"{place} of {size} N"
         explained = (
             f"Reduced chi-square of {place} against the friction coefficient that explains it "
             "best. A failure means that no calculated contact does: noise or scatter larger than "
@@ -73,11 +76,6 @@ def _frictionless(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
         "coefficients are not to be trusted either.",
         float(chdtrc(1, least)),
     )
-
-
-def _place(profile: MeasuredProfile) -> str:
-    words = f"the {profile.lubrication} load" if profile.lubrication else "the load"
-    return f"{words} of {np.format_float_positional(profile.load, precision=3, trim='-')} N"
 
 
 #: Calculated contacts that are less certain than this share of their stress are named.

@@ -117,11 +117,6 @@ class ContactSignal:
         free, stuck = (float(np.interp(distance, self.r, curve)) for curve in self.voltage)
         return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
 
-    def share(self, distance: float) -> float:
-        """Frictionless voltage at a distance (m) over the largest."""
-        free = self.voltage[0]
-        return float(np.interp(distance, self.r, free) / free.max())
-
 
 def contact_signal(scan: Scan, apparatus: ApparatusFunction) -> ContactSignal:
     """Calculate the contacts of a scan's nominal load and near it, or raise a DomainError."""
@@ -190,7 +185,8 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     else:
         axes = [(scan.x, centre[0]), (scan.y, centre[1])]
     ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
-    left = max(signal.share(end) for end in ends)
+    calculated = signal.voltage[0]
+    left = float(np.interp(ends, signal.r, calculated).max() / calculated.max())
     if left > _LARGEST_END:
         raise FitError(
             f"{load_of(scan)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "

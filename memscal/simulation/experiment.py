@@ -122,7 +122,11 @@ def simulate_contacts(
     )
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)
-    draws = _draw(row.size, points, seed)
+    # Standard normal numbers for each source of error, from streams of their own.
+    sources = ("noise", "load", "position", "reading")
+    streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(len(sources)))
+    normal = (stream.standard_normal((row.size, points)) for stream in streams)
+    draws = dict(zip(sources, normal, strict=True))
     ratio = 1 + load_scatter * draws["load"]
     along = x + position_error * draws["position"] - centre[0]
     away = np.hypot(along, centre[1])
@@ -193,16 +197,6 @@ def _described_film(film: ElasticFilm) -> dict[str, float]:
     """Return what of a film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
     return {name: float(getattr(film, name)) for name in names}
-
-
-def _draw(rows: int, points: int, seed: int) -> dict[str, FloatArray]:
-    """Return standard normal numbers for each source of error, from streams of their own."""
-    sources = ("noise", "load", "position", "reading")
-    streams = np.random.SeedSequence(seed).spawn(len(sources))
-    return {
-        name: np.random.default_rng(stream).standard_normal((rows, points))
-        for name, stream in zip(sources, streams, strict=True)
-    }
 
 
 def _described(interface: Interface) -> dict[str, float | str]:
