@@ -54,7 +54,12 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
         for item in contents["quantities"]
     ]
     yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
-    arrays = [_array_row(item) for item in contents["arrays"]]
+    arrays = []
+    for item in contents["arrays"]:
+        shape = " x ".join(str(n) for n in item["shape"]) or "one"
+        low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
+        missing = str(item["missing"] or "-")
+        arrays.append((item["path"], shape, low, high, item["unit"], missing))
     yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
     checks, failed, meanings = [], set(), []
     for i, check in enumerate(contents["checks"]):
@@ -93,12 +98,6 @@ def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
     if dimension == "stress" and str(item["name"]).endswith("modulus"):
         return float(to_si(1e-6, unit, dimension, str(item["path"]))), "MPa"
     return 1.0, unit
-
-
-def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
-    shape = " x ".join(str(n) for n in item["shape"]) or "one"
-    low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
-    return item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")
 
 
 def _number(value: float | None, form: str) -> str:

@@ -126,8 +126,8 @@ def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
             yield f"{path}/{name}", child
 
 
-# Path, value (None for a group) and attributes.
-DigestItem = tuple[str, "np.ndarray[Any, Any] | str | None", Mapping[str, Any]]
+# Path, value (None for a group) or node, and attributes.
+DigestItem = tuple[str, "np.ndarray[Any, Any] | str | Node | None", Mapping[str, Any]]
 
 
 def content_digest(items: Iterable[DigestItem]) -> str:
@@ -145,13 +145,6 @@ def content_digest(items: Iterable[DigestItem]) -> str:
     return total.hexdigest()
 
 
-def tree_items(root: Group) -> Iterable[DigestItem]:
-    """Yield what :func:`content_digest` needs from a tree that is about to be written."""
-    for path, node in sorted(walk(root), key=lambda item: item[0]):
-        value = node.values if isinstance(node, Number) else node
-        yield path, None if isinstance(value, Group) else value, _attributes(node)
-
-
 def _attributes(node: Node) -> dict[str, Any]:
     if isinstance(node, Group):
         return node.all_attributes
@@ -161,10 +154,11 @@ def _attributes(node: Node) -> dict[str, Any]:
 
 
 def _canonical(value: Any) -> tuple[str, list[int], bytes]:
-    if value is None:
+    if value is None or isinstance(value, Group):
         return "group", [], b""
     if isinstance(value, str):
         return "text", [], _plain_text(value)
+    value = value.values if isinstance(value, Number) else value
     kind = "integer" if value.dtype.kind in "iu" else "float"
     stored = np.ascontiguousarray(value, dtype="<i8" if kind == "integer" else "<f8")
     return kind, list(value.shape), stored.tobytes()
@@ -187,7 +181,8 @@ def file_tree(schema: str, entry: Group) -> Group:
     # The list names itself, so it is made once with a place for itself and once in full.
     contents = {path: sorted(_attributes(node)) for path, node in walk(listed)}
     listed = _with_contents(root, to_json("contents", contents))
-    digest = content_digest(tree_items(listed))
+    nodes = sorted(walk(listed), key=lambda item: item[0])
+    digest = content_digest((path, node, _attributes(node)) for path, node in nodes)
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
 
 
@@ -207,17 +202,15 @@ def tree_to_bytes(root: Group) -> bytes:
                         f"{wrong[0]!r} cannot be written into {path}: a name is lower-case ASCII.",
                         cure="Use the letters a to z, digits and underscores.",
                     )
-                group = file if path == "/" else file.create_group(path)
-                for name, value in node.all_attributes.items():
-                    _write_attribute(group, name, value)
+                item = file if path == "/" else file.create_group(path)
             elif isinstance(node, Number):
                 compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
                 item = file.create_dataset(path, data=node.values, track_times=False, **compressed)
-                for name, value in _attributes(node).items():
-                    _write_attribute(item, name, value)
             else:
                 text = _plain_text(node)
-                file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
+                item = file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
+            for name, value in _attributes(node).items():
+                _write_attribute(item, name, value)
         _attach_scales(file, root)
     return memory.getvalue()
 
