@@ -42,6 +42,7 @@ def bracketed_share(
 
 #: Level of one standard deviation of a normal distribution.
 _ONE_SIGMA = 0.6827
+_STEPS = 40
 
 
 def profile_estimate(
@@ -90,15 +91,16 @@ def _crossing(
     spline: Any, coordinates: FloatArray, start: float, side: int, level: float
 ) -> float | None:
     """Where the spline rises through a level next to an inside point; None beyond the ends."""
-    from scipy.optimize import brentq
-
     beyond = coordinates[coordinates * side > start * side]
     if not beyond.size:
         return None
-    outside = float(beyond.min() if side > 0 else beyond.max())
+    inside, outside = start, float(beyond.min() if side > 0 else beyond.max())
     if spline(outside) <= level:
         return None
-    return float(brentq(lambda t: float(spline(t)) - level, start, outside, xtol=1e-15))
+    for _ in range(_STEPS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if spline(middle) <= level else (inside, middle)
+    return (inside + outside) / 2
 
 
 def friction_reason(interval: Interval, last: float) -> str:
