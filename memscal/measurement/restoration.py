@@ -13,6 +13,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
+from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
@@ -113,8 +114,6 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
 def read_expected(expected: Expected) -> StressProfile | Contact:
     """Return a stress to compare with, read from its file where it is one."""
     if isinstance(expected, str | PathLike):
-        from memscal.formats.reference import read_reference
-
         return read_reference(expected)
     if isinstance(expected, StressProfile | Contact):
         return expected
