@@ -24,6 +24,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
+from memscal.errors import InputError
 from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import (
     amontons_family,
@@ -175,6 +176,10 @@ def compare_interface(
     workers: int = 1,
 ) -> InterfaceComparison:
     """Weigh laws of the interface; families without a load within 1 % of each are calculated."""
+    if not profiles:
+        raise InputError(
+            "Laws of the interface are compared with measured profiles, but none is given."
+        )
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)
