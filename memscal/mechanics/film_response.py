@@ -300,8 +300,41 @@ class HankelFilm:
         return HankelField(self.film, RingTraction(self.r, pressure, shear))
 
 
+class FieldByOrder:
+    """A film's field by one function for normal (0) and radial (1); see ``memscal.FilmField``."""
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa."""
+        return self._base(r, 0)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa."""
+        return self._base(r, 1)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        """Return the transform of order zero of the normal stress at ``k`` (rad/m), in N."""
+        return self._spectrum(k, 0)
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        """Return the transform of order one of the base shear at ``k`` (rad/m), in N."""
+        return self._spectrum(k, 1)
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m."""
+        return self._surface(r, 0)
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m."""
+        return self._surface(r, 1)
+
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
+        raise NotImplementedError
+
+    _spectrum = _surface = _base
+
+
 @dataclass(frozen=True, eq=False)
-class HankelField(surface.FieldByOrder):
+class HankelField(FieldByOrder):
     """The field in a film under a traction; base stresses below 1e-13 of their peak are zero."""
 
     film: ElasticFilm

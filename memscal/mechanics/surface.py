@@ -77,39 +77,6 @@ def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[n
     return np.where((x * v < u * y)[:, None], triangles[:, [0, 2, 1, 5, 4, 3]], triangles)
 
 
-class FieldByOrder:
-    """A film's field (:class:`FilmField`) by one function for normal (0) and radial (1) each."""
-
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa."""
-        return self._base(r, 0)
-
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa."""
-        return self._base(r, 1)
-
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of order zero of the normal stress at ``k`` (rad/m), in N."""
-        return self._spectrum(k, 0)
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of order one of the base shear at ``k`` (rad/m), in N."""
-        return self._spectrum(k, 1)
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m."""
-        return self._surface(r, 0)
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return the radial displacement of the surface in m."""
-        return self._surface(r, 1)
-
-    def _base(self, r: FloatArray, order: int) -> FloatArray:
-        raise NotImplementedError
-
-    _spectrum = _surface = _base
-
-
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.
 _ORDER = 8
 # Crowding: nodes v^5 with 24 Gauss points in v take the logarithm to 1e-12.

@@ -33,7 +33,8 @@ from scipy.sparse import block_array, csc_array, csr_array
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
-from memscal.mechanics.surface import FieldByOrder, SurfaceCompliance, anticlockwise
+from memscal.mechanics.film_response import FieldByOrder
+from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.film_response import RingTraction
+from memscal.mechanics.film_response import FieldByOrder, RingTraction
 from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.film_elements import Finer
 from memscal.mechanics.finite_strain.pressing import (
@@ -29,7 +29,7 @@ from memscal.mechanics.finite_strain.pressing import (
 )
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
-from memscal.mechanics.surface import FieldByOrder, anticlockwise
+from memscal.mechanics.surface import anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm

@@ -19,7 +19,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.surface import FieldByOrder
+from memscal.mechanics.film_response import FieldByOrder
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
