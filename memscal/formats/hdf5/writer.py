@@ -202,15 +202,14 @@ def tree_to_bytes(root: Group) -> bytes:
                         f"{wrong[0]!r} cannot be written into {path}: a name is lower-case ASCII.",
                         cure="Use the letters a to z, digits and underscores.",
                     )
-                item = file if path == "/" else file.create_group(path)
+                group = file if path == "/" else file.create_group(path)
+                for name, value in node.all_attributes.items():
+                    _write_attribute(group, name, value)
             elif isinstance(node, Number):
-                compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
-                item = file.create_dataset(path, data=node.values, track_times=False, **compressed)
+                _write_number(file, path, node)
             else:
                 text = _plain_text(node)
-                item = file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
-            for name, value in _attributes(node).items():
-                _write_attribute(item, name, value)
+                file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
         _attach_scales(file, root)
     return memory.getvalue()
 
@@ -221,6 +220,13 @@ def _with_contents(root: Group, text: str) -> Group:
     listing = note(text, media_type="application/json", description=_CONTENTS)
     entry = replace(entry, children={**entry.children, "contents": listing})
     return replace(root, children={**root.children, "entry": entry})
+
+
+def _write_number(file: Any, path: str, node: Number) -> None:
+    compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
+    dataset = file.create_dataset(path, data=node.values, track_times=False, **compressed)
+    for name, value in _attributes(node).items():
+        _write_attribute(dataset, name, value)
 
 
 def _write_attribute(item: Any, name: str, value: Attribute) -> None:
