@@ -1,21 +1,15 @@
 """``memscal compare``: measured against calculated stress, and the friction that explains it."""
 
-from __future__ import annotations
-
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from memscal.cli import output as out
 from memscal.cli.options import FILE, Quantity, option, output_options
-
-if TYPE_CHECKING:
-    from memscal.friction.results import FrictionComparison
-    from memscal.model.stress import StressProfile
 
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
@@ -24,19 +18,6 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
     of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
     stems = [*of_each, "maxima", "effective-friction", "likelihood"]
     return [*stems, "interface"] if interface else stems
-
-
-def _rendered(
-    comparison: FrictionComparison, single: Sequence[Path], named: Mapping[str, Path]
-) -> dict[Path, bytes]:
-    """Return the content of the files of the one figure that shows all, and of all others."""
-    ready = out.rendered(comparison.plot, single)
-    if named:
-        from memscal.figures.friction import comparison_figures
-
-        for stem, draw in comparison_figures(comparison).items():
-            ready |= out.rendered(draw, [named[stem]])
-    return ready
 
 
 def user_cache_folder() -> Path | None:
@@ -137,7 +118,7 @@ def command(
     from memscal.formats.opened import opened_contacts
     from memscal.formats.reference import read_reference
     from memscal.friction.compare import compare, scans_of
-    from memscal.summaries.comparison import failures
+    from memscal.summaries.comparison import failures, file_json, notes
 
     apparatus, data = load_apparatus(artifact), opened_contacts(scans)
     references = [read_reference(path) for path in options["references"]]
@@ -169,11 +150,25 @@ def command(
             workers=min(2, os.cpu_count() or 1),
         )
     with out.working("Drawing"):
-        ready = _rendered(comparison, single, named)
+        ready = out.rendered(comparison.plot, single)
+        if named:
+            from memscal.figures.friction import comparison_figures
+
+            for stem, draw in comparison_figures(comparison).items():
+                ready |= out.rendered(draw, [named[stem]])
     if folder is not None:
         folder.mkdir(exist_ok=True)
     out.write_files(ready, force=force)
-    _show(comparison, artifact, references, figures, as_json)
+    if as_json:
+        files = {
+            "artifact": file_json(apparatus.source),
+            "references": [file_json(profile.source) for profile in references],
+            "figures": [str(path) for path in figures],
+        }
+        out.emit_json(comparison.to_dict() | files)
+    else:
+        out.emit_tables(*comparison.tables())
+    out.show_messages(notes(comparison))
     for path in figures:
         out.message(f"Written: {path}")
     failed = [
@@ -204,30 +199,3 @@ def _check_usage(options: Mapping[str, Any]) -> None:
             "--interface needs --macroscopic: the friction coefficient at which an interface that "
             "yields begins to slip."
         )
-
-
-def _show(
-    comparison: FrictionComparison,
-    artifact: Path,
-    references: list[StressProfile],
-    figures: list[Path],
-    as_json: bool,
-) -> None:
-    """Print the results and the messages."""
-    import hashlib
-
-    from memscal.formats.files import read_bytes
-    from memscal.model.provenance import SourceFile
-    from memscal.summaries.comparison import file_json, notes
-
-    if as_json:
-        source = SourceFile(artifact.name, hashlib.sha256(read_bytes(artifact)).hexdigest())
-        files = {
-            "artifact": file_json(source),
-            "references": [file_json(profile.source) for profile in references],
-            "figures": [str(path) for path in figures],
-        }
-        out.emit_json(comparison.to_dict() | files)
-    else:
-        out.emit_tables(*comparison.tables())
-    out.show_messages(notes(comparison))

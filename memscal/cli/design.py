@@ -1,9 +1,7 @@
 """``memscal design``: the uncertainties to expect of a scan that is not made yet."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,9 +9,6 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
-
-if TYPE_CHECKING:
-    from memscal.planning.design import Design
 
 _VARIED = ("step", "half-range", "repeats")
 #: Options in other units than SI, by the power of ten.
@@ -94,7 +89,13 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     out.prove_writable(figures, force=force)
     vary = None if vary is None else vary.replace("-", "_")
-    planned = _designed(options, dict(targets), vary)
+
+    from memscal.planning.design import design
+
+    settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
+    settings |= {name: options[name] for name in ("load", "repeats", "method")}
+    settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
+    planned = design(kernel=common.kernel_from(options), want=dict(targets), vary=vary, **settings)
     drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
     out.write_files(drawn, force=force)
 
@@ -110,12 +111,3 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     for path in figures:
         out.message(f"Written: {path}")
     return DONE
-
-
-def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | None) -> Design:
-    from memscal.planning.design import design
-
-    settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
-    settings |= {name: options[name] for name in ("load", "repeats", "method")}
-    settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
-    return design(kernel=common.kernel_from(options), want=targets, vary=vary, **settings)

@@ -54,23 +54,23 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
         for item in contents["quantities"]
     ]
     yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
-    arrays = [_array_row(item) for item in contents["arrays"]]
+    arrays = []
+    for item in contents["arrays"]:
+        shape = " x ".join(str(n) for n in item["shape"]) or "one"
+        low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
+        missing = str(item["missing"] or "-")
+        arrays.append((item["path"], shape, low, high, item["unit"], missing))
     yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
-    checks = [
-        (
-            check["name"].replace("_", " "),
-            *(_number(check[name], ".3g") for name in ("value", "limit")),
-            "passed" if check["passed"] else "FAILED",
-        )
-        for check in contents["checks"]
-    ]
-    failed = frozenset(i for i, check in enumerate(contents["checks"]) if not check["passed"])
-    yield Table("Quality checks", ("check", "value", "limit", "result"), checks, failed)
-    meanings = [
-        (check["name"].replace("_", " "), check["meaning"])
-        for check in contents["checks"]
-        if not check["passed"]
-    ]
+    checks, failed, meanings = [], set(), []
+    for i, check in enumerate(contents["checks"]):
+        name, numbers = check["name"].replace("_", " "), (check["value"], check["limit"])
+        result = "passed" if check["passed"] else "FAILED"
+        checks.append((name, *(_number(number, ".3g") for number in numbers), result))
+        if not check["passed"]:
+            failed.add(i)
+            meanings.append((name, check["meaning"]))
+    columns = ("check", "value", "limit", "result")
+    yield Table("Quality checks", columns, checks, frozenset(failed))
     yield Table("What the failures mean", ("", ""), meanings)
     yield Table("Provenance", ("", ""), list(_provenance(contents["provenance"])))
 
@@ -98,12 +98,6 @@ def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
     if dimension == "stress" and str(item["name"]).endswith("modulus"):
         return float(to_si(1e-6, unit, dimension, str(item["path"]))), "MPa"
     return 1.0, unit
-
-
-def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
-    shape = " x ".join(str(n) for n in item["shape"]) or "one"
-    low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
-    return item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")
 
 
 def _number(value: float | None, form: str) -> str:

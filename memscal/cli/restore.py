@@ -1,19 +1,14 @@
 """``memscal restore``: a scan and a calibrated sensor to the stress at the base of the film."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
-
-if TYPE_CHECKING:
-    from memscal.measurement.restoration import Restoration
 
 EXAMPLES = """\b
 Examples:
@@ -60,12 +55,19 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     files = [path for path in (output, *figures) if path is not None]
     out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
+    from memscal.errors import MemscalError
     from memscal.measurement.restore import restore
+    from memscal.mechanics.press_rod import press_rod
 
     with out.working("Restoring"):
         restored = restore(data, apparatus, expected=stress, override=options["override"])
         if stress is None:
-            restored = _beside_calculated(restored)
+            # The calculated contact is shown beside it; one that has no solution is left out.
+            try:
+                contact = press_rod(data.film, data.indenter, data.load, data.rod_friction)
+                restored = replace(restored, comparison=restored.compare(contact))
+            except MemscalError as failure:
+                out.note(f"No contact is shown beside the result: {failure.problem}")
     with out.working("Drawing"):
         drawn = out.rendered(restored.plot, figures)
     if output is not None:
@@ -82,17 +84,3 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     for path in files:
         out.message(f"Written: {path}")
     return exit_code_of(restored.checks)
-
-
-def _beside_calculated(restored: Restoration) -> Restoration:
-    """Add the comparison with the calculated contact; one that has no solution is left out."""
-    from memscal.errors import MemscalError
-    from memscal.mechanics.press_rod import press_rod
-
-    scan = restored.scan
-    try:
-        contact = press_rod(scan.film, scan.indenter, scan.load, scan.rod_friction)
-        return replace(restored, comparison=restored.compare(contact))
-    except MemscalError as failure:
-        out.note(f"No contact is shown beside the result: {failure.problem}")
-        return restored

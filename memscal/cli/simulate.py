@@ -19,7 +19,6 @@ from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
     from memscal.model.scan import Scan
-    from memscal.simulation.experiment import Experiment
 
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with the names of its scans."""
@@ -93,26 +92,6 @@ def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
         **{name: si(options[name], power) for name, power in _SCALED.items()},
         **{name: options[name] for name in _SHARED},
     }
-
-
-def _experiment_from(options: Mapping[str, Any]) -> Experiment:
-    """Simulate the experiment that the options describe."""
-    from memscal.simulation.experiment import simulate_experiment
-
-    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
-    of_sphere = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
-    settings["sphere"] = common.indenter_from("sphere", of_sphere)
-    return simulate_experiment(
-        interface=interface_of(options),
-        rod_points=options["points"],
-        loads=options["loads"] or _LOADS,
-        points=options["contacts"],
-        spacing=si(options["spacing"], -3),
-        load_scatter=si(options["load_scatter"], -2),
-        position_error=si(options["position_error"], -6),
-        thickness_factor=options["thickness_factor"],
-        **settings,
-    )
 
 
 def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
@@ -240,10 +219,18 @@ def command(
         return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
     output = output or Path("synthetic_scan.h5")
     prove_writable([output], force=force)
-    scan = _simulate(options)
 
     from memscal.formats.scan import write_scan
+    from memscal.simulation.rod_scan import simulate
 
+    loads = options["loads"] or (1.0,)
+    scan = simulate(
+        load=loads[0] if len(loads) == 1 else loads,
+        half_range=si(options["half_range"], -3),
+        points=options["points"],
+        raster=options["raster"],
+        **_shared_settings(options),
+    )
     write_scan(scan, output, overwrite=force)
     if as_json:
         emit_json({"schema_version": "1", **_described(scan, output)})
@@ -281,9 +268,24 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
 
 def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
     from memscal.formats.scan import ensure_folder_writable, write_scans
+    from memscal.simulation.experiment import simulate_experiment
 
     ensure_folder_writable(folder, FILES, overwrite=force)
-    scans = {folder / f"{name}.h5": s for name, s in _experiment_from(options).scans.items()}
+    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
+    of_sphere = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
+    settings["sphere"] = common.indenter_from("sphere", of_sphere)
+    made = simulate_experiment(
+        interface=interface_of(options),
+        rod_points=options["points"],
+        loads=options["loads"] or _LOADS,
+        points=options["contacts"],
+        spacing=si(options["spacing"], -3),
+        load_scatter=si(options["load_scatter"], -2),
+        position_error=si(options["position_error"], -6),
+        thickness_factor=options["thickness_factor"],
+        **settings,
+    )
+    scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
     if as_json:
         described = [_described(scan, path) for path, scan in scans.items()]
@@ -293,16 +295,3 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     note("The scans are synthetic: nothing in them was measured.")
     message(f"Written: {', '.join(map(str, scans))}")
     return DONE
-
-
-def _simulate(options: Mapping[str, Any]) -> Scan:
-    from memscal.simulation.rod_scan import simulate
-
-    loads = options["loads"] or (1.0,)
-    return simulate(
-        load=loads[0] if len(loads) == 1 else loads,
-        half_range=si(options["half_range"], -3),
-        points=options["points"],
-        raster=options["raster"],
-        **_shared_settings(options),
-    )

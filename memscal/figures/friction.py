@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.figures import friction_profiles as profiles
@@ -27,7 +26,7 @@ from memscal.friction.results import (
 from memscal.model.arrays import FloatArray
 
 _UM = 1e-6
-#: The length in the middle of the axis, in m.
+#: The length in the middle of the axis from 0 to infinity, in m.
 _MIDDLE = 3e-6
 _TICKS = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, np.inf)
 _COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
@@ -55,20 +54,15 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
     return figure
 
 
-def length_position(length: ArrayLike) -> FloatArray:
-    """Return where a length (m) stands on an axis from 0 to infinity: 3 um in its middle."""
-    return bounded(length, _MIDDLE)
-
-
 def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
-        rise = np.asarray(compared.length.chi_square) - float(np.min(compared.length.chi_square))
-        label = f"{direction}, {profiles.lubricated_words(compared.lubrication)}"
+        place = bounded(compared.length.values, _MIDDLE)
+        label = f"{direction}, {lubricated_words(compared.lubrication)}"
         colour = COLOURS[_COLOURS[direction]]
-        axes.plot(length_position(compared.length.values), rise, color=colour, label=label)
+        axes.plot(place, _rise(compared.length), color=colour, label=label)
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
-    axes.xaxis.set_ticks(list(length_position(np.array(_TICKS) * _UM)), names)
+    axes.xaxis.set_ticks(list(bounded(np.array(_TICKS) * _UM, _MIDDLE)), names)
     axes.set(xlim=(-0.02, 1.02), xlabel="length (um)", ylabel=r"$\chi^2 - \chi^2_{min}$")
     legend_above(axes, columns=1)
 
@@ -96,13 +90,11 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
     axes.fill_between(implied.loads, low, high, color=blue, alpha=0.25, lw=0)
     axes.plot(implied.loads, best, color=blue, label="what the slip length means")
     for i, at_load in enumerate(measured):
-        reading = at_load.by_profile
-        ends = _ends(reading)
+        reading, black = at_load.by_profile, COLOURS["measured"]
         label = "found at each load" if i == 0 else "_found"
-        axes.plot([at_load.load] * 2, ends, color=COLOURS["measured"], lw=1.0, label=label)
+        axes.plot([at_load.load] * 2, _ends(reading), color=black, lw=1.0, label=label)
         if reading.value is not None:
-            place = friction_position([reading.value])
-            axes.plot([at_load.load], place, "o", color=COLOURS["measured"], ms=4)
+            axes.plot([at_load.load], friction_position([reading.value]), "o", color=black, ms=4)
     profiles.friction_axis(axes, "y")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
@@ -146,9 +138,9 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         look = profiles.mark(lubrication, COLOURS["measured"])
         look |= {"ms": 4, "mew": 0.8, "ls": "none", "elinewidth": 0.8, "capsize": 2}
         axes.errorbar(x, ratio, u, zorder=3, label=lubricated_words(lubrication), **look)
-    first, last = loads[0], loads[-1]
+    last = loads[-1]
     # Room at the right for the curves' names.
-    axes.set_xlim(min(0.0, first), last + _ROOM * max(last - first, 0.2 * last))
+    axes.set_xlim(0.0, last + _ROOM * max(last - loads[0], 0.2 * last))
     _name_ends(axes, last, ends)
     axes.set(xlabel="load (N)", ylabel=r"$S_{max}/p^0_{max}$")
     words = f"{loading} loading" if loading else "as given"
@@ -158,29 +150,24 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
 
 def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
     """Name the curves at their ends; those that end together share a name."""
-    low, high = axes.get_ylim()
+    bottom, top = axes.get_ylim()
     groups: list[list[tuple[float, float]]] = []
     for end in sorted(ends):
-        if groups and end[0] - groups[-1][-1][0] < _APART * (high - low):
+        if groups and end[0] - groups[-1][-1][0] < _APART * (top - bottom):
             groups[-1].append(end)
         else:
             groups.append([end])
     for group in groups:
         height = float(np.mean([value for value, _ in group]))
-        text = _group_name([mu for _, mu in group])
+        low, high = min(mu for _, mu in group), max(mu for _, mu in group)
+        text = friction_name(low)
+        if low < high:
+            text = f"≥ {text}" if np.isinf(high) else f"{text}–{high:.3g}"
         axes.annotate(
             text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
             (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
-            color=profiles.friction_colours(max(mu for _, mu in group))[0],
+            color=profiles.friction_colours(high)[0],
         )  # fmt: skip
-
-
-def _group_name(group: list[float]) -> str:
-    """Return one name for curves that end together."""
-    low, high = min(group), max(group)
-    if low == high:
-        return friction_name(low)
-    return f"≥ {friction_name(low)}" if np.isinf(high) else f"{friction_name(low)}–{high:.3g}"
 
 
 def comparison_figure(
@@ -329,10 +316,11 @@ def _draw_likelihood(
 ) -> None:
     """Draw chi-square above its least value of each load and of all loads together."""
     looks = profiles.load_looks(comparison)
-    for at_load in loads:
-        _draw_curve(axes, at_load.by_profile, *looks[at_load.load], 1.0)
     joint = comparison.joint[loads[0].lubrication][loads[0].loading]
-    _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
+    curves = [(at_load.by_profile, *looks[at_load.load], 1.0) for at_load in loads]
+    for reading, colour, label, width in (*curves, (joint, COLOURS["measured"], "all loads", 1.8)):
+        place = friction_position(reading.values)
+        axes.plot(place, _rise(reading), color=colour, lw=width, label=label)
     draw_levels(axes)
     profiles.friction_axis(axes, "x")
     axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
@@ -349,8 +337,5 @@ def draw_levels(axes: Axes) -> None:
     axes.set_ylim(0, _HIGHEST)
 
 
-def _draw_curve(
-    axes: Axes, reading: BoundedEstimate, colour: str, label: str, width: float
-) -> None:
-    rise = np.asarray(reading.chi_square) - float(np.min(reading.chi_square))
-    axes.plot(friction_position(reading.values), rise, color=colour, lw=width, label=label)
+def _rise(reading: BoundedEstimate) -> FloatArray:
+    return np.asarray(reading.chi_square) - float(np.min(reading.chi_square))

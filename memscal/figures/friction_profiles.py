@@ -120,6 +120,7 @@ EXPANDED = 2.0
 #: How strongly points are drawn that are not distinct from zero.
 _PALE = 0.25
 _LEAST_LIMIT = 3.5
+_BARS = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
 
 
 def _draw_points(
@@ -131,21 +132,8 @@ def _draw_points(
     clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
-            points = (r[shown], s[shown], u[shown])
-            _draw_errorbar(axes, at_load, colour, points, label=label or "_points", alpha=alpha)
-
-
-def _draw_errorbar(
-    axes: Axes,
-    at_load: LoadComparison,
-    colour: str,
-    points: tuple[FloatArray, FloatArray, FloatArray],
-    **style: Any,
-) -> None:
-    """Draw x, y and the standard uncertainty of y, in the marker of the lubrication."""
-    look = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7, **style}
-    x, y, u = points
-    axes.errorbar(x, y, u, **mark(at_load.lubrication, colour), **look)
+            look = mark(at_load.lubrication, colour) | _BARS | {"alpha": alpha}
+            axes.errorbar(r[shown], s[shown], u[shown], label=label or "_points", **look)
 
 
 def share_limits(panels: Sequence[Axes]) -> None:
@@ -208,20 +196,18 @@ def draw_profiles(
     else:
         axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
         axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
-        _annotate_curves(axes, comparison, loads[0])
+        ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
+        lines = [lubricated_words(loads[0].lubrication)]
+        lines += [f"{loads[0].loading} loading"] if loads[0].loading else []
+        lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
+        _note(axes, "\n".join(lines), (0.97, 0.95))
     axes.set_ylabel("stress at the base (kPa)")
     legend_above(axes, columns=4 if not logarithmic else 2)
 
 
-def _annotate_curves(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    """Name the scan and the curves inside the frame, where no data are."""
-    ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
-    lines = [lubricated_words(at_load.lubrication)]
-    lines += [f"{at_load.loading} loading"] if at_load.loading else []
-    lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
-    axes.annotate(
-        "\n".join(lines), (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize=7
-    )
+def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
+    """Write inside the frame, left of and below a place at its upper right, where no data are."""
+    axes.annotate(text, corner, xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def draw_residuals(
@@ -229,8 +215,7 @@ def draw_residuals(
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
     looks = load_looks(comparison)
-    colours = [looks[at_load.load][0] for at_load in loads]
-    _plot_residuals(axes, loads, index, colours)
+    _plot_residuals(axes, loads, index, [looks[at_load.load][0] for at_load in loads])
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(comparison.friction[index])}}})/u$")
 
@@ -263,7 +248,10 @@ def friction_set_figure(
             _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
             column[0].set_ylim(bottom=0)
             _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
-            _draw_best(column[2], comparison, at_load)
+            best = int(np.argmin(at_load.chi_square))
+            _plot_residuals(column[2], [at_load], best, [COLOURS["measured"]])
+            name = friction_name(comparison.friction[best])
+            _note(column[2], rf"least $\chi^2$: $\mu$ = {name}", (0.96, 0.9))
         share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:
@@ -291,23 +279,16 @@ def _draw_set(
     unit: float,
 ) -> None:
     """Draw stress less that of some profile at its radii, in a unit (Pa)."""
-    profile, black = at_load.profile, COLOURS["measured"]
+    profile, look = at_load.profile, mark(at_load.lubrication, COLOURS["measured"]) | _BARS
     # As far as the frictionless profile exceeds a twentieth of its top.
     strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
     r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    points = (profile.r / MM, (profile.s_zz - less) / unit, profile.s_zz_errors / unit)
-    _draw_errorbar(axes, at_load, black, points, label="_points")
+    stress, errors = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
+    axes.errorbar(profile.r / MM, stress, errors, label="_points", **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
-
-
-def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    best = int(np.argmin(at_load.chi_square))
-    _plot_residuals(axes, [at_load], best, [COLOURS["measured"]])
-    label = rf"least $\chi^2$: $\mu$ = {friction_name(comparison.friction[best])}"
-    axes.annotate(label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def _legend_of_friction(

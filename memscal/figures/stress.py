@@ -169,7 +169,13 @@ def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
-            _draw_loading(panels[2], contacts, colours)
+            depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
+            load = [contact.load for contact in contacts]
+            panels[2].plot(depth, load, color=COLOURS["muted"], lw=0.8)
+            panels[2].scatter(depth, load, c=list(colours), s=14, zorder=3)
+            panels[2].set_ylim(bottom=0)
+            panels[2].set_xlim(left=min(0.0, 1.05 * float(depth.min())))
+            panels[2].set(xlabel="depth (um)", ylabel="load (N)")
     return figure
 
 
@@ -210,13 +216,3 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
     axes.set(xlim=(0, r[-1] / MM), xlabel="radius (mm)", ylabel="at the base (kPa)")
     style.legend_above(axes, columns=1)
-
-
-def _draw_loading(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
-    depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
-    load = np.array([contact.load for contact in contacts])
-    axes.plot(depth, load, color=COLOURS["muted"], lw=0.8)
-    axes.scatter(depth, load, c=list(colours), s=14, zorder=3)
-    axes.set_ylim(bottom=0)
-    axes.set_xlim(left=min(0.0, 1.05 * float(depth.min())))
-    axes.set(xlabel="depth (um)", ylabel="load (N)")

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -41,44 +42,16 @@ COLOURS = {
 SCATTER_THRESHOLD = 400
 """Above this many points dots are drawn in place of error bars."""
 
-_STYLE: dict[str, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],  # ships with matplotlib: the same on every machine
-    "font.size": 8.0,
-    "axes.labelsize": 8.0,
-    "axes.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.formatter.use_mathtext": True,
-    "axes.formatter.limits": (-5, 6),  # a factor above the axis would lie under the legend
-    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 7.0),
-    **dict.fromkeys(("xtick.direction", "ytick.direction"), "in"),
-    "xtick.top": True,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "legend.fontsize": 7.0,
-    "legend.frameon": False,
-    "legend.handlelength": 2.0,
-    "legend.columnspacing": 1.0,
-    "legend.labelspacing": 0.3,
-    "legend.borderaxespad": 0.2,
-    "lines.linewidth": 1.2,
-    "hatch.linewidth": 0.4,
-    "text.hinting": "none",  # letters as wide on paper as on a screen: lines keep their ends
-    "savefig.dpi": 200,
-    "svg.hashsalt": "memscal",
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-}
+_STYLE = Path(__file__).with_name("house.mplstyle")
 
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Set matplotlib's settings to those of this module, not the user's, and restore them after."""
+    """Set matplotlib's settings to the house's, not the user's, and restore them after."""
     # They are read both when a figure is built and when it is rendered: both need this.
     with mpl.rc_context():
         mpl.rcdefaults()
-        settings: Any = mpl.rcParams
-        settings.update(_STYLE)
+        mpl.rcParams.update(mpl.rc_params_from_file(_STYLE, use_default_template=False))
         yield
 
 

@@ -50,10 +50,8 @@ def table_key(content: Mapping[str, Any]) -> str:
 
 
 def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, FloatArray]) -> bool:
-    """Write arrays under their key, remove the oldest; return whether the disk took them.
-
-    ``value`` (M,), ``load`` (L,), ``k`` (K,), transforms (M, L, K) in N, all others (M, L).
-    """
+    """Write arrays under their key, remove the oldest; return whether the disk took them."""
+    # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
     if folder is None:
         return False
     children: dict[str, Node] = {

@@ -38,14 +38,10 @@ def ensure_writable(
 
 
 def atomic_write_bytes(
-    path: str | os.PathLike[str],
-    data: bytes | memoryview,
-    *,
-    overwrite: bool = False,
-    inputs: Iterable[str | os.PathLike[str]] = (),
+    path: str | os.PathLike[str], data: bytes | memoryview, *, overwrite: bool = False
 ) -> None:
     """Write a file whole or not at all: beside the target, flushed, then renamed in one step."""
-    target = _checked_target(path, overwrite=overwrite, inputs=inputs)
+    target = _checked_target(path, overwrite=overwrite)
     with _beside(target) as temporary:
         _write_durably(temporary, data)
         if overwrite:
@@ -56,7 +52,7 @@ def atomic_write_bytes(
 
 
 def _checked_target(
-    path: str | os.PathLike[str], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str]]
+    path: str | os.PathLike[str], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str]] = ()
 ) -> Path:
     """Follow symbolic links to the real target and refuse what must not be replaced."""
     shown = os.fspath(path)

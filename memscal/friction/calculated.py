@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from memscal.friction.family import (
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter, Sphere
+from memscal.model.indenter import Indenter
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.stress import StressProfile
 
@@ -39,15 +38,10 @@ def amontons_family(
     *,
     friction: Sequence[float] = FRICTIONS,
     loading: str = "incremental",
-    reach: float,  # largest distance from the axis at which stresses will be asked for, in m
-    cache: CacheFolder = None,
-    workers: int = 1,
-    order: int = 0,  # one for the shear at the base
+    **options: Any,  # reach, cache, workers and order of FamilySetup; so in the next functions
 ) -> ProfileFamily:
     """Return the base stresses of a sphere on a film for a range of friction coefficients."""
-    setup = FamilySetup(
-        film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
-    )
+    setup = FamilySetup(film, indenter, loads, **options)
     values = parameter_values("friction coefficients", friction)
     if loading not in ("incremental", "total"):
         raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
@@ -78,12 +72,10 @@ def elasto_plastic_family(
     *,
     friction: float,
     slip_lengths: Sequence[float] = SLIP_LENGTHS,
-    reach: float,
-    cache: CacheFolder = None,
-    workers: int = 1,
+    **options: Any,
 ) -> ProfileFamily:
     """Return incremental base stresses for slip lengths (m), from 0 (rigid) to inf (no shear)."""
-    setup = FamilySetup(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    setup = FamilySetup(film, indenter, loads, **options)
     values = parameter_values("slip lengths", slip_lengths)
     if not 0 < friction < math.inf:
         raise InputError(
@@ -115,17 +107,10 @@ def normal_compliance_family(
     *,
     lengths: Sequence[float] | None = None,
     law: str = "exponential",
-    reach: float,
-    cache: CacheFolder = None,
-    workers: int = 1,
+    **options: Any,
 ) -> ProfileFamily:
-    r"""Return the base stresses without friction for a range of lengths (m) of a normal law.
-
-    ``"exponential"``: :math:`p = p_1 e^{-d/\lambda}` with the length :math:`\lambda`; the pressure
-    :math:`p_1` only shifts the depth.  ``"greenwood-tripp"``: asperities of the roughness
-    :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
-    """
-    setup = FamilySetup(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    """Return the base stresses without friction for a range of lengths (m) of a normal law."""
+    setup = FamilySetup(film, indenter, loads, **options)
     if law not in ("exponential", "greenwood-tripp"):
         raise InputError(f'law is {law!r}, but it is "exponential" or "greenwood-tripp".')
     if lengths is None:
@@ -179,57 +164,30 @@ _REACH = 1.1
 _NEAR = 0.01
 
 
-class LawFamilies:
-    """Families of calculated contacts of what was measured, each at its profiles' loads."""
-
-    def __init__(
-        self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
-    ) -> None:
-        scan, reach = profiles[0].scan, _REACH * max(float(profile.r[-1]) for profile in profiles)
-        self._contacts: dict[str, Any] = {"film": scan.film, "indenter": scan.indenter}
-        self._contacts |= {"reach": reach, "cache": cache, "workers": workers}
-
-    def rigid(
-        self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
-    ) -> ProfileFamily:
-        """Return incremental contacts of Amontons' law, from no friction to full stick."""
-        if calculated is not None and tuple(calculated.values[[0, -1]]) != (0.0, math.inf):
-            calculated = None
-        return _at_loads(profiles, calculated, partial(amontons_family, **self._contacts))
-
-    def slipping(
-        self,
-        profiles: Sequence[MeasuredProfile],
-        friction: float,
-        uncertainty: float | None,
-        calculated: ProfileFamily | None,
-    ) -> ProfileFamily:
-        """Return contacts of the elasto-plastic law at a macroscopic coefficient."""
-
-        def family(loads: FloatArray) -> ProfileFamily:
-            contacts = {**self._contacts, "loads": loads}
-            made = elasto_plastic_family(friction=friction, **contacts)
-            if uncertainty is None:
-                return made
-            # Only its stresses count: without uncertainties it takes a third of the time.
-            exact: Any = dict.fromkeys(
-                f"{name}_uncertainty" for name in ("young_modulus", "thickness", "poisson_ratio")
-            )
-            contacts["film"] = replace(contacts["film"], **exact)
-            more = elasto_plastic_family(friction=friction + uncertainty, **contacts)
-            change = more.spectra - made.spectra
-            return replace(made, changes={**made.changes, "macroscopic_friction": change})
-
-        return _at_loads(profiles, calculated, family)
-
-    def yielding(
-        self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
-    ) -> ProfileFamily:
-        """Return contacts without friction that yield normally."""
-        return _at_loads(profiles, calculated, partial(normal_compliance_family, **self._contacts))
+def contacts_of(
+    profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
+) -> dict[str, Any]:
+    """Return film, indenter and options by which contacts of what was measured are calculated."""
+    scan, reach = profiles[0].scan, _REACH * max(float(profile.r[-1]) for profile in profiles)
+    contacts = {"film": scan.film, "indenter": scan.indenter, "reach": reach}
+    return contacts | {"cache": cache, "workers": workers}
 
 
-def _at_loads(
+def slipping_family(friction: float, uncertainty: float | None, **contacts: Any) -> ProfileFamily:
+    """Return the elasto-plastic family at a macroscopic coefficient that may be uncertain."""
+    made = elasto_plastic_family(friction=friction, **contacts)
+    if uncertainty is None:
+        return made
+    # Only its stresses count: without uncertainties it takes a third of the time.
+    names = ("young_modulus", "thickness", "poisson_ratio")
+    exact: Any = dict.fromkeys((f"{name}_uncertainty" for name in names), None)
+    contacts["film"] = replace(contacts["film"], **exact)
+    more = elasto_plastic_family(friction=friction + uncertainty, **contacts)
+    changes = {**made.changes, "macroscopic_friction": more.spectra - made.spectra}
+    return replace(made, changes=changes)
+
+
+def family_at_loads(
     profiles: Sequence[MeasuredProfile],
     calculated: ProfileFamily | None,
     calculate: Callable[..., ProfileFamily],
@@ -258,52 +216,33 @@ _DECAYED = 1e-3
 _CARRIES = 0.05
 #: Missing tables that an error names.
 _MOST_NAMED = 6
+_Table = tuple[float, StressProfile]  # with its friction coefficient first
 
 
 def external_family(
     profiles: Sequence[StressProfile],
     loads: ArrayLike,
     *,
+    film: ElasticFilm,
+    indenter: Indenter,
     reach: float,
-    film: ElasticFilm | None = None,
-    indenter: Indenter | None = None,
-    cache: CacheFolder = None,
-    workers: int = 1,
+    **options: Any,
 ) -> ProfileFamily:
     """Return base stresses of tables by friction; each serves loads within 1 % of its own."""
     nominal = require_loads(loads)
-    tables = [_checked(profile, reach) for profile in profiles]
+    tables = [(_checked_friction(profile, reach), profile) for profile in profiles]
     if not tables:
         raise InputError("No table of a calculated stress was given.")
     loading = _common_loading(tables)
-    frictions = np.array(sorted({_friction(profile) for profile in tables}))
+    frictions = np.array(sorted({mu for mu, _ in tables}))
     grid = _grid(tables, frictions, nominal)
-    film = film or next((p.film for p in tables if p.film is not None), None)
-    indenter = indenter or next((p.indenter for p in tables if p.indenter is not None), None)
-    # Where no film is known: a stress halves over about the film's thickness.
-    thickness = film.thickness if film else min(_half_width(profile) for profile in tables)
-    nodes = base_wavenumbers(thickness, reach)
+    nodes = base_wavenumbers(film.thickness, reach)
     spectra = np.array(
         [[hankel_transform(cell.r, cell.sigma_zz, nodes.k) for cell in row] for row in grid]
     )
     spectra *= (nominal / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
-    by_load, changes = spectra, {}
-    notes = "No film and sphere are known: the stress counts as proportional to the load."
-    if film is not None and isinstance(indenter, Sphere):
-        ours = amontons_family(
-            film,
-            indenter,
-            nominal,
-            friction=[float(mu) for mu in frictions],
-            loading=loading or "incremental",
-            reach=reach,
-            cache=cache,
-            workers=workers,
-        )
-        # What the tables have beside the contacts solved here counts as proportional to the load.
-        by_load = ours.by_load + (spectra - ours.spectra)
-        changes = dict(ours.changes)
-        notes = "Sensitivities are those of the contacts that memscal calculates."
+    law: dict[str, Any] = {"friction": frictions.tolist(), "loading": loading or "incremental"}
+    ours = amontons_family(film, indenter, nominal, reach=reach, **law, **options)
     return ProfileFamily(
         name="external",
         loading=loading,
@@ -312,17 +251,18 @@ def external_family(
         values=frictions,
         scale=FRICTION_SCALE,
         spectra=spectra,
-        by_load=by_load,
-        changes=changes,
+        # What the tables have beside the contacts solved here counts as proportional to the load.
+        by_load=ours.by_load + (spectra - ours.spectra),
+        changes=ours.changes,
         depths=_numbers(grid, "depth"),
         contact_radii=_numbers(grid, "contact_radius"),
         convergence=_numbers(grid, "convergence"),
-        notes=(notes,),
+        notes=("Sensitivities are those of the contacts that memscal calculates.",),
     )
 
 
 def _grid(
-    tables: Sequence[StressProfile], frictions: FloatArray, loads: FloatArray
+    tables: Sequence[_Table], frictions: FloatArray, loads: FloatArray
 ) -> list[list[StressProfile]]:
     """Return the table of each friction coefficient and load; name all that are missing."""
     grid, missing = [], []
@@ -332,7 +272,7 @@ def _grid(
         missing += [f"{load:g} N with friction {mu:g}" for load in absent]
         grid.append([cell for cell in row if cell is not None])
     if missing:
-        stated = sorted({profile.load for profile in tables})
+        stated = sorted({profile.load for _, profile in tables})
         more = len(missing) - _MOST_NAMED
         listed = missing[:_MOST_NAMED] + [f"and {more} more"] * (more > 0)
         raise InputError(
@@ -346,8 +286,8 @@ def _grid(
     return grid
 
 
-def _nearest(tables: Sequence[StressProfile], mu: float, load: float) -> StressProfile | None:
-    near = [p for p in tables if _friction(p) == mu and abs(p.load / load - 1) <= _SAME_LOAD]
+def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile | None:
+    near = [p for of, p in tables if of == mu and abs(p.load / load - 1) <= _SAME_LOAD]
     near.sort(key=lambda profile: abs(profile.load - load))
     if len(near) > 1 and near[0].load == near[1].load:
         raise InputError(
@@ -358,8 +298,8 @@ def _nearest(tables: Sequence[StressProfile], mu: float, load: float) -> StressP
     return near[0] if near else None
 
 
-def _checked(profile: StressProfile, reach: float) -> StressProfile:
-    """Refuse a table that cannot be compared."""
+def _checked_friction(profile: StressProfile, reach: float) -> float:
+    """Return a table's friction coefficient; refuse a table that cannot be compared."""
     if profile.friction_coefficient is None:
         raise InputError(
             f"{_name(profile)} does not say its friction coefficient.",
@@ -379,11 +319,11 @@ def _checked(profile: StressProfile, reach: float) -> StressProfile:
             why="The force that the base carries must be the load.",
             cure="Check the load, the units, and that the table is fine enough.",
         )
-    return profile
+    return float(profile.friction_coefficient)
 
 
-def _common_loading(tables: Sequence[StressProfile]) -> str:
-    loadings = {p.loading for p in tables if p.loading and _friction(p) > 0}
+def _common_loading(tables: Sequence[_Table]) -> str:
+    loadings = {profile.loading for mu, profile in tables if profile.loading and mu > 0}
     if len(loadings) > 1:
         raise InputError(
             "Some of the tables are for incremental loading and some for total loading.",
@@ -393,18 +333,8 @@ def _common_loading(tables: Sequence[StressProfile]) -> str:
     return loadings.pop() if loadings else ""
 
 
-def _friction(profile: StressProfile) -> float:
-    mu = profile.friction_coefficient
-    return math.nan if mu is None else float(mu)
-
-
 def _name(profile: StressProfile) -> str:
     return profile.source.file_name if profile.source else f"A table for {profile.load:g} N"
-
-
-def _half_width(profile: StressProfile) -> float:
-    below = np.flatnonzero(profile.sigma_zz < profile.sigma_zz.max() / 2)
-    return float(profile.r[below[below > np.argmax(profile.sigma_zz)][0]])
 
 
 def _numbers(grid: Sequence[Sequence[StressProfile]], name: str) -> FloatArray:

@@ -11,7 +11,7 @@ from memscal.friction.family import ProfileFamily
 from memscal.friction.results import BoundedEstimate, LoadComparison
 from memscal.model import checks as quality
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
-from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.notation import format_bound
 
 #: Share of points that may lie outside of what friction can explain, beyond those of chance.
@@ -25,9 +25,31 @@ def comparison_checks(
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     checks: list[QualityCheck] = []
     for i, of_load in enumerate(zip(*loads.values(), strict=True), start=1):
-        checks += [_profile(i, of_load), _bracketing(i, of_load)]
+        profile, outside = of_load[0].profile, 1 - max(load.bracketed for load in of_load)
+        size = np.format_float_positional(profile.load, precision=3, trim="-")
+        place = f"the {profile.lubrication} load" if profile.lubrication else "the load"
+        place = f"{place} of {size} N"
+        explained = (
+            f"Reduced chi-square of {place} against the friction coefficient that explains it "
+            "best. A failure means that no calculated contact does: noise or scatter larger than "
+            "stated, another shape of contact, or a film, gain or load that is not as stated."
+        )
+        bracketed = (
+            f"Share of the points of {place} that lie outside of what no friction and full stick "
+            "give, by more than 1.96 standard uncertainties. A failure means that friction alone "
+            "does not explain the stress."
+        )
+        readings = (load.by_profile for load in of_load)
+        checks.append(_reduced(f"profile_chi_square_{i}", readings, explained))
+        checks.append(check(f"bracketing_{i}", outside, _OUTSIDE, bracketed))
     for lubrication, by_loading in joint.items():
-        checks.append(_together(lubrication, by_loading))
+        tail, kind = (f"_{lubrication}", f"{lubrication} ") if lubrication else ("", "")
+        together = (
+            f"Reduced chi-square of all {kind}loads against one friction coefficient. A failure "
+            "while the single loads pass means that friction changes with the load: look at the "
+            "coefficient of each load, or at laws of the interface."
+        )
+        checks.append(_reduced(f"joint_chi_square{tail}", by_loading.values(), together))
     if "lubricated" in joint:
         checks.append(_frictionless(joint["lubricated"]))
     return tuple(checks)
@@ -38,38 +60,6 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
     best = min(estimates, key=lambda estimate: estimate.least)
     limit = chi_square_limit(best.degrees) / best.degrees
     return check(name, best.least / best.degrees, limit, meaning, best.p_value)
-
-
-def _profile(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
-    return _reduced(
-        f"profile_chi_square_{number}",
-        (load.by_profile for load in loads),
-        f"Reduced chi-square of {_place(loads[0].profile)} against the friction coefficient "
-        "that explains it best. A failure means that no calculated contact does: noise or scatter "
-        "larger than stated, another shape of contact, or a film, gain or load that is not as "
-        "stated.",
-    )
-
-
-def _bracketing(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
-    return check(
-        f"bracketing_{number}",
-        1 - max(load.bracketed for load in loads),
-        _OUTSIDE,
-        f"Share of the points of {_place(loads[0].profile)} that lie outside of what no friction "
-        "and full stick give, by more than 1.96 standard uncertainties. A failure means that "
-        "friction alone does not explain the stress.",
-    )
-
-
-def _together(lubrication: str, by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
-    return _reduced(
-        f"joint_chi_square{f'_{lubrication}' if lubrication else ''}",
-        by_loading.values(),
-        f"Reduced chi-square of all {f'{lubrication} ' if lubrication else ''}loads against one "
-        "friction coefficient. A failure while the single loads pass means that friction changes "
-        "with the load: look at the coefficient of each load, or at laws of the interface.",
-    )
 
 
 def _frictionless(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
@@ -86,11 +76,6 @@ def _frictionless(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
         "coefficients are not to be trusted either.",
         float(chdtrc(1, least)),
     )
-
-
-def _place(profile: MeasuredProfile) -> str:
-    words = f"the {profile.lubrication} load" if profile.lubrication else "the load"
-    return f"{words} of {np.format_float_positional(profile.load, precision=3, trim='-')} N"
 
 
 #: Calculated contacts that are less certain than this share of their stress are named.

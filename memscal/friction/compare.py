@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 from os import PathLike
 from typing import Any
 
@@ -324,25 +325,18 @@ def _loading_counted(
     joint: Mapping[str, Mapping[str, BoundedEstimate]],
 ) -> tuple[dict[str, tuple[LoadComparison, ...]], dict[str, dict[str, BoundedEstimate]]]:
     """Add to every budget what the other definition of the loading would have given."""
-    names = tuple(loads)
-    if len(names) != 2:
-        return dict(loads), {kind: dict(by_loading) for kind, by_loading in joint.items()}
-    other = dict(zip(names, reversed(names), strict=True))
-    counted = {
-        name: tuple(
+    counted, together = dict(loads), {kind: dict(by) for kind, by in joint.items()}
+    for name, other in permutations(loads, 2):
+        counted[name] = tuple(
             replace(
                 mine,
                 by_maximum=effective.with_loading(mine.by_maximum, theirs.by_maximum),
                 by_profile=effective.with_loading(mine.by_profile, theirs.by_profile),
             )
-            for mine, theirs in zip(loads[name], loads[other[name]], strict=True)
+            for mine, theirs in zip(loads[name], loads[other], strict=True)
         )
-        for name in names
-    }
-    together = {
-        kind: {name: effective.with_loading(by[name], by[other[name]]) for name in names}
-        for kind, by in joint.items()
-    }
+        for kind, by in joint.items():
+            together[kind][name] = effective.with_loading(by[name], by[other])
     return counted, together
 
 

@@ -60,7 +60,12 @@ def profile_estimate(
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(coordinates, chi_square)
-    best = _minimum(spline, coordinates, chi_square)
+    # The lowest point of the spline next to the lowest node.
+    i = int(np.argmin(chi_square))
+    around = coordinates[max(i - 1, 0) : i + 2]
+    turns = spline.derivative().roots(extrapolate=False)
+    turns = turns[(around[0] < turns) & (turns < around[-1])]
+    best = float(min([coordinates[i], *turns], key=spline))
     least = float(spline(best))
 
     def interval(at: float) -> Interval:
@@ -80,16 +85,6 @@ def profile_estimate(
         value = value_at(float(np.clip(best, coordinates[0], coordinates[-1])))
         spread = (narrow.high - narrow.low) / 2 if narrow.high and narrow.low > 0 else None
     return BoundedEstimate(value, spread, wide, reason(wide), values, chi_square, least, unit=unit)
-
-
-def _minimum(spline: Any, coordinates: FloatArray, chi_square: FloatArray) -> float:
-    """Lowest point of the spline next to the lowest node."""
-    i = int(np.argmin(chi_square))
-    around = slice(max(i - 1, 0), i + 2)
-    low, high = coordinates[around][0], coordinates[around][-1]
-    turns = spline.derivative().roots(extrapolate=False)
-    candidates = [float(coordinates[i]), *(float(t) for t in turns if low < t < high)]
-    return min(candidates, key=lambda t: float(spline(t)))
 
 
 def _crossing(
@@ -234,6 +229,11 @@ def load_comparison(
     top, top_errors = _blurred(confronted.sensor, family, load, np.zeros(1), points)
     chi_square = confronted.at(family.values, index)
     ratio = profile.maximum / float(top[0, 0])
+    # Measured and calculated maximum: A and G err together.
+    on_axis = predict(points_at(np.zeros(1), points), confronted.sensor, family, load)
+    norms = [float(np.linalg.norm(column[0, 0])) for column in on_axis.columns.values()]
+    systematic = float(np.linalg.norm(norms)) / float(on_axis.signal[0, 0])
+    random = random_uncertainty(profile.maximum_budget) / profile.maximum
     return LoadComparison(
         profile=profile,
         loading=family.loading,
@@ -242,7 +242,7 @@ def load_comparison(
         p0_max=float(top[0, 0]),
         p0_max_uncertainty=float(top_errors[0, 0]),
         ratio=ratio,
-        ratio_uncertainty=_ratio_uncertainty(profile, confronted, index) * ratio,
+        ratio_uncertainty=float(np.hypot(systematic, random)) * ratio,
         calculated=calculated,
         calculated_errors=errors,
         p_max=top[:, 0],
@@ -264,15 +264,6 @@ def _blurred(
     variance = sum(squares, start=np.zeros_like(predicted.signal))
     a = sensor.conversion_constant
     return predicted.signal / a, np.sqrt(variance) / a
-
-
-def _ratio_uncertainty(profile: MeasuredProfile, confronted: Confrontation, index: int) -> float:
-    """Relative uncertainty of measured over frictionless maximum: A and G err together."""
-    axis = points_at(np.zeros(1), confronted.points[index])
-    top = predict(axis, confronted.sensor, confronted.family, confronted.loads[index])
-    norms = [float(np.linalg.norm(column[0, 0])) for column in top.columns.values()]
-    systematic = float(np.linalg.norm(norms)) / float(top.signal[0, 0])
-    return float(np.hypot(systematic, random_uncertainty(profile.maximum_budget) / profile.maximum))
 
 
 #: Loads that differ by less than this share are one.
@@ -315,8 +306,11 @@ def dry_against_lubricated(
     dry, wet = ((side.u - of_side.signal[0])[places] for side, of_side, places in both)
     covariance = sum(_covariance(side, p)[np.ix_(places, places)] for side, p, places in both)
     flat = np.column_stack([sides[0].flat, predicted[0].slope[0] * sides[0].side])[kept[0]]
-    chi_square = _chi_square(dry - wet, np.asarray(covariance), flat)
-    degrees = kept[0].size - flat.shape[1]
+    root = np.linalg.cholesky(np.asarray(covariance))
+    basis = np.linalg.qr(np.linalg.solve(root, flat))[0]
+    left = np.linalg.solve(root, dry - wet)
+    left = left - basis @ (basis.T @ left)
+    chi_square, degrees = float(left @ left), left.size - flat.shape[1]
     difference, errors = _difference(profiles, sides, predicted, kept, sensor, conversion_share)
     top = profiles[0].maximum - profiles[1].maximum
     random = (random_uncertainty(profile.maximum_budget) for profile in profiles)
@@ -351,14 +345,6 @@ def _covariance(points: LoadPoints, predicted: Predicted) -> FloatArray:
     noise = np.diag(np.diag(noise)) if points.correlation is None else noise * points.correlation
     moved = (predicted.slope[0] * points.x_errors) ** 2
     return np.asarray(noise + np.diag((predicted.by_load[0] * points.load_errors) ** 2 + moved))
-
-
-def _chi_square(values: FloatArray, covariance: FloatArray, flat: FloatArray) -> float:
-    root = np.linalg.cholesky(covariance)
-    basis = np.linalg.qr(np.linalg.solve(root, flat))[0]
-    left = np.linalg.solve(root, values)
-    left = left - basis @ (basis.T @ left)
-    return float(left @ left)
 
 
 def _difference(

@@ -18,25 +18,18 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.errors import ConvergenceError, DomainError, InputError, MemscalError
+from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_table, table_key
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import (
-    FloatArray,
-    finite_vector,
-    freeze_arrays,
-    frozen_array,
-    require_positive,
-)
+from memscal.model.arrays import FloatArray, FrozenArrays, finite_vector, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
@@ -61,12 +54,8 @@ _NUMBERS = ("depths", "contact_radii", "convergence")
 
 
 @dataclass(frozen=True, eq=False)
-class ProfileFamily:
-    r"""Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers.
-
-    Spectra are :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, with ``order`` one
-    :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the shear.
-    """
+class ProfileFamily(FrozenArrays):
+    """Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers."""
 
     name: str  # "amontons", "elasto-plastic", "normal-compliance" or "external"
     loading: str  # "incremental", "total", or "" where it is unknown or changes nothing
@@ -74,43 +63,15 @@ class ProfileFamily:
     loads: FloatArray  # (L,), in N
     values: FloatArray  # (M,): coefficients or lengths in m, increasing from 0 or above up to inf
     scale: float  # theta_0, of the values
-    spectra: FloatArray  # (M, L, K), in N
+    spectra: FloatArray  # (M, L, K), in N: those of Contact.base_spectrum, or base_shear_spectrum
     by_load: FloatArray  # their derivatives by the logarithm of the load
     changes: Mapping[str, FloatArray]  # by one standard uncertainty of each source that states one
     depths: FloatArray  # (M, L), in m; NaN where unknown, as the next two
     contact_radii: FloatArray  # (M, L), in m
     convergence: FloatArray  # (M, L): largest relative change under refinement
     notes: tuple[str, ...] = field(default=())  # what was assumed
-    order: int = 0
+    order: int = 0  # one of the shear
     slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "loads", "values", "spectra", "by_load", *_NUMBERS)
-        changes = {source: frozen_array(change) for source, change in self.changes.items()}
-        object.__setattr__(self, "changes", MappingProxyType(changes))
-        require_positive("scale of a profile family", self.scale)
-        table = (self.values.size, self.loads.size)
-        whole = (*table, self.wavenumbers.k.size)
-        arrays = {name: getattr(self, name) for name in ("spectra", "by_load", *_NUMBERS)}
-        arrays |= {f"changes[{name!r}]": change for name, change in self.changes.items()}
-        for name, array in arrays.items():
-            shape = table if name in _NUMBERS else whole
-            if array.shape != shape:
-                raise InputError(
-                    f"{name} of a profile family has shape {array.shape}, not {shape}."
-                )
-        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
-        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
-            raise InputError(
-                f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
-                why="They increase strictly, from 0 or above.",
-                cure="Sort them, and give each once.",
-            )
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out what was computed on demand; a mapping proxy cannot be pickled."""
-        state = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return state | {"changes": dict(self.changes)}
 
     @cached_property
     def coordinates(self) -> FloatArray:
@@ -130,8 +91,6 @@ class ProfileFamily:
 
     def value_at(self, coordinate: float) -> float:
         """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`."""
-        if not 0 <= coordinate <= 1:
-            raise InputError(f"A bounded coordinate is {coordinate:g}, but it lies from 0 to 1.")
         return math.inf if coordinate == 1 else self.scale * coordinate / (1 - coordinate)
 
     def values_at(self, coordinates: Iterable[float]) -> FloatArray:
@@ -179,17 +138,16 @@ class ProfileFamily:
     @cached_property
     def _pieces(self) -> Any:
         """Interpolant of spectra, derivatives and changes, shape (2 + sources, L, K)."""
-        from scipy.interpolate import PchipInterpolator
+        from scipy.interpolate import PchipInterpolator, PPoly
 
         stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
+        if self.values.size == 1:  # a constant
+            return PPoly(stack[None], [0.0, 1.0])
         return PchipInterpolator(self.coordinates, stack, axis=0)
 
     def _interpolated(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Return spectra, derivatives and changes at coordinates (V,): (V, 2 + sources, L, K)."""
-        if self.values.size > 1:
-            return np.asarray(self._pieces(t, derivative))
-        stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
-        return np.repeat(stack * (not derivative), t.size, axis=0)
+        return np.asarray(self._pieces(t, derivative))
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
@@ -236,14 +194,6 @@ def _scaled_changes(
     }
 
 
-def _poisson_ratios(film: ElasticFilm) -> tuple[float, float] | None:
-    """Return two Poisson's ratios (one-sided if incompressible) for its influence, if uncertain."""
-    if not (u := film.poisson_ratio_uncertainty):
-        return None
-    step = max(u, _SMALLEST_STEP)
-    return min(film.poisson_ratio + step, 0.5), max(film.poisson_ratio - step, 0.0)
-
-
 #: Neighbours of each load on the path, relative to it: their difference is its derivative.
 _NEIGHBOURS = (0.98, 1.02)
 #: Rings from the axis to the largest contact; more crowd at the edges.  Three times as many change
@@ -275,11 +225,7 @@ class LoadingPath:
 def solve_paths(
     paths: Sequence[LoadingPath], k: FloatArray, *, workers: int
 ) -> list[dict[str, FloatArray]]:
-    """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes.
-
-    ``spectra`` (L, K) in N with ``by_load`` and ``by_wavenumber``, derivatives by the logarithms
-    (zero where not needed), and ``depths``, ``contact_radii``, ``convergence`` (L,).
-    """
+    """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes."""
     several = min(workers, len(paths))
     if several < 2:
         return [_solve(path, k) for path in paths]
@@ -288,6 +234,7 @@ def solve_paths(
 
 
 def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
+    """Return spectra (L, K) in N, derivatives by logarithms (zero where not needed), numbers."""
     count = len(path.loads)
     factors = np.array([1.0, *_NEIGHBOURS] if path.derivatives else [1.0])
     visited = np.multiply.outer(factors, np.array(path.loads))
@@ -336,21 +283,16 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
                 strain="linear",
                 rings=rings,
             )
-        except ConvergenceError as error:
+        except (ConvergenceError, DomainError) as error:
             failure = error
-        except DomainError as error:
-            raise _named(path, error) from error
-    raise _named(path, failure) from failure
-
-
-def _named(path: LoadingPath, error: DomainError | ConvergenceError) -> MemscalError:
-    """Return the error with what it was about."""
+            if isinstance(error, DomainError):
+                break
     problem = (
         f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm with a film of "
         f"{path.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(path.loads):g} N "
-        f"(friction {path.friction:g}, {path.loading} loading): {error.problem}"
+        f"(friction {path.friction:g}, {path.loading} loading): {failure.problem}"
     )
-    return type(error)(problem, why=error.why, cure=error.cure)
+    raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
 
 
 #: Raised where the same request gives other numbers within one version.
@@ -386,10 +328,10 @@ class FamilySetup:
         indenter: Indenter,
         loads: ArrayLike,
         *,
-        reach: float,
-        cache: CacheFolder,
-        workers: int,
-        order: int = 0,
+        reach: float,  # largest distance from the axis at which stresses will be asked for, in m
+        cache: CacheFolder = None,
+        workers: int = 1,
+        order: int = 0,  # one for the shear at the base
     ) -> None:
         # Refused is what is no sphere, no positive load or reach (m), or no number of workers.
         require_workers(workers)
@@ -452,7 +394,10 @@ class FamilySetup:
     ) -> dict[str, FloatArray]:
         """Solve the paths and derive what follows from them: the arrays that are kept."""
         film, sphere = self.film, self.indenter
-        ratios = _poisson_ratios(film)
+        ratios = None
+        if u := film.poisson_ratio_uncertainty:
+            step, nu = max(u, _SMALLEST_STEP), film.poisson_ratio
+            ratios = min(nu + step, 0.5), max(nu - step, 0.0)  # one-sided if incompressible
         # The strength of an interface counts beside a length of film or sphere alone.
         uncertain = film.thickness_uncertainty or sphere.radius_uncertainty
         nominal, strong, *sides = self._solved(paths, (uncertain and stronger) or paths, ratios)
@@ -467,7 +412,7 @@ class FamilySetup:
             strength=(strong["spectra"] - spectra) / math.log(STRONGER),
         )
         if ratios is not None:
-            share = (film.poisson_ratio_uncertainty or 0.0) / (ratios[0] - ratios[1])
+            share = (u or 0.0) / (ratios[0] - ratios[1])
             changes["poisson_ratio"] = (sides[0]["spectra"] - sides[1]["spectra"]) * share
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 

@@ -31,7 +31,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import logsumexp
 
-from memscal.errors import InputError
 from memscal.friction.family import bounded
 from memscal.model.arrays import FloatArray
 
@@ -90,15 +89,11 @@ def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> float:
 def evidence_of_each(
     tables: Sequence[Tables], weights: Sequence[FloatArray]
 ) -> tuple[float, float]:
-    """Return the logarithm of the evidence of a law with one parameter of each load, and its error.
-
-    The parameter of each load is drawn (by a Sobol sequence) given those before; the evidence is
-    the mean over the draws of the product of what each load was expected to be.
-    """
+    """Return the log evidence of a law with one parameter of each load, and its error."""
+    # The parameter of each load is drawn (by a Sobol sequence) given those before; the evidence is
+    # the mean over the draws of the product of what each load was expected to be.
     from scipy.stats.qmc import Sobol
 
-    if not tables or len(tables) != len(weights):
-        raise InputError(f"There are {len(tables)} loads and {len(weights)} priors.")
     tables = _compressed(tables)
     steps = len(tables) - 1
     # Without scrambling the first point is 0: it is moved into the middle of its cell.

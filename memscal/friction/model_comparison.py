@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtrc
@@ -25,7 +26,13 @@ from scipy.special import chdtrc
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
 from memscal.formats.cache import CacheFolder
-from memscal.friction.calculated import LawFamilies
+from memscal.friction.calculated import (
+    amontons_family,
+    contacts_of,
+    family_at_loads,
+    normal_compliance_family,
+    slipping_family,
+)
 from memscal.friction.effective import profile_estimate
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import LoadPoints, Sensor, likelihood, load_points, sensor_of
@@ -103,8 +110,9 @@ def weigh_normal_compliance(measured: Measured) -> LawComparison:
     )
     along = curve(measured, also=np.geomspace(low / 10, high, _DECADES))
     top, least = float(along.log_likelihood[0]), float(along.chi_square[0])
-    rigid = _law("rigid, frictionless", (), top, 0.0, top, least, measured.degrees)
-    yielding = one_of_all("normal compliance, length", along, prior, measured.degrees)
+    degrees, name = measured.degrees, "rigid, frictionless"
+    rigid = InterfaceLaw(name, (), top, top, 0.0, least, degrees, _p_value(degrees, least))
+    yielding = one_of_all("normal compliance, length", along, prior, degrees)
     return LawComparison(
         lubrication="lubricated",
         loads=measured.family.loads,
@@ -177,18 +185,22 @@ def compare_interface(
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)
     wet = [profile for profile in profiles if profile.lubrication == "lubricated"]
     dry = [profile for profile in profiles if profile.lubrication != "lubricated"]
-    calculated = LawFamilies(profiles, cache, workers)
+    contacts = contacts_of(profiles, cache, workers)
     tangential = normal = None
     if dry:
-        elastic = calculated.slipping(dry, macroscopic, macroscopic_uncertainty, slipping)
+        if amontons is not None and tuple(amontons.values[[0, -1]]) != (0.0, math.inf):
+            amontons = None
+        law = partial(slipping_family, macroscopic, macroscopic_uncertainty, **contacts)
+        rigid = family_at_loads(dry, amontons, partial(amontons_family, **contacts))
         tangential = weigh_slip_length(
-            _measured(dry, apparatus, calculated.rigid(dry, amontons)),
-            _measured(dry, apparatus, elastic),
+            _measured(dry, apparatus, rigid),
+            _measured(dry, apparatus, family_at_loads(dry, slipping, law)),
             macroscopic=macroscopic,
             lubrication=dry[0].lubrication,
         )
     if wet:
-        family = calculated.yielding(wet, yielding)
+        law = partial(normal_compliance_family, **contacts)
+        family = family_at_loads(wet, yielding, law)
         normal = weigh_normal_compliance(_measured(wet, apparatus, family))
     messages = tuple(_messages(tangential, normal, macroscopic_uncertainty, dry))
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
@@ -328,7 +340,8 @@ def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> Interf
     """Return the law with one parameter for all loads; degrees are points less nuisances."""
     best, log_evidence = float(along.values[along.best]), along.log_evidence(prior)
     top, least = float(along.log_likelihood[along.best]), float(along.chi_square[along.best])
-    return _law(name, (best,), log_evidence, 0.0, top, least, degrees - 1)
+    p_value = _p_value(degrees - 1, least)
+    return InterfaceLaw(name, (best,), log_evidence, top, 0.0, least, degrees - 1, p_value)
 
 
 def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
@@ -343,20 +356,13 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
     chosen, top, chi_square = _best_of_each(tables, start)
     triples = zip(curves, near, chosen, strict=True)
     best = tuple(float(along.values[nodes][place]) for along, nodes, place in triples)
-    return _law(name, best, log_evidence, error, top, chi_square, degrees - len(curves))
+    left = degrees - len(curves)
+    p_value = _p_value(left, chi_square)
+    return InterfaceLaw(name, best, log_evidence, top, error, chi_square, left, p_value)
 
 
-def _law(
-    name: str,
-    best: tuple[float, ...],
-    log_evidence: float,
-    error: float,
-    top: float,
-    least: float,
-    degrees: int,
-) -> InterfaceLaw:
-    p_value = float(chdtrc(degrees, least)) if degrees > 0 else 1.0
-    return InterfaceLaw(name, best, log_evidence, top, error, least, degrees, p_value)
+def _p_value(degrees: int, least: float) -> float:
+    return float(chdtrc(degrees, least)) if degrees > 0 else 1.0
 
 
 def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int], float, float]:

@@ -247,14 +247,14 @@ def _measure(
     """Return the profile of a scan of one load, with checks and messages of its restoration."""
     signal = one_load.contact_signal(scan, sensor)
     one_load.require_points(scan, signal)
-    prepared = _prepared(scan, sensor, signal)
+    prepared, electronic, noise_estimated = _prepared(scan, sensor, signal)
     try:
-        restored = restore.restore_known(prepared.scan, sensor)
+        restored = restore.restore_known(prepared, sensor)
     except (FitError, InputError) as failure:
         raise _placed(failure, scan) from failure
     one_load.require_ends(scan, signal, restored.centre)
-    profile = one_load.measured_profile(origin, scan, prepared, restored, signal)
-    estimated = prepared.noise_estimated or restored.points.u_errors is None
+    profile = one_load.measured_profile(origin, scan, electronic, restored, signal)
+    estimated = noise_estimated or restored.points.u_errors is None
     noise = profile.points["zz"].noise if estimated else None
     left_out = {_REPLACED, *_OF_STATED_NOISE} if estimated else {_REPLACED}
     checks = [check for check in restored.checks if check.name not in left_out]
@@ -263,7 +263,7 @@ def _measure(
 
 def _prepared(
     scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
-) -> one_load.PreparedScan:
+) -> tuple[Scan, FloatArray, bool]:
     try:
         return one_load.prepared_scan(scan, sensor, signal)
     except (FitError, InputError) as failure:

@@ -117,11 +117,6 @@ class ContactSignal:
         free, stuck = (float(np.interp(distance, self.r, curve)) for curve in self.voltage)
         return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
 
-    def share(self, distance: float) -> float:
-        """Frictionless voltage at a distance (m) over the largest."""
-        free = self.voltage[0]
-        return float(np.interp(distance, self.r, free) / free.max())
-
 
 def contact_signal(scan: Scan, apparatus: ApparatusFunction) -> ContactSignal:
     """Calculate the contacts of a scan's nominal load and near it, or raise a DomainError."""
@@ -190,7 +185,8 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     else:
         axes = [(scan.x, centre[0]), (scan.y, centre[1])]
     ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
-    left = max(signal.share(end) for end in ends)
+    calculated = signal.voltage[0]
+    left = float(np.interp(ends, signal.r, calculated).max() / calculated.max())
     if left > _LARGEST_END:
         raise FitError(
             f"{load_of(scan)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
@@ -207,46 +203,32 @@ _ROUNDS = 2
 _TRIED = np.geomspace(0.02, 2.0, 120)
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedScan:
-    """A scan at one load, and the noise that its voltages have."""
-
-    scan: Scan  # voltages for the nominal load, errors with the scatter of the loads
-    electronic: FloatArray  # noise of each voltage, in V; zero where it is not stated
-    noise_estimated: bool  # whether it was estimated here
-
-
-def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
-    """Bring every point to its nominal load, and state its noise; there has to be a centre."""
+def prepared_scan(
+    scan: Scan, apparatus: ApparatusFunction, signal: ContactSignal
+) -> tuple[Scan, FloatArray, bool]:
+    """Bring every point to its nominal load; return electronic noise, and if it was estimated."""
     # From P_i to P by -dU/d ln P ln(P_i/P); the variance is n_i^2 + (dU/d ln P u(P_i)/P)^2.
-    prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), _stated(scan), False)
+    stated = np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
+    level, electronic, estimated = _at_nominal(scan, np.zeros_like(scan.u_zz)), stated, False
     if scan.normal_load is None:
-        return prepared
+        return level, electronic, estimated
     errors, (x, y) = scan.normal_load_errors, scan.positions
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.load
     for _ in range(_ROUNDS):
-        estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
+        estimate, _ = gaussian_pressure(level, apparatus, measured_points(level))
         distance = np.hypot(x - estimate.centre[0], y - estimate.centre[1])
-        slope = signal.slope(distance, _sticking(estimate, signal))
+        # How far the voltage nearest to the axis is on the way to a contact that sticks.
+        nearest = int(np.argmin(estimate.distance))
+        voltage = float((estimate.predicted - estimate.background)[nearest])
+        sticking = signal.sticking(float(estimate.distance[nearest]), voltage)
+        slope = signal.slope(distance, sticking)
         of_load = np.abs(slope) * load_share
-        electronic, estimated = _stated(scan), False
+        electronic, estimated = stated, False
         if scan.u_zz_errors is None and of_load.any():
-            noise = _noise_of_load(estimate, of_load[np.isfinite(prepared.scan.u_zz)])
+            noise = _noise_of_load(estimate, of_load[np.isfinite(level.u_zz)])
             electronic, estimated = np.full_like(slope, noise), True
-        level = _at_nominal(scan, slope)
-        prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, estimated)
-    return prepared
-
-
-def _sticking(estimate: ProfileEstimate, signal: ContactSignal) -> float:
-    """How far the measured voltage nearest to the axis is on the way to a contact that sticks."""
-    nearest = int(np.argmin(estimate.distance))
-    voltage = float((estimate.predicted - estimate.background)[nearest])
-    return signal.sticking(float(estimate.distance[nearest]), voltage)
-
-
-def _stated(scan: Scan) -> FloatArray:
-    return np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
+        level = _with_noise(_at_nominal(scan, slope), electronic, of_load)
+    return level, electronic, estimated
 
 
 def _at_nominal(scan: Scan, slope: FloatArray) -> Scan:
@@ -305,7 +287,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
 def measured_profile(
     origin: MeasuredScan,
     scan: Scan,
-    prepared: PreparedScan,
+    electronic: FloatArray,
     restored: Restoration,
     signal: ContactSignal,
 ) -> MeasuredProfile:
@@ -346,17 +328,14 @@ def measured_profile(
         contact_radius=signal.contact_radius,
         curve_r=curve_r,
         curve_s_zz=restored.blurred_stress(curve_r),
-        points=_points(scan, prepared, restored),
+        points=_points(scan, electronic, restored),
     )
 
 
-def _points(
-    scan: Scan, prepared: PreparedScan, restored: Restoration
-) -> Mapping[str, MeasuredPoints]:
+def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str, MeasuredPoints]:
     """Return the points of one load by channel, as they were measured."""
     normal = measured_points(scan)
     weight = restored.posterior.estimate.outlier_weight
-    noise = prepared.electronic
     if not noise.any():
         # Only the electronic noise scatters: it is that of the restoration.
         noise = np.full_like(noise, restored.noise.min())

@@ -25,7 +25,7 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,11 +57,9 @@ _LEAST_PRESSURE = 0.1
 
 
 def film_transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
-    """Transform of the base's normal stress under a pressure of unit transform.
-
-    A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
-    on a linear film makes the rod's own base stress.  Other indenters sink less.
-    """
+    """Transform of the base's normal stress under a pressure of unit transform."""
+    # A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
+    # on a linear film makes the rod's own base stress.  Other indenters sink less.
     linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.film, wavenumbers.k))
     if (law := law_at_once(scan)) == LINEAR:
         return linear.values
@@ -265,10 +263,13 @@ def posterior_of(
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
     fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.film)]
-    shares = _shares(fits)
-    mean = _sum_of(shares, [fit.state for fit in fits])
-    gain = _sum_of(shares, [fit.gain for fit in fits])
-    within = _sum_of(shares, [fit.covariance for fit in fits])
+    log_marginal = np.array([fit.log_marginal for fit in fits])
+    weight = np.exp(log_marginal - log_marginal.max())
+    weight[weight < _NEGLIGIBLE] = 0.0
+    shares = np.asarray(weight / weight.sum())
+    mean = np.average([fit.state for fit in fits], axis=0, weights=shares)
+    gain = np.average([fit.gain for fit in fits], axis=0, weights=shares)
+    within = np.average([fit.covariance for fit in fits], axis=0, weights=shares)
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan, model.reference.wavenumbers)
@@ -287,30 +288,21 @@ def posterior_of(
     changes["film"][:nodes] += scan.load * of_film * mean[:nodes, None]
     covariances |= {source: columns @ columns.T for source, columns in changes.items()}
     names = [(fit.shape.exponent, fit.shape.shear) for fit in fits]
-    posterior = Posterior(
+    variance = np.sum([np.diag(covariance)[:nodes] for covariance in covariances.values()], axis=0)
+    gaussian = scan.load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
+    lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
+    resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
+    return Posterior(
         estimate=estimate,
         state=scale * mean,
         covariances=covariances,
         shifts=shifts,
         changes=changes,
-        residual=_sum_of(shares, [fit.residual for fit in fits]),
+        residual=np.average([fit.residual for fit in fits], axis=0, weights=shares),
         found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
         shares=dict(zip(names, shares.tolist(), strict=True)),
-        resolved_wavenumber=0.0,
+        resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
-    return replace(posterior, resolved_wavenumber=_resolved(posterior, scan.load * film))
-
-
-def _sum_of(shares: FloatArray, arrays: Sequence[FloatArray]) -> FloatArray:
-    """Average arrays by their shares."""
-    return np.asarray(sum(share * array for share, array in zip(shares, arrays, strict=True)))
-
-
-def _shares(fits: Sequence[ShapeFit]) -> FloatArray:
-    log_marginal = np.array([fit.log_marginal for fit in fits])
-    weight = np.exp(log_marginal - log_marginal.max())
-    weight[weight < _NEGLIGIBLE] = 0.0
-    return np.asarray(weight / weight.sum())
 
 
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
@@ -354,12 +346,3 @@ def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
         changes = law_sensitivities(scan, linear).values()
         columns += [_per_pressure(scan, linear, change * scan.load) for change in changes]
     return np.stack(columns, axis=1) if columns else np.zeros((wavenumbers.k.size, 0))
-
-
-def _resolved(posterior: Posterior, per_pressure: FloatArray) -> float:
-    estimate, nodes = posterior.estimate, posterior.nodes
-    k = estimate.model.k
-    errors = np.sqrt(np.maximum(np.diag(posterior.covariance)[:nodes], 0.0))
-    lost = errors * _RESOLVED > per_pressure * gaussian_transfer(k, estimate.gaussian.sigma)
-    first = int(np.argmax(lost)) if lost.any() else k.size - 1
-    return float(min(k[first], np.pi / estimate.points.step))

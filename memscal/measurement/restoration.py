@@ -13,6 +13,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
+from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
@@ -64,7 +65,10 @@ def compare_stress(
         )
     estimate, nodes = posterior.estimate, posterior.nodes
     model = estimate.model
-    spectrum = _per_newton(stress, model.k)
+    if isinstance(stress, Contact):
+        spectrum = stress.base_spectrum(model.k) / stress.load
+    else:
+        spectrum = hankel_transform(stress.r, stress.sigma_zz, model.k) / stress.load
     synthesis = model.reference.wavenumbers.synthesise(np.eye(nodes), r)
     calculated = scan.load * (synthesis @ spectrum)
     covariance = synthesis @ posterior.covariance[:nodes, :nodes] @ synthesis.T
@@ -82,12 +86,6 @@ def compare_stress(
         difference=float(apart.max()) / peak,
         within=float(np.mean(apart <= allowed)),
     )
-
-
-def _per_newton(stress: StressProfile | Contact, k: FloatArray) -> FloatArray:
-    if isinstance(stress, Contact):
-        return stress.base_spectrum(k) / stress.load
-    return hankel_transform(stress.r, stress.sigma_zz, k) / stress.load
 
 
 def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[float, int]:
@@ -116,8 +114,6 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
 def read_expected(expected: Expected) -> StressProfile | Contact:
     """Return a stress to compare with, read from its file where it is one."""
     if isinstance(expected, str | PathLike):
-        from memscal.formats.reference import read_reference
-
         return read_reference(expected)
     if isinstance(expected, StressProfile | Contact):
         return expected

@@ -1,6 +1,7 @@
 """Contact of a rigid indenter with a bonded film: tractions, displacements, stress at the base."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, TypeAlias
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from memscal.errors import DomainError, InputError
 from memscal.mechanics.film_response import InterfaceTraction
 from memscal.mechanics.interface import Interface
-from memscal.mechanics.surface import FilmField, MeshedField
+from memscal.mechanics.surface import FilmField
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
@@ -180,12 +181,13 @@ class Contact(Result):
 
     def mesh(self) -> FieldMesh:
         """Return displacement and stress in the whole film, on the mesh of its finite elements."""
-        if isinstance(self.inside, MeshedField):
-            return self.inside.mesh()
-        raise InputError(
-            f'A contact that was solved with backend="{self.backend}" has no mesh.',
-            cure='Press the indenter with backend="fem".',
-        )
+        mesh: Callable[[], FieldMesh] | None = getattr(self.inside, "mesh", None)
+        if mesh is None:
+            raise InputError(
+                f'A contact that was solved with backend="{self.backend}" has no mesh.',
+                cure='Press the indenter with backend="fem".',
+            )
+        return mesh()
 
     def profile(self, r: ArrayLike | None = None) -> StressProfile:
         """Return the stress at the base as a table, such as a calibration divides by.

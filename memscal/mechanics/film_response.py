@@ -293,56 +293,68 @@ class HankelFilm:
         matrices = _displacements(film, (direct[0], *across, direct[1]), layer)
         return surface.SurfaceCompliance(r, *matrices)
 
-    @property
-    def discretisation(self) -> str:
-        """What was discretised, in words."""
-        return "Hankel transforms, Gauss-Legendre in k"
+    discretisation = "Hankel transforms, Gauss-Legendre in k"
 
     def field(self, pressure: FloatArray, shear: FloatArray) -> HankelField:
         """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
         return HankelField(self.film, RingTraction(self.r, pressure, shear))
 
 
+class FieldByOrder:
+    """A film's field by one function for normal (0) and radial (1); see ``memscal.FilmField``."""
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa."""
+        return self._base(r, 0)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa."""
+        return self._base(r, 1)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        """Return the transform of order zero of the normal stress at ``k`` (rad/m), in N."""
+        return self._spectrum(k, 0)
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        """Return the transform of order one of the base shear at ``k`` (rad/m), in N."""
+        return self._spectrum(k, 1)
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m."""
+        return self._surface(r, 0)
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m."""
+        return self._surface(r, 1)
+
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
+        raise NotImplementedError
+
+    _spectrum = _surface = _base
+
+
 @dataclass(frozen=True, eq=False)
-class HankelField:
-    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`."""
+class HankelField(FieldByOrder):
+    """The field in a film under a traction; base stresses below 1e-13 of their peak are zero."""
 
     film: ElasticFilm
     traction: InterfaceTraction
 
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa; zero where it is below 1e-13 of its peak."""
-        return base_stress(self.film, self.traction, r)
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
+        return base_stress(self.film, self.traction, r, order=order)
 
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa."""
-        return base_stress(self.film, self.traction, r, order=1)
+    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=order)
 
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-        return 2 * np.pi * base_spectrum(self.film, self.traction, k)
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=1)
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m, positive into the film."""
-        w_by_p, w_by_q, _, _ = self._surface(r)
-        return np.asarray(w_by_p + w_by_q).reshape(np.shape(r))
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return the radial displacement of the surface in m, positive outward."""
-        _, _, u_by_p, u_by_q = self._surface(r)
-        return np.asarray(u_by_p + u_by_q).reshape(np.shape(r))
-
-    def _surface(self, r: FloatArray) -> HalfSpaceIntegrals:
+    def _surface(self, r: FloatArray, order: int) -> FloatArray:
         x = np.ravel(np.asarray(r, dtype=np.float64))
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
         transforms = traction.pressure_transform(k), traction.shear_transform(k)
         layer = _layer_integrals(self.film, x, (k, weights), transforms)
-        return _displacements(self.film, traction.half_space_integrals(x), layer)
+        displaced = _displacements(self.film, traction.half_space_integrals(x), layer)
+        by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
+        return np.asarray(by_pressure + by_shear).reshape(np.shape(r))
 
 
 _Pair = tuple[FloatArray, FloatArray]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, overload
 
 import numpy as np
@@ -165,20 +166,10 @@ def indent(
 
 def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
     """Return contacts with more and less of each uncertain input, and u over its difference."""
-    film, indenter = contact.film, contact.indenter
-
-    def again(film: ElasticFilm, indenter: Indenter) -> Contact:
-        return indent(
-            film,
-            indenter,
-            load=contact.load,
-            friction=contact.friction,
-            loading=contact.loading or "incremental",
-            backend=contact.backend,
-            interface=contact.interface,
-            strain=contact.strain,
-        )
-
+    film, indenter, load, loading = contact.film, contact.indenter, contact.load, contact.loading
+    names = ("friction", "backend", "interface", "strain")
+    settings: dict[str, Any] = {name: getattr(contact, name) for name in names}
+    again = partial(indent, load=load, loading=loading or "incremental", **settings)
     if abs(again(film, indenter).depth / contact.depth - 1) > max(_SAME, 2 * contact.convergence):
         raise InputError(
             "The contact was not reached by loading alone, or in a film of its own radius.",

@@ -14,12 +14,10 @@ from memscal.model.indenter import Rod, RoundIndenter
 def press_rod(
     film: ElasticFilm, rod: RoundIndenter, load: float, friction: float | None = None
 ) -> Contact:
-    """Press a rod to a load (N) by the film's law, linear where it states none.
-
-    ``friction``: 0 or ``inf``; by default a linear film slides, which changes its base stress by
-    1e-3, and one of another law sticks, which is solved at any depth.  A sphere sinks less: its
-    film is linear.
-    """
+    """Press a rod to a load (N) by the film's law, linear where it states none."""
+    # Friction is 0 or inf; by default a linear film slides, which changes its base stress by 1e-3,
+    # and one of another law sticks, which is solved at any depth.  A sphere sinks less: its film
+    # is linear.
     if film.law in ("", LINEAR) or not isinstance(rod, Rod):
         return indent(film, rod, load=load, friction=friction or 0.0, strain="linear")
     friction = math.inf if friction is None else friction

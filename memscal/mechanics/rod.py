@@ -19,7 +19,7 @@ incompressible).  A sticking compressible film has an oscillating edge, exponent
 :math:`-1/2 \pm i\ln(3-4\nu)/2\pi`: the number of terms is doubled until the base stress settles.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -213,19 +213,16 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
             why=f"The largest change allowed is {_TOLERABLE:g}.",
             cure="Use a narrower rod, a thicker film, or a rod that slides freely (friction 0).",
         )
-    return RodSolution(*fine, change)
+    return replace(fine, convergence=change)
 
 
-_Terms = tuple[float, FloatArray, FloatArray]
-
-
-def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> _Terms:
-    """Return stiffness factor, pressure terms and shear terms of the Galerkin solution."""
+def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> RodSolution:
+    """Return the Galerkin solution, of unknown convergence."""
     matrix = _energy_matrix(ratio, nu, sticking, terms, order)
     solution = np.linalg.solve(matrix, np.eye(1, matrix.shape[0])[0])
     scaled = solution / solution[0]
     scaled.setflags(write=False)
-    return float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:]
+    return RodSolution(float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:], np.nan)
 
 
 def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> FloatArray:
@@ -242,26 +239,21 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
         return matrix
     radial = np.diag(np.pi / (4 * even_orders + 6))
     radial += (odd * (weights * film_response.radial_correction(x, nu))) @ odd.T
-    coupling = film_response.half_space_coupling(nu) * _half_space_coupling_matrix(terms)
+    # Of the half-space: the integral of j_l j_m is sin((l - m) pi/2)/((l - m)(l + m + 1)).
+    apart, both = even_orders[:, None] - even_orders - 1, even_orders[:, None] + even_orders + 1
+    products = np.where(apart % 4 == 1, 1.0, -1.0) / (apart * (both + 1))
+    coupling = film_response.half_space_coupling(nu) * products
     coupling += (even * (weights * film_response.coupling_correction(x, nu))) @ odd.T
     return np.block([[matrix, coupling], [coupling.T, radial]])
 
 
-def _half_space_coupling_matrix(terms: int) -> FloatArray:
-    r"""Return :math:`\int_0^\infty j_l j_{l'}\,d\xi = \sin((l-l')\pi/2)/((l-l')(l+l'+1))`."""
-    even, odd = 2 * np.arange(terms)[:, None], 2 * np.arange(terms)[None, :] + 1
-    sign = np.where((even - odd) % 4 == 1, 1.0, -1.0)
-    return np.asarray(sign / ((even - odd) * (even + odd + 1)), dtype=np.float64)
-
-
-def _largest_change(fine: _Terms, coarse: _Terms, ratio: float, nu: float) -> float:
+def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: float) -> float:
     """Return the relative change of stiffness and of the base stress under the same load."""
     film = ElasticFilm(young_modulus=1.0, poisson_ratio=nu, thickness=1.0)
     r = np.linspace(0.0, ratio + 4.0, 60)
-    tractions = (RodTraction(ratio, 1.0, *terms[1:]) for terms in (fine, coarse))
-    new, old = (base_stress(film, traction, r) for traction in tractions)
+    new, old = (base_stress(film, rod.traction(ratio, 1.0), r) for rod in (fine, coarse))
     by_stress = np.max(np.abs(new - old)) / np.max(np.abs(new))
-    return float(max(by_stress, abs(fine[0] / coarse[0] - 1)))
+    return float(max(by_stress, abs(fine.stiffness_factor / coarse.stiffness_factor - 1)))
 
 
 def _term_scale(count: int) -> FloatArray:

@@ -21,14 +21,13 @@ integrated with nodes that crowd there, others by a plain Gauss rule; both to ab
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprd
 
 from memscal.model.arrays import FloatArray
-from memscal.model.field_mesh import FieldMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +70,11 @@ class FilmField(Protocol):
         """Return the radial displacement of the surface in m, positive outward."""
 
 
-@runtime_checkable
-class MeshedField(Protocol):
-    """A field that was solved on a mesh, and can be shown on it."""
-
-    def mesh(self) -> FieldMesh:
-        """Return displacement and stress on the mesh."""
+def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return quadratic triangles (m, 6) of points (n, 2) with their nodes anticlockwise."""
+    first, second, third = np.moveaxis(points[triangles[:, :3]], 1, 0)
+    (x, y), (u, v) = (second - first).T, (third - first).T
+    return np.where((x * v < u * y)[:, None], triangles[:, [0, 2, 1, 5, 4, 3]], triangles)
 
 
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.

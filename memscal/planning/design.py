@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -139,24 +139,19 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     stress = reference.reference_profile(scan, None)
     points = measured_points(scan)
     references = reference.reference_spectra([stress], [points])
-    estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)
-    solution = solved([scan], [stress], estimate, method, both=False)
-    effects = input_effects([scan], [stress], estimate)
-    return solution, uncertainties(solution, solution.deconvolution, effects, {})
-
-
-def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
-    """Return the estimate from voltages without noise, at the noise that they state."""
-    assert model.points.u_errors is not None
-    weights = np.asarray(1 / model.points.u_errors**2)
+    model = ForwardModel(points, references)
+    assert points.u_errors is not None  # the plan's: the voltages themselves have none
+    weights = np.asarray(1 / points.u_errors**2)
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
     basis = departure_basis(model, fit, weights)
-    count = float(repeats * weights.size)
+    count = float(plan.repeats * weights.size)
     weighed = weigh_departures(model, fit, basis, weights, count, expected_noise=1.0)
     ones = np.ones_like(weights)
     estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, ones, basis)
     require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")
-    return estimate
+    solution = solved([scan], [stress], estimate, method, both=False)
+    effects = input_effects([scan], [stress], estimate)
+    return solution, uncertainties(solution, solution.deconvolution, effects, {})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -273,15 +268,6 @@ _CURES = {
 }
 
 
-class _Search(NamedTuple):
-    """A number to vary: its name, its least and most count, and the plan of a count."""
-
-    name: str
-    least: int
-    most: int
-    plan: Callable[[int], Plan]
-
-
 def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
     """Return the targets by their full names; refuse unknown ones, and those without ``vary``."""
     named = {}
@@ -312,13 +298,13 @@ def least_design(
     plan: Plan, targets: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
 ) -> Design:
     """Find the coarsest step, the shortest range or the fewest repeats that reach the targets."""
-    search = _search(plan, vary)
+    what, fewest, most, planned = _search(plan, vary)
     tried: dict[int, Design | None] = {}
 
     def meets(count: int) -> bool:
         if count not in tried:
             # None where the plan determines nothing, or does not sample G.
-            tried[count], attempt = None, search.plan(count)
+            tried[count], attempt = None, planned(count)
             with suppress(FitError):
                 design = evaluate(attempt)
                 samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
@@ -326,11 +312,11 @@ def least_design(
         found = tried[count]
         return found is not None and all(_met(found, *target) for target in targets.items())
 
-    fails, works = search.least - 1, search.least
+    fails, works = fewest - 1, fewest
     while not meets(works):
-        if works == search.most:
-            raise _out_of_reach(search, targets, [d for d in tried.values() if d is not None])
-        fails, works = works, min(max(works + 1, round(_GROWTH * works)), search.most)
+        if works == most:
+            raise _out_of_reach(what, targets, [d for d in tried.values() if d is not None])
+        fails, works = works, min(max(works + 1, round(_GROWTH * works)), most)
     while works - fails > 1:
         middle = (works + fails) // 2
         fails, works = (fails, middle) if meets(middle) else (middle, works)
@@ -339,19 +325,19 @@ def least_design(
     return least
 
 
-def _search(plan: Plan, vary: str) -> _Search:
+def _search(plan: Plan, vary: str) -> tuple[str, int, int, Callable[[int], Plan]]:
+    """Return what to vary in words, its least and most count, and the plan of a count."""
     step, width, off = plan.step, 2 * plan.half_range, abs(plan.centre)
     if vary == "repeats":
-        return _Search(vary, 1, _MOST_REPEATS, lambda count: replace(plan, repeats=count))
+        return vary, 1, _MOST_REPEATS, lambda count: replace(plan, repeats=count)
     least, most = _FEWEST_POSITIONS, _MOST_POSITIONS
     if vary == "step":
-        return _Search(vary, least, most, lambda count: replace(plan, step=width / (count - 1)))
+        return vary, least, most, lambda count: replace(plan, step=width / (count - 1))
     # The sensor has to lie within.
     least = max(least, int(np.ceil(2 * off / step)) + 1)
     most = max(min(most, int(2 * (off + _FARTHEST * plan.film.thickness) / step) + 1), least)
-    return _Search(
-        "half range", least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
-    )
+    name = "half range"
+    return name, least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
 
 
 def _reached(design: Design, name: str) -> float:
@@ -372,23 +358,23 @@ def _in_words(name: str, value: float) -> str:
     return f"a standard uncertainty of {short} of {value * 100:.3g} %"
 
 
-def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Design]) -> FitError:
+def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) -> FitError:
     """Return the error with the best that can be reached, and its limiting source."""
     if not tried:
         return FitError(
-            f"No {search.name} makes a scan that can be calibrated with.",
+            f"No {what} makes a scan that can be calibrated with.",
             cure="Plan more repeats, less noise, a larger load or a larger half range.",
         )
     name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
-    goal = f"{_in_words(name, targets[name])} is out of reach by the {search.name} alone"
-    length = best.plan.step if search.name == "step" else best.plan.half_range
-    count = f"a {search.name} of {length * 1e3:.4g} mm"
-    if search.name == "repeats":
+    goal, reached = (_in_words(name, value) for value in (targets[name], _reached(best, name)))
+    length = best.plan.step if what == "step" else best.plan.half_range
+    count = f"a {what} of {length * 1e3:.4g} mm"
+    if what == "repeats":
         count = f"{best.plan.repeats} repeats"
-    reached = f"{_in_words(name, _reached(best, name))}, with {count}"
-    problem = f"{goal[0].upper()}{goal[1:]}: the best is {reached}."
+    out_of_reach = f"is out of reach by the {what} alone: the best is {reached}"
+    problem = f"{goal[0].upper()}{goal[1:]} {out_of_reach}, with {count}."
     if name == "resolved_wavenumber":
         step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
         if best.resolved_wavenumber >= 0.99 * sampled:

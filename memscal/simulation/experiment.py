@@ -25,38 +25,26 @@ _SPREAD = 2.0
 _LEAST_SPREAD = 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class LoadPath:
-    """Contacts at several nominal loads, with neighbours where their loads scatter."""
-
-    states: Sequence[Sequence[Contact]]  # at each nominal load one contact, or three
-    spread: float  # their distance in ln P
-
-    def near(
-        self, i: int, kernel: RadialKernel, radius: FloatArray, ratio: FloatArray, order: int = 0
-    ) -> FloatArray:
-        """Return the blurred stress (Pa) at ``radius`` (m); ``ratio``: load over nominal."""
-        # Of order one: the radial component of the shear.
-        values = rod_scan.blurred_stress(self.states[i], kernel, radius, order=order)
-        if len(values) == 1:
-            return np.asarray(values[0])
-        below, middle, above = values
-        t = np.log(ratio)  # the stress is a parabola in it
-        slope = (above - below) / (2 * self.spread)
-        bend = (above - 2 * middle + below) / self.spread**2
-        return np.asarray(middle + slope * t + 0.5 * bend * t**2)
-
-
-def pressed_path(
+def _pressed(
     solve: Callable[[FloatArray], list[Contact]], loads: FloatArray, scatter: float
-) -> LoadPath:
-    """Solve the contacts at the loads (N) that scatter by a relative standard deviation."""
+) -> tuple[list[list[Contact]], float]:
+    """Return one contact at each load (N), or three where loads scatter, and their step in ln P."""
     spread = max(_SPREAD * scatter, _LEAST_SPREAD) if scatter > 0 else 0.0
     around = np.exp(spread * np.arange(-1, 2)) if scatter > 0 else np.ones(1)
     path, place = np.unique(np.multiply.outer(loads, around), return_inverse=True)
     solved = solve(path)
     rows = np.reshape(place, (loads.size, around.size))
-    return LoadPath([[solved[i] for i in row] for row in rows], spread)
+    return [[solved[i] for i in row] for row in rows], spread
+
+
+def _at_load(stresses: FloatArray, spread: float, ratio: FloatArray) -> FloatArray:
+    """Return the stress at loads ``ratio`` over nominal, by the parabola in ln P through three."""
+    if len(stresses) == 1:
+        return np.asarray(stresses[0])
+    below, middle, above = stresses
+    t, slope = np.log(ratio), (above - below) / (2 * spread)
+    bend = (above - 2 * middle + below) / spread**2
+    return np.asarray(middle + slope * t + 0.5 * bend * t**2)
 
 
 #: The paper's sphere and its loads in N; the uncertainty of the radius is a plausible one.
@@ -98,12 +86,8 @@ def simulate_contacts(
     lubricant: str = "",
     seed: int = 0,
 ) -> Scan:
-    r"""Simulate a line scan of contacts of a sphere, each pressed anew at its place.
-
-    Contact i has a load and a distance from the sensor of its own: :math:`U_i = A\,(G \otimes
-    \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i` with offset, drift and noise.  Arguments are those
-    of :func:`memscal.simulate_experiment`; ``load_scale``: all true loads over the stated ones.
-    """
+    """Simulate a line scan of contacts of a sphere, each pressed anew with a load of its own."""
+    # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
     loads = checked_loads(load)
     if np.unique(loads).size != loads.size:
         raise InputError(
@@ -131,23 +115,35 @@ def simulate_contacts(
     interface, truth = interface or Interface(), rod_scan.apparatus_function(kernel)
     shear = rod_scan.shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
-    path = pressed_path(
+    states, spread = _pressed(
         lambda at: indent(film, sphere, load=at, strain="linear", **law),
         load_scale * loads,
         load_scatter,
     )
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)
-    draws = _draw(row.size, points, seed)
+    # Standard normal numbers for each source of error, from streams of their own.
+    sources = ("noise", "load", "position", "reading")
+    streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(len(sources)))
+    normal = (stream.standard_normal((row.size, points)) for stream in streams)
+    draws = dict(zip(sources, normal, strict=True))
     ratio = 1 + load_scatter * draws["load"]
     along = x + position_error * draws["position"] - centre[0]
     away = np.hypot(along, centre[1])
-    at_nominal = [state[len(state) // 2] for state in path.states]
+
+    def blurred(kernel: RadialKernel, order: int = 0) -> FloatArray:
+        at_states = [
+            rod_scan.blurred_stress(states[j], kernel, away[i], order=order)
+            for i, j in enumerate(row)
+        ]
+        pairs = zip(at_states, ratio, strict=True)
+        return np.stack([_at_load(stresses, spread, of_row) for stresses, of_row in pairs])
+
+    at_nominal = [state[len(state) // 2] for state in states]
     nominal = rod_scan.blurred_stress(at_nominal, truth, np.hypot(x - centre[0], centre[1]))
     largest = conversion_constant * float(nominal.max())
-    signal = np.stack([path.near(int(j), truth, away[i], ratio[i]) for i, j in enumerate(row)])
     added = rod_scan.disturbance(x, baseline, drift) + noise * draws["noise"]
-    u = conversion_constant * signal + largest * added
+    u = conversion_constant * blurred(truth) + largest * added
     stated = np.broadcast_to(loads[row, None], u.shape)
     unsure = load_scatter
     if record_loads:
@@ -157,10 +153,7 @@ def simulate_contacts(
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:
-        blurred = [
-            path.near(int(j), shear.kernel, away[i], ratio[i], order=1) for i, j in enumerate(row)
-        ]
-        sheared = np.stack(blurred) * shear.side(along, away)
+        sheared = blurred(shear.kernel, order=1) * shear.side(along, away)
         channel_data, shear_truth = shear.recorded(sheared.reshape(shape), x, disturbed)
     return Scan(
         x=x,
@@ -204,16 +197,6 @@ def _described_film(film: ElasticFilm) -> dict[str, float]:
     """Return what of a film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
     return {name: float(getattr(film, name)) for name in names}
-
-
-def _draw(rows: int, points: int, seed: int) -> dict[str, FloatArray]:
-    """Return standard normal numbers for each source of error, from streams of their own."""
-    sources = ("noise", "load", "position", "reading")
-    streams = np.random.SeedSequence(seed).spawn(len(sources))
-    return {
-        name: np.random.default_rng(stream).standard_normal((rows, points))
-        for name, stream in zip(sources, streams, strict=True)
-    }
 
 
 def _described(interface: Interface) -> dict[str, float | str]:

@@ -109,11 +109,9 @@ _OF_ONE_SCAN = {"noise", "load_scatter", "position"}
 
 
 def correlated(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
-    """Return the coefficients of all loads that have a standard uncertainty, by what they are of.
-
-    Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
-    is common to them; each source moves all coefficients to the same side.
-    """
+    """Return the coefficients of all loads that have a standard uncertainty, by their names."""
+    # Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
+    # is common to them; each source moves all coefficients to the same side.
     joint = [entry for entry in _joint(comparison) if entry[2].standard_uncertainty is not None]
     if not joint:
         raise InputError(
@@ -428,17 +426,13 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
         return Table("", ("", ""), [])
     value, u = comparison.macroscopic
     title = f"Beside the macroscopic friction coefficient, {format_measured(value, u)}"
-    rows = [
-        [_which(lubrication, loading), str(joint), _against(joint, value)]
-        for lubrication, loading, joint in _joint(comparison)
-    ]
+    rows = []
+    for lubrication, loading, joint in _joint(comparison):
+        side = "below" if value < joint.interval.low else "above"
+        place = "within" if joint.interval.holds(value) else side
+        interval = f"{place} the {percent(joint.interval.level)} interval"
+        rows.append([_which(lubrication, loading), str(joint), interval])
     return Table(title, ["all loads of", "effective coefficient", "macroscopic one"], rows)
-
-
-def _against(joint: BoundedEstimate, value: float) -> str:
-    side = "below" if value < joint.interval.low else "above"
-    place = "within" if joint.interval.holds(value) else side
-    return f"{place} the {percent(joint.interval.level)} interval"
 
 
 def _checks_table(checks: Sequence[QualityCheck]) -> Table:

@@ -152,11 +152,9 @@ def frame(contact: Contact) -> declared.DataFrame:
 
 
 def correlated(contact: Contact) -> dict[str, Any]:
-    """Return depth, radii and largest base stress at the exact load, as correlated numbers.
-
-    They vary with the stated uncertainties of film and indenter; the change under refinement is
-    taken as a further standard uncertainty of each.
-    """
+    """Return depth, radii and largest base stress at the exact load, as correlated numbers."""
+    # They vary with the stated uncertainties of film and indenter; the change under refinement is
+    # taken as a further standard uncertainty of each.
     names = ["depth", "contact_radius", "stick_radius", "max_base_stress"]
 
     def numbers(contact: Contact) -> FloatArray:

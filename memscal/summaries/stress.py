@@ -16,6 +16,7 @@ _QUANTITIES = by_name(records.STRESS_PROFILE.quantities) | _NUMBERS
 _POINTS = ("r", "x", "y", "s_zz", "s_zz_errors")
 _SCALARS = tuple(name for name in _NUMBERS if not name.startswith("centre"))
 _IN_JSON = [q for name, q in _NUMBERS.items() if not name.startswith("centre_y")]
+_IN_JSON += [records.FORCE_BUDGET, records.MAXIMUM_BUDGET]
 _POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors")]
 
 
@@ -23,7 +24,14 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
     """Return the object of ``apply --json`` without its files; the contract fixes its form."""
     return {
         **declared.members(records.APPLIED, stress, **_force_over_load(stress)),
-        "profiles": [_profile_json(profile) for profile in stress.profiles],
+        "profiles": [
+            {
+                "scan": getattr(profile.scan.source, "file_name", None),
+                **declared.members(_IN_JSON, profile, **_centre(profile)),
+                "stress": declared.members(_POINTS_IN_JSON, profile),
+            }
+            for profile in stress.profiles
+        ],
         "overridden": list(stress.overridden),
         "checks": checks_json(stress.checks),
         "warnings": texts_of(stress.messages),
@@ -33,16 +41,6 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
 def _force_over_load(stress: MeasuredStress) -> dict[str, Any]:
     ratio, u = pooled_force(stress.profiles)
     return {"force_over_load": ratio, "force_over_load_uncertainty": u}
-
-
-def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
-    return {
-        "scan": getattr(profile.scan.source, "file_name", None),
-        **declared.members(
-            [*_IN_JSON, records.FORCE_BUDGET, records.MAXIMUM_BUDGET], profile, **_centre(profile)
-        ),
-        "stress": declared.members(_POINTS_IN_JSON, profile),
-    }
 
 
 def _centre(profile: MeasuredProfile) -> dict[str, Any]:
@@ -74,16 +72,13 @@ def tables(stress: MeasuredStress) -> list[Table]:
     # What checks all profiles, the force of each, and what failed.
     kinds = ("applied_force", "applied_force_all")
     checks_shown = [check for check in stress.checks if check.kind in kinds or not check.passed]
-    common = Table("All profiles", ("", ""), _common_rows(stress))
-    return [Table(title, head, rows, frozenset(marked)), common, checks_table(checks_shown)]
-
-
-def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
     ratio = _force_over_load(stress)
     numbers = [(q.words, declared.cell(q, stress, **ratio)) for q in records.APPLIED[::2]]
     points = sum(profile.r.size for profile in stress.profiles)
     farthest = max(float(profile.r[-1]) for profile in stress.profiles)
-    return [*numbers, ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")]
+    places = ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")
+    common = Table("All profiles", ("", ""), [*numbers, places])
+    return [Table(title, head, rows, frozenset(marked)), common, checks_table(checks_shown)]
 
 
 def dataset(stress: MeasuredStress) -> declared.Dataset:
@@ -118,11 +113,8 @@ def frame(stress: MeasuredStress) -> declared.DataFrame:
 
 
 def correlated(stress: MeasuredStress) -> dict[str, Any]:
-    """Return force, maximum, centre and baseline of each profile, numbered from one.
-
-    Forces are correlated by the sources that profiles share, as in the check of all forces.  No
-    other covariance is known: all other pairs are taken as independent.
-    """
+    """Return force, maximum, centre and baseline of each profile, numbered from one."""
+    # Forces are correlated by the sources that profiles share; no other covariance is known.
     names, values, spread = [], [], []
     for i, profile in enumerate(stress.profiles, start=1):
         numbers = {

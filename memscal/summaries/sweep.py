@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from memscal.calibration.sweep import Sweep
-from memscal.model.arrays import FloatArray
 from memscal.model.quantities import ESTIMATED, MM, MV, Quantity
 from memscal.summaries.declared import Dataset, plain, power_of_ten
 from memscal.summaries.table import Table
@@ -27,7 +26,9 @@ def tables(result: Sweep) -> list[Table]:
         values = getattr(result, quantity.name) / scale
         columns.append([_number(value, form) for value in values])
     for (_, name), scale, form in zip(_RESULTS, scales, forms, strict=True):
-        columns.append([_median(draws / scale, form) for draws in getattr(result, name)])
+        drawn = (draws[np.isfinite(draws)] for draws in getattr(result, name))
+        medians = [float(np.median(draws)) if draws.size else np.nan for draws in drawn]
+        columns.append([_number(median / scale, form) for median in medians])
     title = (
         "Dependence on the noise amplitude (1 is the rule's choice): the expectation, and the "
         f"median of {result.seed_relative_rms.shape[1]} draws"
@@ -60,11 +61,6 @@ def dataset(result: Sweep) -> Dataset:
         variables[quantity.name] = (axes[:1], getattr(result, quantity.name), attributes)
         variables[draws] = (axes, getattr(result, draws), attributes)
     return xarray.Dataset(variables)
-
-
-def _median(values: FloatArray, form: str) -> str:
-    numbers = values[np.isfinite(values)]
-    return _number(float(np.median(numbers)), form) if numbers.size else "-"
 
 
 def _number(value: float, form: str) -> str:

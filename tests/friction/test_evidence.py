@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from memscal.errors import InputError
 from memscal.friction.marginal_likelihood import (
     Prior,
     Tables,
@@ -115,11 +114,6 @@ def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, lo
 def test_one_parameter_is_integrated_over_its_prior() -> None:
     found = evidence_of_one(-(np.linspace(-8, 8, 161) ** 2) / 2, np.full(161, 0.1 / 16))
     assert found == pytest.approx(LOG_2PI / 2 - np.log(16))
-
-
-def test_every_load_needs_its_prior() -> None:
-    with pytest.raises(InputError, match="2 priors"):
-        evidence_of_each([], [np.ones(1), np.ones(1)])
 
 
 def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence() -> None:

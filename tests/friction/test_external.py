@@ -14,6 +14,7 @@ from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family, external_family
 
 FRICTIONS = (0.0, 0.3, math.inf)
+CONTACT = {"film": FILM, "indenter": SPHERE, "reach": REACH}
 
 
 def tables(loading: str = "incremental") -> list[StressProfile]:
@@ -24,18 +25,10 @@ def tables(loading: str = "incremental") -> list[StressProfile]:
     ]
 
 
-def bare(profile: StressProfile) -> StressProfile:
-    """The table as another program may give it: numbers, load and friction."""
-    return StressProfile(
-        r=profile.r, sigma_zz=profile.sigma_zz, load=profile.load,
-        friction_coefficient=profile.friction_coefficient,
-    )  # fmt: skip
-
-
 def test_tables_of_our_own_contacts_give_our_own_family() -> None:
     film = replace(FILM, thickness_uncertainty=2e-5)
     ours = amontons_family(film, SPHERE, LOADS, friction=FRICTIONS, reach=REACH)
-    family = external_family(tables(), LOADS, reach=REACH, film=film)
+    family = external_family(tables(), LOADS, **(CONTACT | {"film": film}))
     assert family.name == "external"
     assert family.loading == "incremental"
     assert family.values.tolist() == list(FRICTIONS)
@@ -48,41 +41,29 @@ def test_tables_of_our_own_contacts_give_our_own_family() -> None:
 
 def test_a_table_serves_a_load_within_one_percent_in_proportion() -> None:
     asked = [load * 1.008 for load in LOADS]
-    exact = external_family(tables(), LOADS, reach=REACH)
-    family = external_family(tables(), asked, reach=REACH)
+    exact = external_family(tables(), LOADS, **CONTACT)
+    family = external_family(tables(), asked, **CONTACT)
     np.testing.assert_allclose(family.spectra, 1.008 * exact.spectra, rtol=1e-12)
     assert family.loads.tolist() == asked
-    turned = external_family(tables()[::-1], asked, reach=REACH)
+    turned = external_family(tables()[::-1], asked, **CONTACT)
     assert_same_to_rounding(turned.spectra, family.spectra)
-
-
-def test_tables_that_say_nothing_of_film_and_sphere_count_as_proportional() -> None:
-    family = external_family([bare(one) for one in tables()], LOADS, reach=REACH)
-    ours = external_family(tables(), LOADS, reach=REACH)
-    assert_same_to_rounding(family.by_load, family.spectra)
-    assert dict(family.changes) == {}
-    assert "No film" in family.notes[0]
-    assert np.all(np.isnan(family.depths))
-    r = np.linspace(0.0, 8e-3, 30)
-    stress, truth = (one.wavenumbers.synthesise(one.spectra[1, 0], r) for one in (family, ours))
-    np.testing.assert_allclose(stress, truth, atol=1e-3 * truth.max())
 
 
 def test_every_missing_table_is_named() -> None:
     given = [one for one in tables() if (one.load, one.friction_coefficient) != (2.75, 0.3)]
     with pytest.raises(InputError, match=r"No table was given for 2\.75 N with friction 0\.3\."):
-        external_family(given, LOADS, reach=REACH)
+        external_family(given, LOADS, **CONTACT)
     with pytest.raises(InputError, match=r"1 N with friction 0; 1 N with friction 0\.3; 1 N"):
-        external_family(tables(), [0.34, 1.0], reach=REACH)
+        external_family(tables(), [0.34, 1.0], **CONTACT)
 
 
 def test_tables_that_contradict_each_other_are_refused() -> None:
     with pytest.raises(InputError, match="both for"):
-        external_family([*tables(), tables()[0]], LOADS, reach=REACH)
+        external_family([*tables(), tables()[0]], LOADS, **CONTACT)
     with pytest.raises(InputError, match="one loading"):
-        external_family([*tables()[:-2], *tables("total")[-2:]], LOADS, reach=REACH)
+        external_family([*tables()[:-2], *tables("total")[-2:]], LOADS, **CONTACT)
     with pytest.raises(InputError, match="No table"):
-        external_family([], LOADS, reach=REACH)
+        external_family([], LOADS, **CONTACT)
 
 
 def test_a_table_that_cannot_be_compared_is_refused() -> None:
@@ -94,4 +75,4 @@ def test_a_table_that_cannot_be_compared_is_refused() -> None:
         (replace(one, sigma_zz=one.sigma_zz * 1.1), "carries"),
     ):
         with pytest.raises(InputError, match=said):
-            external_family([changed], [one.load], reach=REACH)
+            external_family([changed], [one.load], **CONTACT)

@@ -2,7 +2,6 @@
 
 import math
 import pickle
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,13 +94,3 @@ def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
     assert turned.loads.tolist() == [1.0, 0.5]
     assert_same_to_rounding(turned.at(0.2).spectra, one.at(0.2).spectra[:, ::-1])
     assert_same_to_rounding(turned.changes["thickness"], one.changes["thickness"][:, ::-1])
-
-
-@pytest.mark.parametrize(("name", "value"), [
-    ("values", np.array([0.0, 0.3, 0.1, 1.0, 2.0])),
-    ("values", np.array([-0.1, 0.0, 0.1, 1.0, 2.0])), ("spectra", np.ones((5, 2, 3))),
-    ("changes", {"thickness": np.ones((5, 1, 3))}), ("depths", np.ones((2, 5))), ("scale", 0.0),
-])  # fmt: skip
-def test_what_does_not_fit_together_is_refused(name: str, value: object) -> None:
-    with pytest.raises(InputError):
-        replace(family(), **{name: value})

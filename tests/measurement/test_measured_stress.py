@@ -87,8 +87,8 @@ def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum()
 def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
     parts = single_loads(made.contact_scan(2))
     for profile, part in zip(made.measured(2).profiles, parts, strict=True):
-        prepared = prepared_scan(part, SENSOR, contact_signal(part, SENSOR))
-        found, a = restore_known(prepared.scan, SENSOR), made.CONVERSION
+        prepared, *_ = prepared_scan(part, SENSOR, contact_signal(part, SENSOR))
+        found, a = restore_known(prepared, SENSOR), made.CONVERSION
         nodes = found.posterior.nodes
         sigma = found.posterior.covariance[nodes:, nodes:]
         # Columns by differences: a shifted centre moves every point on the blurred profile.

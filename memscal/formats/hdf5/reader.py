@@ -108,14 +108,27 @@ class SafeFile:
         """Return the numbers at a path: 64-bit floats, or 64-bit integers where stored so."""
         if path not in self._arrays:
             with damage_named(f"{self.where(path)} cannot be read"):
-                self._arrays[path] = self._read_array(path)
+                dataset = self._dataset(path)
+                limits.check_layout(self.where(path), dataset, text=False)
+                self._spend(path, limits.claimed_bytes(dataset))
+                whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
+                values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
+                dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
+                values.setflags(write=False)
+                self._arrays[path] = values
         return self._arrays[path]
 
     def text(self, path: str) -> str:
         """Return the text at a path, without characters that do not print."""
         if path not in self._texts:
             with damage_named(f"{self.where(path)} cannot be read"):
-                self._texts[path] = self._read_text(path)
+                dataset = self._dataset(path)
+                limits.check_layout(self.where(path), dataset, text=True)
+                self._spend(path, limits.claimed_bytes(dataset))
+                if dataset.get_type().is_variable_str():
+                    offset = dataset.get_offset() or -1
+                    self._check_length(path, limits.text_length(self._data, offset))
+                self._texts[path] = printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
         return self._texts[path]
 
     def is_text(self, path: str) -> bool:
@@ -179,24 +192,6 @@ class SafeFile:
                 f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is.",
             )
         self._spend(path, length)
-
-    def _read_array(self, path: str) -> np.ndarray[Any, Any]:
-        dataset = self._dataset(path)
-        limits.check_layout(self.where(path), dataset, text=False)
-        self._spend(path, limits.claimed_bytes(dataset))
-        whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
-        values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
-        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
-        values.setflags(write=False)
-        return values
-
-    def _read_text(self, path: str) -> str:
-        dataset = self._dataset(path)
-        limits.check_layout(self.where(path), dataset, text=True)
-        self._spend(path, limits.claimed_bytes(dataset))
-        if dataset.get_type().is_variable_str():
-            self._check_length(path, limits.text_length(self._data, dataset.get_offset() or -1))
-        return printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
 
     def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
         item = self._open(path)

@@ -126,30 +126,23 @@ def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
             yield f"{path}/{name}", child
 
 
-# Path, value (None for a group) and attributes.
-DigestItem = tuple[str, "np.ndarray[Any, Any] | str | None", Mapping[str, Any]]
+# Path, value (None for a group) or node, and attributes.
+DigestItem = tuple[str, "np.ndarray[Any, Any] | str | Node | None", Mapping[str, Any]]
 
 
 def content_digest(items: Iterable[DigestItem]) -> str:
-    """Return the SHA-256 over paths, values and attributes, as hexadecimal text.
-
-    It shows accidents and careless edits; it is not a signature.
-    """
+    """Return the SHA-256 over paths, values and attributes: it shows accidents, no forgery."""
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
-        plain = {name: _plain(attribute) for name, attribute in attributes.items()}
+        plain = {
+            name: printable(value, len(value)) if isinstance(value, str) else value
+            for name, value in attributes.items()
+        }
         item = [path, kind, shape, plain, hashlib.sha256(data).hexdigest()]
         line = json.dumps(item, sort_keys=True, separators=(",", ":"))
         total.update(line.encode("ascii") + b"\n")
     return total.hexdigest()
-
-
-def tree_items(root: Group) -> Iterable[DigestItem]:
-    """Yield what :func:`content_digest` needs from a tree that is about to be written."""
-    for path, node in sorted(walk(root), key=lambda item: item[0]):
-        value = node.values if isinstance(node, Number) else node
-        yield path, None if isinstance(value, Group) else value, _attributes(node)
 
 
 def _attributes(node: Node) -> dict[str, Any]:
@@ -161,25 +154,23 @@ def _attributes(node: Node) -> dict[str, Any]:
 
 
 def _canonical(value: Any) -> tuple[str, list[int], bytes]:
-    if value is None:
+    if value is None or isinstance(value, Group):
         return "group", [], b""
     if isinstance(value, str):
-        return "text", [], printable(value, len(value)).encode("utf-8", "replace")
+        return "text", [], _plain_text(value)
+    value = value.values if isinstance(value, Number) else value
     kind = "integer" if value.dtype.kind in "iu" else "float"
     stored = np.ascontiguousarray(value, dtype="<i8" if kind == "integer" else "<f8")
     return kind, list(value.shape), stored.tobytes()
 
 
-def _plain(attribute: Any) -> Any:
-    if isinstance(attribute, str):
-        return printable(attribute, len(attribute))
-    return list(attribute) if isinstance(attribute, tuple) else attribute
-
-
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _CONTENTS = "Every path that was written, with its attributes; memscal_content_sha256 covers them."
+# Of variable length in UTF-8, as most programs write it.
+_TEXT = h5py.string_dtype("utf-8")
 # Below this a chunked and compressed dataset is larger than a plain one.
 _COMPRESS_ABOVE = 4096
+_COMPRESSION = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
 
 
 def file_tree(schema: str, entry: Group) -> Group:
@@ -190,7 +181,8 @@ def file_tree(schema: str, entry: Group) -> Group:
     # The list names itself, so it is made once with a place for itself and once in full.
     contents = {path: sorted(_attributes(node)) for path, node in walk(listed)}
     listed = _with_contents(root, to_json("contents", contents))
-    digest = content_digest(tree_items(listed))
+    nodes = sorted(walk(listed), key=lambda item: item[0])
+    digest = content_digest((path, node, _attributes(node)) for path, node in nodes)
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
 
 
@@ -217,7 +209,7 @@ def tree_to_bytes(root: Group) -> bytes:
                 _write_number(file, path, node)
             else:
                 text = _plain_text(node)
-                file.create_dataset(path, data=text, dtype=_text_type(), track_times=False)
+                file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
         _attach_scales(file, root)
     return memory.getvalue()
 
@@ -231,10 +223,8 @@ def _with_contents(root: Group, text: str) -> Group:
 
 
 def _write_number(file: Any, path: str, node: Number) -> None:
-    storage: dict[str, Any] = {}
-    if node.values.nbytes > _COMPRESS_ABOVE:
-        storage = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
-    dataset = file.create_dataset(path, data=node.values, track_times=False, **storage)
+    compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
+    dataset = file.create_dataset(path, data=node.values, track_times=False, **compressed)
     for name, value in _attributes(node).items():
         _write_attribute(dataset, name, value)
 
@@ -244,14 +234,9 @@ def _write_attribute(item: Any, name: str, value: Attribute) -> None:
         item.attrs.create(name, value, dtype=np.int64)
     elif isinstance(value, tuple):
         texts = [_plain_text(text) for text in value]
-        item.attrs.create(name, np.array(texts, dtype=object), dtype=_text_type())
+        item.attrs.create(name, np.array(texts, dtype=object), dtype=_TEXT)
     else:
-        item.attrs.create(name, _plain_text(value), dtype=_text_type())
-
-
-def _text_type() -> Any:
-    """Text of variable length in UTF-8, as most programs write it."""
-    return h5py.string_dtype("utf-8")
+        item.attrs.create(name, _plain_text(value), dtype=_TEXT)
 
 
 def _plain_text(text: str) -> bytes:

@@ -179,17 +179,14 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh and its fields as stored: ``points`` (n, 3), ``point_data`` (n, components).
+    """A mesh and its fields as stored."""
 
-    ``tensor_order``: whether six components are known to be a tensor's in VTK's order.
-    """
-
-    points: FloatArray
+    points: FloatArray  # (n, 3)
     cells: tuple[Cells, ...]
-    point_data: dict[str, FloatArray]
+    point_data: dict[str, FloatArray]  # (n, components)
     sources: tuple[SourceFile, ...]
     notes: tuple[str, ...]
-    tensor_order: bool
+    tensor_order: bool  # whether six components are known to be a tensor's in VTK's order
 
     @property
     def source(self) -> SourceFile:
@@ -206,11 +203,6 @@ class Mesh:
     def used(self) -> NDArray[np.int64]:
         """The nodes that belong to the body."""
         return np.unique(np.concatenate([block.nodes.ravel() for block in self.solid]))
-
-    @property
-    def size(self) -> str:
-        """Numbers of nodes and cells, in words."""
-        return f"{len(self.points)} nodes, {sum(len(block.nodes) for block in self.solid)} cells"
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -316,10 +308,8 @@ def _unusable(source: SourceFile, content: str) -> FormatError:
 
 
 def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write displacement and stress on a mesh as a VTU file, whole or not at all.
-
-    x is the radius and y the height, in mm; ``stress_Pa`` is in VTK's order, tension positive.
-    """
+    """Write displacement and stress on a mesh as a VTU file, whole or not at all."""
+    # x is the radius and y the height, in mm; stress_Pa is in VTK's order, tension positive.
     _require_meshio()
     import meshio
 

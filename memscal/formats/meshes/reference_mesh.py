@@ -124,10 +124,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
 def average_over_circles(
     places: FloatArray, columns: dict[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], str]:
-    """Interpolate between places (n, 2), in m from the axis, and average over circles.
-
-    Circles of which less than half as much is inside as of others are left out: the corners.
-    """
+    """Interpolate between places (n, 2), in m from the axis, and average over circles."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
 
@@ -147,6 +144,7 @@ def average_over_circles(
             "The nodes on the base of the film lie on one line.",
             cure="Name the axis across the film (vertical; --vertical).",
         ) from error
+    # Circles of which less than half as much is inside as of others are left out: the corners.
     inside = np.isfinite(next(iter(fields.values())))
     share = inside.sum(axis=1)
     kept = share >= max(1, share.max() / 2)
@@ -242,19 +240,12 @@ def _no_such_field(
         more = len(fields) - len(names)
         return f"{where}: " + ", ".join(names) + (f" and {more} more" if more else "")
 
-    lists = [
-        listed(fields, where)
-        for fields, where in ((points, "at the nodes"), (cells, "in the cells"))
-        if fields
-    ]
-    has = (
-        f"It has, with their numbers of components, {'; '.join(lists)}."
-        if lists
-        else ("It has no fields at all.")
-    )
+    places = {"at the nodes": points, "in the cells": cells}
+    lists = "; ".join(listed(fields, where) for where, fields in places.items() if fields)
+    has = f"has, with their numbers of components, {lists}" if lists else "has no fields at all"
     return InputError(
         f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
-        why=has,
+        why=f"It {has}.",
         cure="Give the name of the stress among them, or save the mesh with its stress.",
     )
 
@@ -308,6 +299,7 @@ def read_reference_mesh(
         values = _at_base(mesh, frame, footing, tangential)[1]
         columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
         notes.append(_component_note(tangential, "Radial shear", f"times {turned}"))
+    size = f"{len(mesh.points)} nodes, {sum(len(block.nodes) for block in mesh.solid)} cells"
     samples = reference.Samples(
         columns=columns,
         source=mesh.source,
@@ -317,7 +309,7 @@ def read_reference_mesh(
         units=(r_unit, sigma_unit),
         sign=sign,
         spacing=frame.tolerance,
-        discretisation=f"{mesh.size}, {len(footing.nodes)} nodes on the base",
+        discretisation=f"{size}, {len(footing.nodes)} nodes on the base",
     )
     samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
     return reference.profile_of(samples, stated)

@@ -33,7 +33,8 @@ from scipy.sparse import block_array, csc_array, csr_array
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
-from memscal.mechanics.surface import SurfaceCompliance
+from memscal.mechanics.film_response import FieldByOrder
+from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
@@ -143,13 +144,6 @@ class MixedSystem:
         return skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP4()), intorder=_QUADRATURE)
 
     @cached_property
-    def pressure(self) -> Any:
-        """Basis of the mean pressure."""
-        import skfem
-
-        return self.displacement.with_element(skfem.ElementTriP3())
-
-    @cached_property
     def matrix(self) -> csr_array:
         """All equations, symmetric: those of the displacement, then those of the pressure."""
         import skfem
@@ -175,8 +169,9 @@ class MixedSystem:
         def compression(p: Any, q: Any, w: Any) -> Any:
             return -softness * p * q * w.x[0]
 
-        coupled = squeeze.assemble(self.displacement, self.pressure)
-        stiff, soft = distortion.assemble(self.displacement), compression.assemble(self.pressure)
+        pressure = self.displacement.with_element(skfem.ElementTriP3())
+        coupled = squeeze.assemble(self.displacement, pressure)
+        stiff, soft = distortion.assemble(self.displacement), compression.assemble(pressure)
         return csr_array(block_array([[stiff, coupled.T], [coupled, soft]]))
 
     @cached_property
@@ -235,11 +230,11 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     index = index.reshape(inward.shape)
     # The displacement's gradient and the mean pressure at the nodes of every triangle.
     basis = system.displacement
-    points = (local.T, np.ones(local.shape[0]))
-    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=points)
+    rule = (local.T, np.ones(local.shape[0]))
+    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=rule)
     moved, pressed = np.split(solution, [basis.N])
     gradient = at_nodes.interpolate(moved).grad
-    squeeze = np.asarray(at_nodes.with_element(system.pressure.elem).interpolate(pressed))
+    squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
     r, depth = system.displacement.doflocs[:, nodes]
     displacement = np.empty((nodes.size, 2))
     displacement[index, 0], displacement[index, 1] = solution[outward], -solution[inward]
@@ -252,9 +247,10 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     slip = averaged(gradient[0][1] + gradient[1][0])
     mean, volume = averaged(squeeze), (radial + vertical + hoop) / 3
     stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
+    points = film.thickness * np.stack([r, 1 - depth], axis=1)
     return FieldMesh(
-        points=film.thickness * np.stack([r, 1 - depth], axis=1),
-        triangles=_quadratic_triangles(index, local, system),
+        points=points,
+        triangles=anticlockwise(points, _quadratic_triangles(index, local)),
         displacement=film.thickness * displacement,
         stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
         notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
@@ -262,23 +258,15 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     )
 
 
-def _quadratic_triangles(
-    index: NDArray[np.int64], local: FloatArray, system: MixedSystem
-) -> NDArray[np.int64]:
-    """Return four quadratic triangles for each quartic one, anticlockwise with z upward."""
+def _quadratic_triangles(index: NDArray[np.int64], local: FloatArray) -> NDArray[np.int64]:
+    """Return four quadratic triangles for each quartic one."""
     place = {tuple(np.rint(_QUARTERS * point).astype(int)): i for i, point in enumerate(local)}
     quarters = []
     for corners in _CORNERS:
         around = [*corners, corners[0]]
         middles = [((a[0] + b[0]) // 2, (a[1] + b[1]) // 2) for a, b in pairwise(around)]
         quarters.append(index[[place[node] for node in (*corners, *middles)]].T)
-    triangles = np.concatenate(quarters)
-    # With the depth as second coordinate, what turns anticlockwise there is clockwise here.
-    r, depth = system.displacement.mesh.p[:, system.displacement.mesh.t]
-    turn = (r[1] - r[0]) * (depth[2] - depth[0]) - (r[2] - r[0]) * (depth[1] - depth[0])
-    turned = np.tile(turn > 0, len(_CORNERS))
-    triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
-    return triangles
+    return np.concatenate(quarters)
 
 
 # Tractions solved together: bounds the memory.
@@ -347,53 +335,27 @@ class ElementFilm:
 
 
 @dataclass(frozen=True, eq=False)
-class ElementField:
-    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`."""
+class ElementField(FieldByOrder):
+    """The field in a film under a traction, zero beyond the film's edge at ``radius`` (m)."""
 
     film: ElasticFilm
     radius: float
     system: MixedSystem
     solution: FloatArray  # displacements in film thicknesses, mean pressures in shear moduli
 
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa; zero beyond the film's edge."""
-        return self._at_base(0, r)
-
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa; zero beyond its edge."""
-        return self._at_base(1, r)
-
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of the base stress at ``k`` (rad/m), in N, to 1e-5 of the load."""
-        r = self._fine_radii
-        return hankel_transform(r, self.base_normal(r), np.ravel(k)).reshape(np.shape(k))
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        r = self._fine_radii
-        return hankel_transform(r, self.base_shear(r), np.ravel(k), order=1).reshape(np.shape(k))
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m, positive into the film."""
-        return self._at_surface(1, r)
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return the radial displacement of the surface in m; see :meth:`depression`."""
-        return self._at_surface(0, r)
-
     def mesh(self) -> FieldMesh:
         """Return displacement and stress inside the film, on quadratic triangles."""
         return field_mesh(self.system, self.solution, self.film)
 
-    @property
-    def _fine_radii(self) -> FloatArray:
-        """Radii at which the base's tractions are tabulated for their spectra, in m."""
+    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        """Return a transform of the base's tractions, to 1e-5 of the load."""
         nodes = self.system.side(1.0)[0].r * self.film.thickness
         index = np.arange(_PER_NODE * (nodes.size - 1) + 1) / _PER_NODE
-        return np.interp(index, np.arange(nodes.size), nodes)
+        r = np.interp(index, np.arange(nodes.size), nodes)
+        return hankel_transform(r, self._base(r, order), np.ravel(k), order=order).reshape(k.shape)
 
     @cached_property
-    def _base(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
+    def _tractions(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
         """Normal and radial traction at the base, in Pa, at radii in film thicknesses."""
         from scipy.sparse.linalg import spsolve
 
@@ -405,19 +367,18 @@ class ElementField:
         shear = np.append(0.0, spsolve(mass[1:, 1:], held[1:]))
         return smooth(line, -spsolve(mass, pushed), 1), smooth(line, shear, -1)
 
-    def _at_base(self, component: int, r: FloatArray) -> FloatArray:
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(r, dtype=np.float64))
-        values = self._base[component](np.minimum(flat, self.radius) / self.film.thickness)
+        values = self._tractions[order](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
-    def _at_surface(self, component: int, r: FloatArray) -> FloatArray:
-        """Return the displacement outward (0) or inward (1) at ``r``, in m."""
+    def _surface(self, r: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(r, dtype=np.float64))
         if np.any(flat > self.radius):
             raise DomainError(
                 f"There is no surface at {flat.max():g} m: the film ends at {self.radius:g} m.",
                 cure="Ask for smaller radii, or give a wider film.",
             )
-        line, *unknowns = self.system.side(0.0)
-        values = line.at(flat / self.film.thickness) @ self.solution[unknowns[component]]
+        line, outward, inward = self.system.side(0.0)
+        values = line.at(flat / self.film.thickness) @ self.solution[outward if order else inward]
         return np.asarray(self.film.thickness * values).reshape(np.shape(r))

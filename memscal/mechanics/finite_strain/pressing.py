@@ -19,6 +19,7 @@ from scipy.sparse.linalg import splu
 
 from memscal.errors import ConvergenceError
 from memscal.mechanics.finite_strain.film_elements import FilmElements, IntArray
+from memscal.mechanics.solver.step import Load, Target
 from memscal.model.arrays import FloatArray
 
 
@@ -97,14 +98,6 @@ class NewtonError(ConvergenceError):
     """Newton's method found no equilibrium from where it started: load in smaller steps."""
 
 
-@dataclass(frozen=True)
-class Goal:
-    """What is prescribed: a load in N, or a depth in mm."""
-
-    value: float
-    is_load: bool
-
-
 @dataclass(frozen=True, eq=False)
 class Pressed:
     """A film under an indenter."""
@@ -136,7 +129,7 @@ class Pressing:
     # Whether a node sticks at its undeformed radius, and not where it came to touch the face.
     upright: bool = False
 
-    def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
+    def press(self, start: Pressed, goal: Target, before: Pressed) -> Pressed:
         """Return the equilibrium at a goal, from a state near it and the last; or NewtonError."""
         elements, seen = self.elements, set[bytes]()
         state = self.placed(self._touching(start, before, set()) or start)
@@ -234,14 +227,14 @@ class Pressing:
         return place, gap
 
     def _step(
-        self, state: Pressed, forces: FloatArray, goal: Goal, tangent: _Tangent | None
+        self, state: Pressed, forces: FloatArray, goal: Target, tangent: _Tangent | None
     ) -> tuple[Pressed, float, _Tangent | None]:
         """Take Newton's step; return the state after it and how far it moves something, in mm."""
         touching, n, change = state.touching, self.elements.n, self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
         solution = tangent.factors.solve(-np.asarray(change.T @ forces))
         sunk = goal.value - state.depth
-        if goal.is_load:
+        if isinstance(goal, Load):
             load = -float(np.sum(forces[touching + n]))
             sunk = (goal.value - load - tangent.pushed @ solution) / tangent.stiffness
         solution = solution + sunk * tangent.along
@@ -311,8 +304,8 @@ _LONGEST = 0.1
 _HALVINGS = 8
 
 
-def _value(state: Pressed, goal: Goal) -> float:
-    return state.load if goal.is_load else state.depth
+def _value(state: Pressed, goal: Target) -> float:
+    return state.load if isinstance(goal, Load) else state.depth
 
 
 def work(states: list[Pressed]) -> float:
@@ -328,13 +321,13 @@ def work(states: list[Pressed]) -> float:
 
 
 class Path:
-    """The states so far, and the length of the next step."""
+    """The states so far, and the length of the next step; goals are loads in N or depths in mm."""
 
     def __init__(self, pressing: Pressing, start: Pressed) -> None:
         self.pressing, self.start, self.length = pressing, start, np.inf
         self.states: list[Pressed] = []
 
-    def reach(self, goal: Goal, guesses: Iterable[Pressed]) -> Iterator[float]:
+    def reach(self, goal: Target, guesses: Iterable[Pressed]) -> Iterator[float]:
         """Go to a goal, at once from a good guess; yield the share of the way after each step."""
         for guess in guesses:
             with suppress(NewtonError):
@@ -349,7 +342,7 @@ class Path:
             left = goal.value - begin
             pieces = max(1.0, np.ceil(abs(left) / self.length - 1e-9))
             ahead = goal.value if pieces == 1 else begin + left / pieces
-            stage = Goal(ahead, goal.is_load)
+            stage = replace(goal, value=ahead)
             try:
                 before = self.states[-1] if self.states else self.start
                 state = self.pressing.press(self._guess(stage), stage, before)
@@ -366,13 +359,13 @@ class Path:
             begin = ahead
             yield 1 - (goal.value - begin) / way
 
-    def _radius(self, goal: Goal) -> float:
+    def _radius(self, goal: Target) -> float:
         """Return a rod's radius as a depth, or the load that sinks it so far; inf for a sphere."""
         radius = self.pressing.face.radius if isinstance(self.pressing.face, RodFace) else np.inf
         modulus = self.pressing.elements.material.shear_modulus
-        return radius * (8 * modulus * radius if goal.is_load else 1.0)
+        return radius * (8 * modulus * radius if isinstance(goal, Load) else 1.0)
 
-    def _guess(self, goal: Goal) -> Pressed:
+    def _guess(self, goal: Target) -> Pressed:
         """Return the last state, carried on as it came as far as that is sound."""
         states = self.states[-3:] or [self.start]
         values = np.array([_value(state, goal) for state in states])
@@ -384,7 +377,7 @@ class Path:
             powers = np.vander(values - to, increasing=True).T
             weights = np.linalg.solve(powers, np.eye(values.size)[0])
             x, depth = weights @ [s.x for s in states], float(weights @ [s.depth for s in states])
-            ahead = replace(states[-1], x=x, depth=depth if goal.is_load else to)
+            ahead = replace(states[-1], x=x, depth=depth if isinstance(goal, Load) else to)
             if not self.pressing.sticking:
                 ahead = self.pressing.at_nearest(ahead)
             if self.pressing.is_sound(self.pressing.placed(ahead), states[-1]):

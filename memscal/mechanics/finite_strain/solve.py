@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.film_response import RingTraction
+from memscal.mechanics.film_response import FieldByOrder, RingTraction
 from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.film_elements import Finer
 from memscal.mechanics.finite_strain.pressing import (
-    Goal,
     NewtonError,
     Path,
     Pressed,
@@ -30,6 +29,7 @@ from memscal.mechanics.finite_strain.pressing import (
 )
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
+from memscal.mechanics.surface import anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
@@ -115,8 +115,7 @@ def solve_finite_strain(
     """Press a rod (edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m)."""
     # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
     # the wall; under a sphere that sticks nothing in the contact moves radially.
-    by_load = isinstance(targets[0], Load)
-    goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
+    goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
     tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
@@ -128,7 +127,7 @@ def follow_depths(
     film: ElasticFilm, rod: Rod, depths: Sequence[float], *, sticking: bool, finer: Finer = (1, 1)
 ) -> Iterator[Contact]:
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
-    goals = [Goal(depth * _MM, False) for depth in depths]
+    goals = [Depth(depth * _MM) for depth in depths]
     radius = _FREE_EDGE * film.thickness * _MM
     return _Request(film, rod, goals, sticking, radius, None, finer).reached(1.0)
 
@@ -139,7 +138,7 @@ class _Request:
 
     film: ElasticFilm
     indenter: Rod | Sphere
-    goals: list[Goal]
+    goals: Sequence[Target]
     sticking: bool
     radius: float
     edge: float | None
@@ -215,19 +214,19 @@ class _Request:
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 
-    def _depth(self, goal: Goal) -> float:
+    def _depth(self, goal: Target) -> float:
         """Return a rod's depth at a goal, that on a half-space at a load, in mm."""
-        if not goal.is_load:
+        if isinstance(goal, Depth):
             return goal.value
         stiffness = 2 * self.film.contact_modulus / 1e6 * self.indenter.extent * _MM
         return min(goal.value / stiffness, self.film.thickness * _MM)
 
-    def _hertz_radius(self, goal: Goal) -> float:
+    def _hertz_radius(self, goal: Target) -> float:
         """Return a contact radius of a sphere that is not exceeded, in mm."""
         # At a load that on a half-space; at a depth that of an incompressible film, which rises
         # beside the contact.
         R = self.indenter.extent * _MM
-        if goal.is_load:
+        if isinstance(goal, Load):
             return float(np.cbrt(0.75 * goal.value * R / (self.film.contact_modulus / 1e6)))
         return float(1.6 * np.sqrt(goal.value * R))
 
@@ -279,8 +278,8 @@ class _Request:
 
 
 @dataclass(frozen=True, eq=False)
-class FiniteStrainField:
-    """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`."""
+class FiniteStrainField(FieldByOrder):
+    """The field in a film at finite strain; zero beyond the film's edge."""
 
     # An element of the bonded base does not deform: its Cauchy traction is the nominal one.
     # ``depression`` and ``outward`` are functions of a point's radius *before* the deformation.
@@ -311,43 +310,23 @@ class FiniteStrainField:
         r, w, u = elements.nodes[0][nodes], -x[nodes + elements.n], x[nodes]
         return r / _MM, w / _MM, u / _MM
 
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa, compression positive; 0 beyond the film."""
-        return _interpolated(self.base[0], self.base[1], r, parity=1)
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
+        return _interpolated(self.base[0], self.base[1 + order], r, parity=-1 if order else 1)
 
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa, positive outward."""
-        return _interpolated(self.base[0], self.base[2], r, parity=-1)
+    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        r, traction = self.base[0], self.base[1 + order]
+        return hankel_transform(r, traction, np.ravel(k), order=order).reshape(np.shape(k))
 
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-        return hankel_transform(self.base[0], self.base[1], np.ravel(k)).reshape(np.shape(k))
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        r, shear = self.base[0], self.base[2]
-        return hankel_transform(r, shear, np.ravel(k), order=1).reshape(np.shape(k))
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return how far the points at ``r`` before deformation (m) moved into the film, in m."""
-        return _interpolated(self.surface[0], self.surface[1], r, parity=0)
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return how far the points at ``r`` before deformation (m) moved outward, in m."""
-        return _interpolated(self.surface[0], self.surface[2], r, parity=0)
+    def _surface(self, r: FloatArray, order: int) -> FloatArray:
+        return _interpolated(self.surface[0], self.surface[1 + order], r, parity=0)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
         elements, x = self.pressing.elements, self.pressed.x
-        basis = elements.bases[0]
-        corners = basis.doflocs[:, basis.element_dofs[:3]]
-        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        turned = first[0] * second[1] < first[1] * second[0]
-        triangles = basis.element_dofs.T.copy()
-        triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
+        points = elements.nodes.T / _MM
         return FieldMesh(
-            points=elements.nodes.T / _MM,
-            triangles=triangles,
+            points=points,
+            triangles=anticlockwise(points, elements.bases[0].element_dofs.T),
             displacement=x[: 2 * elements.n].reshape(2, -1).T / _MM,
             stress=elements.nodal_stress(x) * _MPA,
             notes=f"{elements.material.law} film at finite strain under {self.pressed.load:.6g} N",

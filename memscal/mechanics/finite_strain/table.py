@@ -19,6 +19,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
+from memscal.mechanics.film_response import FieldByOrder
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
@@ -32,30 +33,14 @@ _STEPS = np.linspace(0.0, 1.0, 65)
 
 
 @dataclass(frozen=True, eq=False)
-class TabulatedField:
+class TabulatedField(FieldByOrder):
     """Base stress of a rod by its transforms (N) at wavenumbers (rad/m), and nothing else."""
 
     k: FloatArray
     transforms: tuple[FloatArray, FloatArray]  # of the normal stress, and of order one of the shear
     radius: float
 
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of the normal stress at ``k`` (rad/m), in N."""
-        return self._transform(0, k)
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of order one of the shear at ``k`` (rad/m), in N."""
-        return self._transform(1, k)
-
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa, compression positive."""
-        return self._stress(0, r)
-
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa, positive outward."""
-        return self._stress(1, r)
-
-    def _transform(self, order: int, k: FloatArray) -> FloatArray:
+    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
         from scipy.interpolate import CubicSpline
 
         # Even in k, or odd.
@@ -63,19 +48,19 @@ class TabulatedField:
         spline = CubicSpline(self.k, self.transforms[order], bc_type=ends)
         return np.where(k <= self.k[-1], spline(np.minimum(k, self.k[-1])), 0.0)
 
-    def _stress(self, order: int, r: FloatArray) -> FloatArray:
+    def _base(self, r: FloatArray, order: int) -> FloatArray:
         nodes = Wavenumbers.covering(float(self.k[-1]), float(np.max(r, initial=self.radius)))
-        values = self._transform(order, nodes.k)
+        values = self._spectrum(nodes.k, order)
         return nodes.synthesise(values, np.ravel(r), order=order).reshape(np.shape(r))
 
-    def _absent(self, *_: Any) -> NoReturn:
+    def _absent(self, *_: Any, **__: Any) -> NoReturn:
         raise InputError(
             "The table of rods holds the stress at the base alone.",
             cure="Press the rod by memscal.indent, which solves the whole film.",
         )
 
-    depression = outward = pressure = shear = _absent
-    pressure_transform = shear_transform = half_space_integrals = _absent
+    _surface = pressure = shear = pressure_transform = shear_transform = _absent
+    half_space_integrals = _absent
 
 
 def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -> Contact | None:

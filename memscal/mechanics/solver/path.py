@@ -71,7 +71,7 @@ def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target)
         return step.take_step(problem, start, target)
     except ConvergenceError:
         rings = int(np.count_nonzero(start.touching))
-        if problem.normal_law is not None or not np.all(start.touching[:rings]):
+        if problem.interface.normal_law is not None or not np.all(start.touching[:rings]):
             raise
     return _between_rings(problem, start, target, rings)
 
@@ -152,7 +152,7 @@ class _Walk:
     def point(self) -> PathPoint:
         energy = _elastic_energy(self.problem, self.state)
         # Where nothing is lost, whatever the way, the energy in the film is the work done.
-        lossless = self.problem.friction == 0 and self.problem.normal_law is None
+        lossless = self.problem.friction == 0 and self.problem.interface.normal_law is None
         work = energy if lossless else self.work
         return PathPoint(self.state, self.steps, energy, work, self.dissipated)
 
@@ -174,7 +174,7 @@ def _step_by_step(
         if rising == upward:
             walk = resume
         try:
-            if problem.normal_law is not None:
+            if problem.interface.normal_law is not None:
                 _walk_evenly(walk, target, farthest, increments)
             elif problem.friction == 0:
                 walk.step_to(step.take_step(problem, walk.state, target))
@@ -184,7 +184,7 @@ def _step_by_step(
             error.last = walk.point() if walk.steps else None
             raise
         yield walk.point()
-        if problem.friction == 0 or problem.normal_law is not None:
+        if problem.friction == 0 or problem.interface.normal_law is not None:
             resume = walk
 
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.elements.element_film import ElementFilm
 from memscal.mechanics.film_response import HankelFilm, RingTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.path import PathPoint, follow
@@ -19,9 +19,6 @@ from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Ta
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
-
-if TYPE_CHECKING:
-    from memscal.mechanics.elements.element_film import ElementFilm
 
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
@@ -160,8 +157,6 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
     """Return the contacts on ``rings`` (m)."""
     model: HankelFilm | ElementFilm
     if request.backend == "fem":
-        from memscal.mechanics.elements.element_film import ElementFilm
-
         radius = request.film_radius or rings[-1] + _FREE_EDGE * request.film.thickness
         model = ElementFilm(request.film, rings, radius)
     else:
@@ -234,9 +229,9 @@ def _stick_radius(
     request: RingRequest, rings: FloatArray, state: ContactState, contact_radius: float
 ) -> float:
     """Return the radius in m within which the film sticks."""
-    sticking = np.flatnonzero(state.sticking(request.friction) & (state.pressure > 0))
+    sticking = np.flatnonzero(state.touching & (state.slip == 0) & (state.pressure > 0))
     last = int(sticking.max(initial=0))
-    if last == 0:
+    if last == 0 or request.friction == 0:
         return 0.0
     if last + 1 >= rings.size or not state.touching[last + 1]:
         return contact_radius

@@ -51,11 +51,6 @@ class ContactProblem:
         """Number of rings."""
         return self.heights.size
 
-    @property
-    def normal_law(self) -> NormalLaw | None:
-        """The interface's normal compliance, or ``None`` where it is rigid."""
-        return self.interface.normal_law
-
     def displacements(self, p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
         c = self.compliance
@@ -86,12 +81,6 @@ class ContactState:
     anchor: FloatArray  # outward displacement at which a sticking ring bears no shear, in m
     outward: FloatArray  # outward displacement in m
     iterations: int = 0  # linear systems that were solved
-
-    def sticking(self, friction: float) -> NDArray[np.bool_]:
-        """Return the rings in contact that stick."""
-        if friction == 0:
-            return np.zeros_like(self.touching)
-        return np.asarray(self.touching & (self.slip == 0))
 
 
 @dataclass(frozen=True)
@@ -136,13 +125,7 @@ class _Status:
     stretch: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class _Tractions:
-    """Pressure and shear (Pa) at the rings, and the depth (m)."""
-
-    pressure: FloatArray
-    shear: FloatArray
-    depth: float
+_Tractions = tuple[FloatArray, FloatArray, float]  # pressure and shear (Pa), and the depth (m)
 
 
 def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tractions:
@@ -165,7 +148,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trac
     last, value = _goal_row(problem, goal, normal, rows, unit)
     matrix = np.vstack([normal[rows], radial, last])
     right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [value]])
-    if (law := problem.normal_law) is not None:
+    if (law := problem.interface.normal_law) is not None:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
         stiffness = law.stiffness(gap, problem.film)
@@ -187,7 +170,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trac
     pressure[rows] = solution[: rows.size]
     shear[rows] = ratio * solution[: rows.size]
     shear[stuck] = solution[rows.size : -1]
-    return _Tractions(pressure, shear, float(solution[-1]) * unit)
+    return pressure, shear, float(solution[-1]) * unit
 
 
 def _goal_row(
@@ -242,7 +225,7 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    law, separation = problem.normal_law, problem.separations(start)
+    law, separation = problem.interface.normal_law, problem.separations(start)
     pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
     if held is not None:
@@ -275,11 +258,11 @@ def _revise(
     problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None, careful: bool
 ) -> tuple[_Status, bool]:
     """Return a status that the tractions do not contradict, and whether nothing changed."""
-    p = tractions.pressure
-    w, u = problem.displacements(p, tractions.shear)
-    gap = problem.heights - tractions.depth + w
+    p, q, depth = tractions
+    w, u = problem.displacements(p, q)
+    gap = problem.heights - depth + w
     slip, tangential = _revised_slip(problem, status, tractions, u, careful)
-    law = problem.normal_law
+    law = problem.interface.normal_law
     if law is None:
         pressing = _revised_contact(status, tractions, gap, held, careful=careful)
         separation, normal = gap, bool(np.any(pressing != status.pressing))
@@ -297,7 +280,7 @@ def _revised_contact(
     status: _Status, tractions: _Tractions, gap: FloatArray, held: int | None, *, careful: bool
 ) -> NDArray[np.bool_]:
     """Let go of rings that pull, and catch rings that would pass through the indenter."""
-    p, depth = tractions.pressure, tractions.depth
+    p, _, depth = tractions
     pulled = np.where(status.pressing, -p / np.abs(p).max(initial=1e-300), 0.0)
     passed = np.where(status.pressing, 0.0, -gap / max(abs(depth), 1e-300))
     if held is not None:
@@ -316,7 +299,7 @@ def _revised_slip(
     mu = problem.friction
     if mu == 0 or np.isinf(mu):
         return status.slip, False
-    p, q = tractions.pressure, tractions.shear
+    p, q, _ = tractions
     largest = mu * np.abs(p).max()
     sticks = status.pressing & (status.slip == 0)
     slips = status.pressing & (status.slip != 0) & (problem.compliance.r > 0)
@@ -347,7 +330,7 @@ def _revised_separation(
     """Return the next trial of the separations."""
     # Where the surfaces part, the linear equations' own; where they close, the one at which the
     # (convex) law bears the linear equations' pressure.
-    before, p = status.separation, tractions.pressure
+    before, p = status.separation, tractions[0]
     after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
     closing = status.pressing & (gap < before) & (p > 0)
     borne = law.separation(np.where(closing, p, 1.0), film)
@@ -357,7 +340,7 @@ def _revised_separation(
 def _accepted(
     problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None, count: int
 ) -> ContactState:
-    p, q = tractions.pressure, tractions.shear
+    p, q, depth = tractions
     _, u = problem.displacements(p, q)
     slip = np.where(status.pressing, status.slip, 0).astype(np.int8)
     # What slips drags its anchor along, a slip length behind; what is free has none.
@@ -365,4 +348,4 @@ def _accepted(
     anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
     touching = status.pressing | (np.arange(problem.size) == held)
     load = float(problem.compliance.areas @ p)
-    return ContactState(p, q, tractions.depth, load, touching, slip, anchor, u, count)
+    return ContactState(p, q, depth, load, touching, slip, anchor, u, count)
