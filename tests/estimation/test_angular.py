@@ -1,0 +1,106 @@
+"""What of a sensor is not round: its kernels, its size, and noise and outliers beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.rasters import tailed_raster
+from helpers.scans import estimated, reference_spectrum, simulated
+from scipy.signal import fftconvolve
+
+import memscal
+from memscal.estimation.angular import ORDERS, AngularDepartures
+from memscal.estimation.points import measured_points
+from memscal.estimation.profile import ProfileEstimate, estimate_profile
+from memscal.estimation.raster_noise import raster_noise
+from memscal.model.scan import Scan
+
+RADII = np.array([0.3e-3, 0.8e-3])
+ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
+
+
+def in_the_plane(scan: Scan) -> ProfileEstimate:
+    points = measured_points(scan)
+    contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
+    return estimate_profile(points, reference_spectrum(contact, points), angular=True)
+
+
+def test_kernels_are_blurred_rings_of_their_order() -> None:
+    blur, axis = 0.25e-3, np.arange(-60, 61) * 0.05e-3
+    x, y = (a.ravel() for a in np.meshgrid(axis, axis))
+    kernels = AngularDepartures(RADII, blur, ONE_EACH).at(x, y)
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    # A ring is many Gaussians around it, their heights cos and sin of m times the angle.
+    for column, (m, turn, q) in enumerate(
+        (m, t, q) for m in ORDERS for t in (np.cos, np.sin) for q in RADII
+    ):
+        square = np.subtract.outer(x, q * np.cos(angle)) ** 2
+        square += np.subtract.outer(y, q * np.sin(angle)) ** 2
+        ring = np.exp(-0.5 * square / blur**2) @ turn(m * angle) / (2 * np.pi * blur**2) / 400
+        np.testing.assert_allclose(kernels[:, column], ring, atol=2e-5 * np.abs(ring).max())
+
+
+def test_signals_are_the_convolutions_of_the_kernels() -> None:
+    scan = simulated(raster=True, points=17, half_range=4e-3)
+    model, step = estimated(scan).model, 0.05e-3
+    axis = step * np.arange(-240, 241)
+    stress = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(
+        np.hypot.outer(axis, axis)
+    )
+    departures = AngularDepartures(RADII, 0.3e-3, ONE_EACH)
+    x, y = (a.ravel() for a in np.meshgrid(axis, axis))
+    kernels = departures.at(x, y).T.reshape(-1, axis.size, axis.size)
+    signals = departures.signal(model, np.array([[0.15e-3, -0.1e-3]]))
+    rows = np.rint((model.points.y + 0.1e-3) / step).astype(int) + 240
+    columns = np.rint((model.points.x - 0.15e-3) / step).astype(int) + 240
+    for kernel, signal in zip(kernels, signals.T, strict=True):
+        field = fftconvolve(stress, kernel, mode="same") * step**2
+        np.testing.assert_allclose(signal, field[rows, columns], atol=2e-4 * field.max())
+
+
+@pytest.mark.parametrize("side", [33, 49])
+def test_noise_of_a_raster_is_not_what_is_not_round(side: int) -> None:
+    ratios = []
+    for seed in range(10):
+        scan = tailed_raster(seed=seed, side=side)
+        points = measured_points(scan)
+        # What is not round is left over: many times the noise.
+        estimate = estimated(scan)
+        residual = estimate.weighed.residual + estimate.oval
+        ratios.append((raster_noise(points, residual) or np.nan) / scan.synthetic["noise"])
+        if seed == 0:
+            assert np.abs(estimate.oval).max() > 10 * scan.synthetic["noise"]
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.03)
+
+
+def test_noise_by_repeats_is_that_within_each_place() -> None:
+    scan = tailed_raster(seed=1, side=33)
+    x, y = (np.tile(a.ravel(), 2) for a in scan.positions)
+    again = tailed_raster(seed=2, side=33)
+    both = replace(
+        scan, x=x, y=y, u_zz=np.append(scan.u_zz, again.u_zz),
+        repeat=np.repeat([0, 1], scan.u_zz.size),
+    )  # fmt: skip
+    # A gradient that third differences would not see either, and steps, which they would.
+    points = measured_points(both)
+    steps = np.where(points.x > 0, 1.0, 0.0) * points.u.max()
+    noise = raster_noise(points, points.u - points.u.mean() + steps)
+    assert noise == pytest.approx(scan.synthetic["noise"], rel=0.1)
+
+
+def test_a_spike_is_an_outlier_and_asymmetry_is_none() -> None:
+    scan = tailed_raster(seed=3, side=33)
+    u = scan.u_zz.copy()
+    spikes = (16, 18), (5, 25), (20, 12)
+    for place in spikes:
+        u[place] += 12 * scan.synthetic["noise"]
+    weight = in_the_plane(replace(scan, u_zz=u)).outlier_weight.reshape(u.shape)
+    assert {tuple(map(int, place)) for place in np.argwhere(weight < 0.5)} == set(spikes)
+
+
+def test_a_round_sensor_keeps_its_profile_and_its_centre() -> None:
+    scan = simulated(raster=True, points=33, half_range=6e-3, noise=0.005, seed=4)
+    round_, any_ = estimated(scan), in_the_plane(scan)
+    np.testing.assert_allclose(any_.centre, round_.centre, atol=2e-6)
+    assert any_.conversion_constant == pytest.approx(round_.conversion_constant, rel=1e-3)
+    assert np.abs(any_.oval).max() < 0.01 * any_.largest_signal
