@@ -155,7 +155,9 @@ class RasterFields:
     ) -> RasterFields:
         """Place the raster, continued by its smoothed profile; a field that is divided is even."""
         points = estimate.points
-        lattice = even_lattice(points.x, points.y, points.places[0].count)
+        # Of several rasters there is no one field of voltages.
+        single = points.as_raster
+        lattice = even_lattice(points.x, points.y, points.places[0].count) if single else None
         even = lattice is not None
         if lattice is None and divided:
             raise InputError(

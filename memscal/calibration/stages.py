@@ -166,7 +166,8 @@ def prepare_fields(
     divided: bool = True,
 ) -> Fields:
     """Lift the profile of lines or several scans, or place a raster (evenly if it is divided)."""
-    if smoothed is not None and estimate.points.as_raster:
+    data = estimate.points
+    if smoothed is not None and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
     if divided and not _of_round_fields(estimate):
         raise InputError(
