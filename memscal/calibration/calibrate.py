@@ -23,12 +23,15 @@ from memscal.errors import InputError, MemscalError
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import loads_differ, scans_by_load
 from memscal.estimation.reference import (
+    at_load_of,
+    film_of,
     press_neo_hookean,
     reference_profile,
     reference_spectra,
     require_calibration_rod,
     require_one_sensor,
     require_same_set_up,
+    with_film_of,
 )
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
@@ -41,6 +44,7 @@ from memscal.model.apparatus import (
 )
 from memscal.model.checks import Message, QualityCheck, override_messages
 from memscal.model.film import LINEAR
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
@@ -54,6 +58,7 @@ _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noi
 
 def assemble(
     solution: Solution,
+    stated: Scan,
     results: Results,
     other: Results | None,
     checks: tuple[QualityCheck, ...],
@@ -61,6 +66,7 @@ def assemble(
     configuration: Mapping[str, Any],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
+    # Film and indenter are those of the scan as ``stated`` where nothing was calculated with them.
     scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
     reference = stress.profile() if isinstance(stress, Contact) else stress
     versions = {"numpy": np.__version__, "scipy": scipy.__version__}
@@ -84,10 +90,10 @@ def assemble(
         reconvolution=_reconvolution(solution),
         parameters=results.parameters,
         checks=checks,
-        film=scan.film,
-        indenter=scan.indenter,
+        film=scan.film or stated.film,
+        indenter=scan.indenter or stated.indenter,
         sensor=scan.sensor if channel == "zz" else replace(scan.sensor, channel=channel),
-        load=scan.load,
+        load=None if results.parameters.reading.per != "Pa" else scan.load,
         reference=reference,
         process=Process(
             program="memscal",
@@ -219,7 +225,8 @@ class Calibration(Result):
         InputError
             If a number is out of range, or the scan's fields cannot be divided.
         """
-        return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+        swept = sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+        return replace(swept, reading=self.apparatus.reading)
 
 
 @single_threaded()
@@ -238,6 +245,7 @@ def calibrate(
     free: str | Sequence[str] = (),
     seed: int = 0,
     override: bool = False,
+    relative: bool = False,
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -287,6 +295,9 @@ def calibrate(
         Seed of methods that draw random numbers.
     override : bool, default False
         Accept a reference or alternative of another film, rod or load than the scan's; recorded.
+    relative : bool, default False
+        For scans at constant depth, or of unknown load: loads count for nothing, A is the reading
+        by the reference over its largest stress, and no result states pascals from it.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -310,20 +321,29 @@ def calibrate(
     True
     """
     scans, pairs = require_one_sensor(opened_scans(scan)), correlations or {}
-    for rod_scan in scans:
-        require_calibration_rod(rod_scan)
     references = _references(reference, scans)
+    for rod_scan, of_scan in zip(scans, references, strict=True):
+        require_calibration_rod(rod_scan, of_scan)
+    as_stated = scans[0]
     known = film_law, mooney_rivlin_ratio, rod_friction
     scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
+    if relative:
+        scans = tuple(_without_loads(s, r) for s, r in zip(scans, references, strict=True))
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
+    scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
     owners: Sequence[int] | None = None
     stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
-    if not any(stated) and any(s.film.law != LINEAR for s in scans):
+    if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
         # Under another law than the linear one each load has a stress of its own shape.
         of_loads, owners = scans_by_load(scans)
         scans, references = tuple(of_loads), [None] * len(of_loads)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
+    peak = _largest(stresses[0]) if relative else None
+    loaded = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
+    scans = tuple(s for s, _ in loaded)
+    notes = tuple(dict.fromkeys(note for _, of_scan in loaded for note in of_scan))
+    reading = replace(scans[0].reading, per="relative" if relative else stresses[0].unit)
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
@@ -339,18 +359,19 @@ def calibrate(
         stresses = [reference_profile(s, None) for s in scans]
     solution = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
     effects = _effects(solution, alternatives)
-    results = uncertainties(solution, solution.deconvolution, effects, pairs)
+    results = uncertainties(solution, solution.deconvolution, effects, pairs, reading)
     beside = solution.other
-    other = None if beside is None else uncertainties(solution, beside, effects, pairs)
+    other = None if beside is None else uncertainties(solution, beside, effects, pairs, reading)
     checks = quality_checks(solution, results)
     messages = calibration_messages(solution, results, checks)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
+    configuration |= {} if reading == VOLTS else {"reading": asdict(reading)}
     if freed is not None:
         messages = (*freed.messages, *messages)
         configuration["free"] = freed.record
-    if loads_differ([s.load for s in solution.scans]):
+    if not relative and loads_differ([s.stated_load for s in solution.scans]):
         from memscal.calibration.film_inference import weigh_laws
 
         if (compared := weigh_laws(solution)) is not None:
@@ -368,8 +389,8 @@ def calibrate(
         configuration["override"] = overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
-    messages = (*override_messages(overridden), *messages)
-    apparatus = assemble(solution, results, other, checks, messages, configuration)
+    messages = (*override_messages(overridden), *notes, *messages)
+    apparatus = assemble(solution, as_stated, results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
 
 
@@ -385,17 +406,30 @@ def _of_law(
                 why="A reference has been calculated by a law already.",
                 cure="Give one of them (film_law, --film-law; reference, --reference).",
             )
-        film = replace(scan.film, law=law, mooney_rivlin_ratio=ratio)
+        film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=ratio)
         scan = replace(scan, film=film, reference=None)
     stress = scan.reference if reference is None else reference
-    theirs = stress.film_of_law if isinstance(stress, Contact) else stress and stress.film
-    if stress is not None and theirs and theirs.law and not scan.film.law:
+    theirs = stress and film_of(stress)
+    if stress is not None and theirs and theirs.law and scan.film and not scan.film.law:
         stated = {name: getattr(theirs, name) for name in ("law", "mooney_rivlin_ratio")}
         scan = replace(scan, film=replace(scan.film, **stated))
         used = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         if theirs.law != LINEAR and scan.rod_friction is None and used in (0.0, np.inf):
             scan = replace(scan, rod_friction=used)
     return scan if friction is None else replace(scan, rod_friction=friction)
+
+
+def _without_loads(scan: Scan, reference: BaseStress | None) -> Scan:
+    """Return a scan without loads; one whose rod has to be solved keeps the nominal one."""
+    solved = reference is None and scan.reference is None
+    unstated: dict[str, Any] = dict.fromkeys(("normal_load", "normal_load_errors"))
+    load = scan.stated_load if solved else None
+    return replace(scan, load=load, load_uncertainty=None, **unstated)
+
+
+def _largest(stress: BaseStress) -> float:
+    profile = stress.profile() if isinstance(stress, Contact) else stress
+    return float(np.abs(profile.sigma_zz).max())
 
 
 def _references(
@@ -452,10 +486,12 @@ def uncertainties(
     deconvolution: Deconvolution,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
+    reading: Reading = VOLTS,
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
     # A linear method's derivatives are complete; of another, the scatter of draws is taken.
     linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
     drawn = None if linear else drawn_scatter(solution)
-    return propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    return replace(results, parameters=replace(results.parameters, reading=reading))

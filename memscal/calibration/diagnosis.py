@@ -146,13 +146,13 @@ class _Search:
     @cached_property
     def lengths(self) -> tuple[_Length, ...]:
         """Lengths that make the reference narrower than the scan."""
-        h = min(scan.film.thickness for scan in self.scans)
+        h = min(map(_spread, self.scans, self.stresses))
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
         stretch = _grid(_LONGEST_SPAN * h / span)
         positions = _Length("positions", "data/x", 1.0, stretch)
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
             return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
-        a = self.scans[0].indenter.radius
+        a = self.scans[0].set_up.indenter.radius
         # A calibration asks for a rod no wider than its film is thick.
         thinner = _grid(min(_LONGEST_SPAN * h / span, h / (2 * a)))
         return (
@@ -246,6 +246,14 @@ class _Search:
             if np.isfinite(residual).all():
                 return _Trial(factor, fit, residual, weights)
         return _Trial(factor, None, np.full(1, np.inf), weights)
+
+
+def _spread(scan: Scan, stress: BaseStress) -> float:
+    """Length over which a reference spreads, in m: of a film its thickness."""
+    if isinstance(stress, Contact) or scan.film is not None:
+        return scan.set_up.film.thickness
+    high = stress.sigma_zz > 0.5 * stress.sigma_zz.max()
+    return 1.5 * float(stress.r[high].max(initial=_LOAD))
 
 
 def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:

@@ -24,6 +24,7 @@ from memscal.estimation.points import measured_mask
 from memscal.estimation.reference import RECTANGLE, law_at_once, relative, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, single_threaded, worker_pool
@@ -288,6 +289,7 @@ class MonteCarlo(Result):
     g_shortest: FloatArray
     g_first_order: FloatArray
     messages: tuple[Message, ...]
+    reading: Reading = VOLTS
 
     def __repr__(self) -> str:
         """Return what was drawn, and whether the budget agrees."""
@@ -392,6 +394,7 @@ def monte_carlo(
         g_shortest=shortest_interval(g),
         g_first_order=first_order.radial_scatter,
         messages=tuple(_messages(calibration, comparisons, failures, draws)),
+        reading=calibration.apparatus.reading,
     )
 
 

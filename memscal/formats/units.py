@@ -4,6 +4,7 @@ Canonical units are powers of ten, so that 0.25 mm is exactly 0.25e-3; others ar
 """
 
 import functools
+import math
 import re
 from typing import Any
 
@@ -12,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import UnitError
 from memscal.model.arrays import FloatArray
-from memscal.model.quantities import DIMENSIONS
+from memscal.model.notation import NAMED_UNITS, Reading
+from memscal.model.quantities import DIMENSIONS, dimension_in
 
 SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
@@ -61,20 +63,62 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
         raise UnitError(
             f"{where} has no unit.",
             why=f"It is a {dimension}, and a bare number could be in any unit.",
-            cure=f'Add an attribute units, such as "{FILE_UNITS[dimension]}".',
+            cure=f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".',
         )
-    canonical = _CANONICAL.get(unit.strip())
-    if canonical is not None:
-        if canonical[0] != dimension:
-            raise _wrong_dimension(where, unit, dimension)
-        return _scaled(numbers, canonical[1])
+    power = _power(unit.strip(), dimension)
+    if power is not None:
+        return _scaled(numbers, power)
+    if unit.strip() in _CANONICAL:
+        raise _wrong_dimension(where, unit, dimension)
     return np.asarray(numbers * _pint_factor(unit, dimension, where))
 
 
 def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:
     """Convert SI values to the unit that our files use; return them with that unit."""
-    unit = FILE_UNITS[dimension]
-    return _scaled(np.asarray(values, dtype=np.float64), -_CANONICAL[unit][1]), unit
+    unit = DIMENSIONS[dimension].stored
+    return _scaled(np.asarray(values, dtype=np.float64), -(_power(unit, dimension) or 0)), unit
+
+
+def _power(unit: str, dimension: str) -> int | None:
+    """Return the power of ten that takes a unit of a dimension to SI, where it is known."""
+    of, power = _CANONICAL.get(unit, ("", 0))
+    units = DIMENSIONS[dimension]
+    if of and DIMENSIONS[of].si == units.si:
+        return power
+    # Units of readings are entered among the dimensions by what they are stored in.
+    return round(math.log10(units.scale)) if unit == units.stored and not of else None
+
+
+def reading_unit(unit: str | None, where: str) -> str:
+    """Return the SI unit of readings in any unit: one that has a name, base units, or 1."""
+    if unit is None or unit.strip() in _POWERS["voltage"]:
+        return "V"
+    if unit.strip().lower() in _ARBITRARY:
+        return "1"
+    quantity = _pint_quantity(unit, 1.0, "reading", where)
+    base = quantity.to_base_units()
+    if abs(_pint_quantity(unit, 2.0, "reading", where).to_base_units() / base - 2) > 1e-9:
+        raise UnitError(
+            f'{where} has the unit "{_shown(unit)}", whose zero is not that of the SI unit.',
+            why="A calibration needs readings in proportion to what is measured.",
+            cure=f'Convert them, such as to "{base.units:~C}".',
+        )
+    for name in NAMED_UNITS:
+        if quantity.is_compatible_with(name):
+            return name
+    return f"{base.units:~C}".replace("**", "^") if base.dimensionality else "1"
+
+
+def readings_in_si(values: ArrayLike, unit: str, where: str) -> FloatArray:
+    """Convert readings from any unit to that of :func:`reading_unit`."""
+    si = reading_unit(unit, where)
+    arbitrary = unit.strip().lower() in _ARBITRARY
+    dimension = dimension_in("voltage", Reading(si, -3 if si == "V" else 0))
+    return to_si(values, "1" if arbitrary else unit, dimension, where)
+
+
+#: Words for readings in units of their own.
+_ARBITRARY = {"", "1", "a.u.", "arb", "arb.", "arb. units", "arbitrary", "adu", "lsb", "digits"}
 
 
 def dimension_of(unit: str, where: str) -> str:
@@ -82,6 +126,8 @@ def dimension_of(unit: str, where: str) -> str:
     canonical = _CANONICAL.get(unit.strip())
     if canonical is not None:
         return canonical[0]
+    if entered := next((d for d, units in DIMENSIONS.items() if units.stored == unit), ""):
+        return entered
     for dimension in SI_UNITS:
         try:
             _pint_factor(unit, dimension, where)
@@ -101,24 +147,32 @@ def _scaled(numbers: FloatArray, power: int) -> FloatArray:
 
 
 def _pint_factor(unit: str, dimension: str, where: str) -> float:
+    import pint
+
+    si = DIMENSIONS[dimension].si
+    try:
+        quantity = _pint_quantity(unit, 1.0, dimension, where)
+        return float(quantity.to("dimensionless" if si == "1" else si).magnitude)
+    except pint.DimensionalityError as error:
+        raise _wrong_dimension(where, unit, dimension) from error
+
+
+def _pint_quantity(unit: str, value: float, dimension: str, where: str) -> Any:
+    """Return a number with a unit, which pint must know."""
+    stored = DIMENSIONS[dimension].stored if dimension in DIMENSIONS else "pA"
     if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
         raise UnitError(
             f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.',
-            cure=f'Write it like "{FILE_UNITS[dimension]}".',
+            cure=f'Write it like "{stored}".',
         )
-    import pint
-
     registry = _registry()
-    target = dimension if dimension == "dimensionless" else SI_UNITS[dimension]
     try:
-        return float(registry.Quantity(1.0, registry.parse_units(unit)).to(target).magnitude)
-    except pint.DimensionalityError as error:
-        raise _wrong_dimension(where, unit, dimension) from error
+        return registry.Quantity(value, registry.parse_units(unit))
     except Exception as error:  # pint raises what its parser happens to meet
         raise UnitError(
             f'{where} has the unit "{_shown(unit)}", which is unknown.',
             why=f"It is a {dimension}.",
-            cure=f'Write it like "{FILE_UNITS[dimension]}".',
+            cure=f'Write it like "{stored}".',
         ) from error
 
 
@@ -133,7 +187,7 @@ def _wrong_dimension(where: str, unit: str, dimension: str) -> UnitError:
     return UnitError(
         f'{where} has the unit "{_shown(unit)}", but it must be a {dimension}.',
         why="A number in a unit of another kind cannot be converted.",
-        cure=f'Give it in "{FILE_UNITS[dimension]}" or another unit of {dimension}.',
+        cure=f'Give it in "{DIMENSIONS[dimension].stored}" or another unit of {dimension}.',
     )
 
 

@@ -12,7 +12,7 @@ from memscal.model.arrays import FloatArray, FrozenArrays
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.notation import format_measured
+from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
@@ -92,6 +92,8 @@ class ParameterSet(FrozenArrays):
         names that the file format does not define.
     values, covariance : ndarray, shape (n,), (n, n)
         Estimates and their joint covariance, systematic contributions included.
+    reading : Reading
+        The unit of the sensor's readings, in which baseline and conversion constant are shown.
 
     Examples
     --------
@@ -104,6 +106,7 @@ class ParameterSet(FrozenArrays):
     values: FloatArray
     covariance: FloatArray
     units: tuple[str, ...] = ()
+    reading: Reading = VOLTS
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -132,7 +135,7 @@ class ParameterSet(FrozenArrays):
         chosen = [self._index(name) for name in names]
         units = tuple(self.units[i] for i in chosen) if self.units else ()
         covariance = self.covariance[np.ix_(chosen, chosen)]
-        return ParameterSet(tuple(names), self.values[chosen], covariance, units)
+        return ParameterSet(tuple(names), self.values[chosen], covariance, units, self.reading)
 
     def _index(self, name: str) -> int:
         if name not in self.names:
@@ -163,6 +166,7 @@ class OtherEstimate:
 class ApparatusData(Checked):
     """Everything that an apparatus-function artifact stores, in SI units.
 
+    ``film``, ``indenter`` and ``load`` are ``None`` where a scan with a reference states none.
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
     of the conversion constant and of both Gaussian widths by source; ``other`` is the estimate by
     the route that was not chosen, where there is one.
@@ -174,10 +178,10 @@ class ApparatusData(Checked):
     reconvolution: Reconvolution
     parameters: ParameterSet
     checks: tuple[QualityCheck, ...]
-    film: ElasticFilm
-    indenter: RoundIndenter
+    film: ElasticFilm | None
+    indenter: RoundIndenter | None
     sensor: StressSensor
-    load: float
+    load: float | None
     reference: StressProfile
     process: Process
     budget: Mapping[str, Mapping[str, float]]
@@ -185,18 +189,50 @@ class ApparatusData(Checked):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
+        constant = self.reading.over(self.reading.unit)
         a, sigma = (
             format_measured(
-                self.parameters[name] * 1e3, self.parameters.uncertainty(name) * 1e3, unit
+                self.parameters[name] / scale, self.parameters.uncertainty(name) / scale, unit
             )
-            for name, unit in (("conversion_constant", "mV/Pa"), ("gaussian_sigma", "mm"))
+            for name, scale, unit in (
+                ("conversion_constant", self.reading.scale, constant),
+                ("gaussian_sigma", 1e-3, "mm"),
+            )
         )
         state = state_of_checks(self.checks)
         return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"
 
     @property
+    def reading(self) -> Reading:
+        """Unit of the sensor's readings, and of the reference."""
+        return self.parameters.reading
+
+    @property
+    def relative(self) -> bool:
+        """Whether A is relative: the reading by the reference at its largest stress."""
+        return self.reading.per == "relative"
+
+    def require_pascals(self) -> None:
+        """Refuse to state pascals by a conversion constant that is not per pascal."""
+        if self.reading.per != "Pa":
+            raise InputError(
+                "The conversion constant of the artifact is not per pascal: it is "
+                + ("relative." if self.relative else "per unit of a reference that is no stress."),
+                why="The stress of its calibration was not known, and no reading tells another.",
+                cure="Calibrate with a scan of known load and a stress in Pa, without --relative; "
+                "G needs none of them.",
+            )
+
+    @property
+    def load_factor(self) -> float:
+        """The stress that A refers to over the stored reference."""
+        if self.relative:
+            return 1 / float(np.abs(self.reference.sigma_zz).max())
+        return (self.load or self.reference.load) / self.reference.load
+
+    @property
     def conversion_constant(self) -> float:
-        """Conversion constant A, in V/Pa."""
+        """Conversion constant A, in V/Pa, or in the unit of the readings per Pa."""
         return self.parameters["conversion_constant"]
 
     @property

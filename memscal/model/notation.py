@@ -1,6 +1,7 @@
 """Notation of measured values: with uncertainty, rounded by it, and unit; printable text."""
 
 import math
+from dataclasses import dataclass
 from decimal import Decimal, localcontext
 
 from memscal.errors import InputError
@@ -9,6 +10,59 @@ from memscal.errors import InputError
 _PLAIN_EXPONENTS = range(-3, 5)
 _NEGLIGIBLE = 1e-12
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+#: Prefixes by their powers of ten, and the SI units that take one.
+_PREFIXES = dict(
+    zip(range(-18, 12, 3), ("a", "f", "p", "n", "u", "m", "", "k", "M", "G"), strict=True)
+)
+NAMED_UNITS = ("V", "A", "T", "Pa", "N", "m", "Hz", "W", "J", "C", "F", "ohm", "S", "K", "s")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Unit of a sensor's readings: SI unit in Python (1: counts), the power of ten shown with it.
+
+    ``per``: the unit of the reference, by which A divides that of the readings; ``"1"``: by none,
+    ``"relative"``: by the reference's largest value, as the load is not known.
+    """
+
+    si: str = "V"
+    power: int = -3
+    per: str = "Pa"
+
+    @classmethod
+    def fitting(cls, si: str, size: float) -> "Reading":
+        """Return the unit in which readings up to a size are shown: volts are in mV always."""
+        if si not in NAMED_UNITS[1:] or not (math.isfinite(size) and size > 0):
+            return cls(si, -3 if si == "V" else 0)
+        return cls(si, min(max(3 * math.floor(math.log10(size) / 3 + 1e-9), -18), 9))
+
+    @property
+    def unit(self) -> str:
+        """The unit that is shown, with its prefix."""
+        return _PREFIXES[self.power] + self.si
+
+    @property
+    def scale(self) -> float:
+        """How many SI units that is."""
+        return 10.0**self.power
+
+    def over(self, unit: str) -> str:
+        """Return a unit of readings over that of the reference."""
+        if self.per in ("1", "relative"):
+            return unit
+        if unit == self.per:
+            return "1"
+        inverse = self.per.startswith("1/")
+        return f"{unit}*{self.per[2:]}" if inverse else f"{unit}/{self.per}"
+
+    def text(self, value: float, form: str = ".3g") -> str:
+        """Write a reading, given in its SI unit."""
+        return f"{value / self.scale:{form}} {self.unit}".removesuffix(" 1")
+
+
+VOLTS = Reading()
+"""Volts, shown in mV, over Pa."""
 
 
 def format_measured(value: float, uncertainty: float | None, unit: str = "") -> str:

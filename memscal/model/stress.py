@@ -1,6 +1,7 @@
 """A radial stress profile at the base of the film: the reference of a calibration."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -56,6 +57,8 @@ class StressProfile:
     >>> profile.sigma_zz.max()
     np.float64(200000.0)
     """
+
+    unit: ClassVar[str] = "Pa"
 
     r: FloatArray
     sigma_zz: FloatArray
