@@ -68,7 +68,7 @@ def assemble(
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are those of the scan as ``stated`` where nothing was calculated with them.
     scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
-    reference = stress.profile() if isinstance(stress, Contact) else stress
+    reference = _table(stress)
     versions = {"numpy": np.__version__, "scipy": scipy.__version__}
     record: dict[str, Any] = {
         **configuration,
@@ -162,6 +162,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
+#: What a relative calibration leaves out of a scan.
+_OF_LOADS = ("load_uncertainty", "normal_load", "normal_load_errors")
 #: Methods whose derivatives are complete.
 _LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
@@ -324,11 +326,16 @@ def calibrate(
     references = _references(reference, scans)
     for rod_scan, of_scan in zip(scans, references, strict=True):
         require_calibration_rod(rod_scan, of_scan)
-    as_stated = scans[0]
+    as_stated = scans
     known = film_law, mooney_rivlin_ratio, rod_friction
     scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
     if relative:
-        scans = tuple(_without_loads(s, r) for s, r in zip(scans, references, strict=True))
+        # A rod that has to be solved keeps its nominal load.
+        loads: dict[str, Any] = dict.fromkeys(_OF_LOADS)
+        pairs_of = zip(scans, references, strict=True)
+        scans = tuple(
+            replace(s, **loads, load=None if r or s.reference else s.load) for s, r in pairs_of
+        )
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
@@ -339,10 +346,8 @@ def calibrate(
         of_loads, owners = scans_by_load(scans)
         scans, references = tuple(of_loads), [None] * len(of_loads)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
-    peak = _largest(stresses[0]) if relative else None
-    loaded = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
-    scans = tuple(s for s, _ in loaded)
-    notes = tuple(dict.fromkeys(note for _, of_scan in loaded for note in of_scan))
+    peak = float(np.abs(_table(stresses[0]).sigma_zz).max()) if relative else None
+    scans = tuple(at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True))
     reading = replace(scans[0].reading, per="relative" if relative else stresses[0].unit)
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
@@ -367,7 +372,13 @@ def calibrate(
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
-    configuration |= {} if reading == VOLTS else {"reading": asdict(reading)}
+    configuration |= {"reference_unit": reading.per} if reading.per != "Pa" else {}
+    if reading.per == "Pa" and any(s.load is None and s.normal_load is None for s in as_stated):
+        text = "No load is stated: it is taken to be that of the reference, "
+        text += (
+            f"{solution.scan.stated_load:.4g} N (--relative takes none, and states a relative A)."
+        )
+        messages = (Message("load_of_reference", text), *messages)
     if freed is not None:
         messages = (*freed.messages, *messages)
         configuration["free"] = freed.record
@@ -389,8 +400,8 @@ def calibrate(
         configuration["override"] = overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
-    messages = (*override_messages(overridden), *notes, *messages)
-    apparatus = assemble(solution, as_stated, results, other, checks, messages, configuration)
+    messages = (*override_messages(overridden), *messages)
+    apparatus = assemble(solution, as_stated[0], results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
 
 
@@ -419,17 +430,8 @@ def _of_law(
     return scan if friction is None else replace(scan, rod_friction=friction)
 
 
-def _without_loads(scan: Scan, reference: BaseStress | None) -> Scan:
-    """Return a scan without loads; one whose rod has to be solved keeps the nominal one."""
-    solved = reference is None and scan.reference is None
-    unstated: dict[str, Any] = dict.fromkeys(("normal_load", "normal_load_errors"))
-    load = scan.stated_load if solved else None
-    return replace(scan, load=load, load_uncertainty=None, **unstated)
-
-
-def _largest(stress: BaseStress) -> float:
-    profile = stress.profile() if isinstance(stress, Contact) else stress
-    return float(np.abs(profile.sigma_zz).max())
+def _table(stress: BaseStress) -> StressProfile:
+    return stress.profile() if isinstance(stress, Contact) else stress
 
 
 def _references(

@@ -146,11 +146,8 @@ def _hysteresis(solution: Solution) -> list[QualityCheck]:
     if extra is None:
         return []
     unit = solution.estimate.points.reading
-    scales = (
-        ("A", 1e2, "%"),
-        ("the centre's position", 1e6, "um"),
-        ("the baseline", 1 / unit.scale, unit.unit),
-    )
+    scales = [("A", 1e2, "%"), ("the centre's position", 1e6, "um")]
+    scales.append(("the baseline", 1 / unit.scale, unit.unit))
     differences = [
         f"of {name} by {format_measured(value * scale, error * scale, unit)}"
         for (name, scale, unit), value, error in zip(
@@ -265,7 +262,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_agreements(solution, results),
         *_shape(solution, results.parameters),
         *_set_up(solution),
-        *_indentation(solution, results),
+        *([] if solution.scan.film is None else [_indentation(solution, results)]),
         *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
@@ -393,15 +390,15 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     outliers = float(np.mean(estimate.outlier_weight < quality.OUTLIER_WEIGHT))
     transfer = float(gaussian_transfer(np.array(resolved), sigma))
     tail = _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT
-    film = solution.scan.film
     values = {
-        "width_over_thickness": (sigma / film.thickness if film else None, _WIDTH_LIMIT),
         "resolved_band": (transfer, _BAND_LIMIT),
         "tail_share": (solution.tail_share, tail),
         "baseline_drift": (change, _BASELINE_DRIFT_LIMIT),
         "reference_force": (force, _FORCE_LIMIT),
         "outliers": (outliers, quality.OUTLIER_LIMIT),
     }
+    if (film := solution.scan.film) is not None:
+        values = {"width_over_thickness": (sigma / film.thickness, _WIDTH_LIMIT), **values}
     meanings = {
         "width_over_thickness": "Width of G over the film's thickness. A failure means that the "
         "unit of the positions or of the film's thickness should be looked at.",
@@ -422,23 +419,16 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "noise is not what the uncertainties take it for: look at the points that the messages "
         "name.",
     }
-    return [
-        check(name, value, limit, meanings[name])
-        for name, (value, limit) in values.items()
-        if value is not None
-    ]
+    return [check(name, *values[name], meanings[name]) for name in values]
 
 
-def _indentation(solution: Solution, results: Results) -> list[QualityCheck]:
+def _indentation(solution: Solution, results: Results) -> QualityCheck:
     """Compare the depth with the thickness: beyond the limit a linear film is formal."""
-    if any(scan.film is None for scan in solution.scans):
-        return []
     film, depths = solution.scan.set_up.film, []
-    for scan, stress in zip(solution.scans, solution.stresses, strict=True):
-        below, rod, load = scan.set_up
+    pairs = zip(solution.scans, solution.stresses, strict=True)
+    for (below, *rod), stress in ((scan.set_up, stress) for scan, stress in pairs if scan.film):
         linear = replace(below, law=LINEAR, mooney_rivlin_ratio=None)
-        depth = stress.depth or press_rod(linear, rod, load).depth
-        depths.append(depth / below.thickness)
+        depths.append((stress.depth or press_rod(linear, *rod).depth) / below.thickness)
     meaning = "Largest depth of the rod over the film's thickness. "
     formal = film.law == LINEAR or not (film.law or "model_form" in results.changes)
     if formal:
@@ -455,7 +445,7 @@ def _indentation(solution: Solution, results: Results) -> list[QualityCheck]:
         )
         meaning += f"It has no limit, for {why}. A failure means that the film was stated linear."
     limit = INDENTATION_LIMIT if formal else math.inf
-    return [check("indentation", max(depths), limit, meaning)]
+    return check("indentation", max(depths), limit, meaning)
 
 
 def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:

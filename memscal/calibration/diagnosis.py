@@ -36,7 +36,7 @@ _CLEARLY, _KNEE, _AS_GOOD = 25.0, 3.0, 4.0
 _RATIO, _MOST_POINTS, _RISEN, _PROMISING, _HALVINGS = 1.4, 200, 1.05, 0.9, 7
 #: Lengths are scaled until the scan spans so many thicknesses of the film, and a rod until its
 #: radius is so small a share of the thickness that it acts as a point.
-_LONGEST_SPAN, _THINNEST = 60.0, 0.02
+_LONGEST_SPAN, _USUAL_SPAN, _THINNEST = 60.0, 8.0, 0.02
 #: Load of the rods that are tried, in N: the reference per newton does not depend on it.
 _LOAD = 1e-6
 
@@ -146,8 +146,8 @@ class _Search:
     @cached_property
     def lengths(self) -> tuple[_Length, ...]:
         """Lengths that make the reference narrower than the scan."""
-        h = min(map(_spread, self.scans, self.stresses))
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
+        h = min(scan.film.thickness if scan.film else span / _USUAL_SPAN for scan in self.scans)
         stretch = _grid(_LONGEST_SPAN * h / span)
         positions = _Length("positions", "data/x", 1.0, stretch)
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
@@ -246,14 +246,6 @@ class _Search:
             if np.isfinite(residual).all():
                 return _Trial(factor, fit, residual, weights)
         return _Trial(factor, None, np.full(1, np.inf), weights)
-
-
-def _spread(scan: Scan, stress: BaseStress) -> float:
-    """Length over which a reference spreads, in m: of a film its thickness."""
-    if isinstance(stress, Contact) or scan.film is not None:
-        return scan.set_up.film.thickness
-    high = stress.sigma_zz > 0.5 * stress.sigma_zz.max()
-    return 1.5 * float(stress.r[high].max(initial=_LOAD))
 
 
 def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:

@@ -92,9 +92,8 @@ class FilmLawComparison:
         against = best.law != self.reference
         if against and 2 * factor.log_factor >= POSITIVE:
             text += (
-                f" By the {names[0]} film A = {best.conversion_constant / self.reading.scale:.4g} "
-                f"{self.reading.over(self.reading.unit)} and "
-                f"σ = {best.gaussian_sigma / MM:.4g} mm; --film-law {best.law} makes it the "
+                f" By the {names[0]} film A = {self.reading.constant(best.conversion_constant)} and"
+                f" σ = {best.gaussian_sigma / MM:.4g} mm; --film-law {best.law} makes it the "
                 "reference."
             )
         strong = against and 2 * factor.log_factor >= STRONG
@@ -112,10 +111,8 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     solved: dict[str, Solution] = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
         of_law = ratio if law == reference else None
-        films = [
-            replace(s.set_up.film, law=law, mooney_rivlin_ratio=of_law) for s in solution.scans
-        ]
-        scans = [replace(s, film=f) for s, f in zip(solution.scans, films, strict=True)]
+        form: dict[str, Any] = {"law": law, "mooney_rivlin_ratio": of_law}
+        scans = [replace(s, film=replace(s.set_up.film, **form)) for s in solution.scans]
         if law == reference:
             solved[law] = replace(solution, scans=tuple(scans))
             continue
@@ -150,10 +147,8 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     columns = [effects[name].voltage for name in names]
     # A balance's error may differ from load to load; repeats at one load share it.
     signal, scan_of_points = estimate.predicted - estimate.background, estimate.points.scan
-    keys = [
-        (o, s.stated_load, s.load_uncertainty)
-        for o, s in zip(solution.owners, solution.scans, strict=True)
-    ]
+    pairs = zip(solution.owners, solution.scans, strict=True)
+    keys = [(o, s.stated_load, s.load_uncertainty) for o, s in pairs]
     for key in dict.fromkeys(keys):
         _, load, u = key
         chosen = np.array([other == key for other in keys])[scan_of_points]

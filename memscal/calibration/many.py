@@ -62,8 +62,7 @@ class FleetCalibration(Result):
         if self.parameters is None:
             problem = self.error.problem if self.error is not None else "no result"
             return f"<FleetCalibration {self.index}: {problem}>"
-        unit = self.parameters.reading
-        a = f"{self.parameters['conversion_constant'] / unit.scale:.4g} {unit.over(unit.unit)}"
+        a = self.parameters.reading.constant(self.parameters["conversion_constant"])
         return f"<FleetCalibration {self.index}: A = {a}>"
 
     @property

@@ -339,7 +339,7 @@ def _rehearse(
         scans = scans_of_repeats(scans, channel)[0]
     stresses = [reference_profile(scan, profile) for scan in scans]
     peak = 1.0 if settings["relative"] else None
-    loaded = [at_load_of(stress, s, peak)[0] for s, stress in zip(scans, stresses, strict=True)]
+    loaded = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
     readings = [measured_points(scan, channel) for scan in loaded]
     reference_spectra(stresses, readings)
     points, plan = joined_points(readings), (regulariser.name, outputs)

@@ -16,7 +16,6 @@ from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.finite_strain.table import largest_tabulated_load
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.indenter import Rod
 from memscal.model.records import FILM, INDENTER, LOAD
@@ -38,19 +37,13 @@ _DECAYED = 1e-3
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     """Refuse scans that cannot be fitted together."""
-    sensors = {(scan.sensor.name, scan.sensor.channel): None for scan in scans}
+    sensors = {(s.sensor.name or "unnamed", s.sensor.channel, s.unit): None for s in scans}
     if len(sensors) > 1:
-        named = ", ".join(f"{name or 'unnamed'} ({channel})" for name, channel in sensors)
+        named = ", ".join(f"{name} ({channel}, in {unit})" for name, channel, unit in sensors)
         raise InputError(
             f"The scans are of {len(sensors)} sensors: {named}.",
             why="Scans that are fitted together share one apparatus function.",
             cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
-        )
-    if len(units := {scan.unit: None for scan in scans}) > 1:
-        raise InputError(
-            f"The readings of the scans are in {' and in '.join(units)}.",
-            why="Scans that are fitted together share one conversion constant.",
-            cure="Correct the units of u_zz, or calibrate each scan by itself.",
         )
     films: dict[str, ElasticFilm] = {}
     for film in (scan.film for scan in scans if scan.film is not None):
@@ -181,29 +174,15 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     return press_rod(*scan.set_up, scan.rod_friction)
 
 
-def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> tuple[Scan, list[Message]]:
-    """Return a scan with a load: its own or the reference's; with a ``peak`` (Pa) loads are equal.
-
-    A relative calibration refers A to the reference over its largest stress, whatever the loads.
-    """
+def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
+    """Return a scan with a load: its own or the reference's; with a ``peak`` (Pa) one for all."""
     if peak or stress.unit != "Pa":
+        # A refers to the reference over its peak, or to a unit of what is no stress.
         factor = np.full(scan.u_zz.shape, stress.load / (peak or 1.0))
-        return replace(
-            scan,
-            load=stress.load,
-            load_uncertainty=None,
-            normal_load=factor,
-            normal_load_errors=None,
-        ), []
-    if scan.load is not None:
-        return scan, []
-    if scan.normal_load is not None:
-        return replace(scan, load=float(np.nanmedian(scan.normal_load))), []
-    text = (
-        f"The scan states no load: it is taken at that of its reference, {stress.load:.4g} N "
-        "(--relative: no load is taken, and A is relative)."
-    )
-    return replace(scan, load=stress.load), [Message("load_of_reference", text, "warning")]
+        return replace(scan, load=stress.load, normal_load=factor, normal_load_errors=None)
+    if scan.load is None and scan.normal_load is not None:
+        return replace(scan, load=float(np.nanmedian(scan.normal_load)))
+    return scan if scan.load else replace(scan, load=stress.load)
 
 
 def reference_spectra(
@@ -312,11 +291,9 @@ def reference_sensitivities(
     ):
         distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
-            if scan.film is None:
-                continue
             number = distinct.index(owner)
             suffix = f"_{number + 1}" if number else ""
-            for source, change in sensitivities(scan, references[i]).items():
+            for source, change in (sensitivities(scan, references[i]) if scan.film else {}).items():
                 blank = [np.zeros_like(change) for _ in scans]
                 changes.setdefault(source + suffix, blank)[i] = change
     return changes
@@ -400,9 +377,8 @@ def law_at_once(scan: Scan) -> str:
     if scan.set_up.film.law in ("", LINEAR):
         return LINEAR
     rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    within = is_tabulated(
-        rubber, scan.set_up.indenter, _MARGIN * scan.stated_load, scan.rod_friction
-    )
+    rod, load = scan.set_up[1:]
+    within = is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction)
     return NEO_HOOKEAN if within else LINEAR
 
 

@@ -130,7 +130,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
     stress = _seen_stress(data)
     if not (np.isfinite(constant) and constant > 0) or stress is None:
         return
-    voltage = constant * stress * data.load_factor
+    voltage = constant * stress
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
@@ -146,7 +146,7 @@ def _reference_peak(data: ApparatusData) -> float:
     stress = _seen_stress(data)
     if stress is None:
         return 0.0
-    peak = float(data.conversion_constant * np.max(stress) * data.load_factor)
+    peak = float(data.conversion_constant * np.max(stress))
     return peak if np.isfinite(peak) else 0.0
 
 
@@ -155,11 +155,14 @@ def _tangential(data: ApparatusData) -> bool:
 
 
 def _seen_stress(data: ApparatusData) -> FloatArray | None:
-    """The reference as the channel sees it where its voltage is positive, in Pa."""
+    """The reference at the load, as the channel sees it where its voltage is positive, in Pa."""
     reference = data.reference
+    factor = (data.load or reference.load) / reference.load
+    if data.reading.per == "relative":
+        factor = 1 / np.abs(reference.sigma_zz).max()
     if not _tangential(data):
-        return reference.sigma_zz
-    return None if reference.sigma_rz is None else -reference.sigma_rz
+        return reference.sigma_zz * factor
+    return None if reference.sigma_rz is None else -reference.sigma_rz * factor
 
 
 def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:

@@ -1,6 +1,7 @@
 """memscal-artifact: the apparatus function with all that it rests on, as HDF5."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,15 +9,9 @@ from memscal.errors import FormatError
 from memscal.formats import groups
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import (
-    ARTIFACT_SCHEMA,
-    Group,
-    Node,
-    file_tree,
-    without_empty,
-    write_tree,
-)
-from memscal.formats.values import altered, require_schema
+from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
+from memscal.formats.units import reading_of
+from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import apparatus, records
 from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
 from memscal.model.notation import Reading
@@ -33,8 +28,9 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         )
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
     film, indenter = groups.read_stated(file)
-    process = groups.read_process(file, "/entry/process")
-    reading = Reading(**process.configuration.get("reading", {}))
+    process, u_zz = groups.read_process(file, "/entry/process"), "/entry/reconvolution/u_zz"
+    reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
+    reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
     of_scan = records.RECONVOLUTION.read_in(reading)
     reconvolution = read_record(of_scan, file, "/entry/reconvolution")
@@ -69,16 +65,14 @@ def artifact_tree(data: ApparatusData) -> Group:
 
 
 def _entry(data: ApparatusData) -> Group:
-    sensor = data.sensor.name
+    sensor, of_scan = data.sensor.name, records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "apparatus_function": write_record(records.FIELD, data.field),
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
         "transfer_function": write_record(records.TRANSFER, data.transfer),
-        "reconvolution": write_record(
-            records.RECONVOLUTION.read_in(data.reading), data.reconvolution
-        ),
+        "reconvolution": write_record(of_scan, data.reconvolution),
         "parameters": groups.parameter_group(data.parameters, data.budget),
         "quality": groups.quality_group(data.checks),
         "sample": groups.sample_group(data.film),
@@ -94,7 +88,7 @@ def _entry(data: ApparatusData) -> Group:
             f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
-    return Group("NXentry", without_empty(children), {"default": "apparatus_function"})
+    return Group("NXentry", children, {"default": "apparatus_function"})
 
 
 def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:

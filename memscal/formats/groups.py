@@ -27,17 +27,9 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
-from memscal.model.notation import Reading
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import (
-    OF_READINGS,
-    TRUTH,
-    Quantity,
-    Record,
-    declared_quantity,
-    dimension_in,
-    estimated_quantity,
-)
+from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
@@ -186,12 +178,13 @@ _COVARIANCE = (
 )
 
 
-def parameter_dimension(name: str, unit: str = "") -> str:
+def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name."""
+    declared = declared_quantity(name)
+    if declared is not None and (not unit or reading != VOLTS):
+        return declared.read_in(reading).dimension
     if unit:
         return dimension_of(unit, f"parameter {name}")
-    if (declared := declared_quantity(name)) is not None:
-        return declared.dimension
     raise InputError(
         f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",
@@ -204,9 +197,9 @@ def parameter_dimension(name: str, unit: str = "") -> str:
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
+    of = parameters.reading
     dimensions = [
-        dimension_in(parameter_dimension(name, unit), parameters.reading)
-        for name, unit in zip(parameters.names, stated, strict=True)
+        parameter_dimension(n, u, of) for n, u in zip(parameters.names, stated, strict=True)
     ]
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
@@ -238,8 +231,8 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
             f"{file.where(path)}/names is missing or names a parameter twice.",
             why="It lists the parameters, in the order of their covariance.",
         )
-    for dimension in OF_READINGS:
-        dimension_in(dimension, reading)
+    for name in names:  # their units are entered
+        estimated_quantity(name).read_in(reading)
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
     scale = np.array([_unit_scale(file, f"{path}/{name}") for name in names])
     covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)

@@ -15,7 +15,7 @@ from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si
-from memscal.formats.units import reading_unit
+from memscal.formats.units import reading_of
 from memscal.formats.values import any_scalar, optional_text, text_list, units_of
 from memscal.model import records
 from memscal.model.arrays import FloatArray
@@ -83,11 +83,11 @@ def scan_from(file: SafeFile) -> Scan:
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
     film, indenter = groups.read_stated(file)
-    unit = reading_unit(units_of(file, f"{_DATA}/u_zz"), file.where(f"{_DATA}/u_zz"))
+    reading = reading_of(units_of(file, f"{_DATA}/u_zz") or "V", file.where(f"{_DATA}/u_zz"))
     axes = _check_axes(file)
     only_y = axes == _POINTS and not file.has(f"{_DATA}/x")
     along = "y" if only_y or axes in _ALONG_Y.values() else "x"
-    arrays = _read_arrays(file, along, Reading(unit, -3 if unit == "V" else 0))
+    arrays = _read_arrays(file, along, reading)
     # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
     numbered = axes == _POINTS and file.has(f"{_DATA}/repeat")
     if "branch" in arrays:
@@ -108,7 +108,7 @@ def scan_from(file: SafeFile) -> Scan:
         **load,
         indenter=indenter,
         film=film,
-        unit=unit,
+        unit=reading.si,
         **contact,
         sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
         title=optional_text(file, "/entry/title"),
@@ -172,7 +172,7 @@ def _entry(scan: Scan) -> Group:
         children |= groups.reference_groups(scan.reference)
     if scan.synthetic is not None:
         children["synthetic"] = _synthetic_group(scan.synthetic)
-    return Group("NXentry", writer.without_empty(children), {"default": "data"})
+    return Group("NXentry", children, {"default": "data"})
 
 
 def _data_group(scan: Scan) -> Group:

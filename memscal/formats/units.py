@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from memscal.errors import UnitError
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import NAMED_UNITS, Reading
-from memscal.model.quantities import DIMENSIONS, dimension_in
+from memscal.model.quantities import DIMENSIONS
 
 SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
@@ -38,7 +38,7 @@ _POWERS = {
     "angle": {"rad": 0},
     "energy": {"J": 0},
     "stress per length": {"MPa/mm": 9},
-    "dimensionless": {"1": 0, "": 0},
+    "dimensionless": {"1": 0, "": 0, "a.u.": 0, "arb": 0, "adu": 0, "lsb": 0, "digits": 0},
 }
 _CANONICAL = {
     unit: (dimension, power)
@@ -89,36 +89,16 @@ def _power(unit: str, dimension: str) -> int | None:
     return round(math.log10(units.scale)) if unit == units.stored and not of else None
 
 
-def reading_unit(unit: str | None, where: str) -> str:
-    """Return the SI unit of readings in any unit: one that has a name, base units, or 1."""
-    if unit is None or unit.strip() in _POWERS["voltage"]:
-        return "V"
-    if unit.strip().lower() in _ARBITRARY:
-        return "1"
-    quantity = _pint_quantity(unit, 1.0, "reading", where)
-    base = quantity.to_base_units()
-    if abs(_pint_quantity(unit, 2.0, "reading", where).to_base_units() / base - 2) > 1e-9:
-        raise UnitError(
-            f'{where} has the unit "{_shown(unit)}", whose zero is not that of the SI unit.',
-            why="A calibration needs readings in proportion to what is measured.",
-            cure=f'Convert them, such as to "{base.units:~C}".',
-        )
-    for name in NAMED_UNITS:
-        if quantity.is_compatible_with(name):
-            return name
-    return f"{base.units:~C}".replace("**", "^") if base.dimensionality else "1"
-
-
-def readings_in_si(values: ArrayLike, unit: str, where: str) -> FloatArray:
-    """Convert readings from any unit to that of :func:`reading_unit`."""
-    si = reading_unit(unit, where)
-    arbitrary = unit.strip().lower() in _ARBITRARY
-    dimension = dimension_in("voltage", Reading(si, -3 if si == "V" else 0))
-    return to_si(values, "1" if arbitrary else unit, dimension, where)
-
-
-#: Words for readings in units of their own.
-_ARBITRARY = {"", "1", "a.u.", "arb", "arb.", "arb. units", "arbitrary", "adu", "lsb", "digits"}
+def reading_of(unit: str, where: str) -> Reading:
+    """Return the unit of readings in any unit: one that has a name, base units, or 1."""
+    if canonical := _CANONICAL.get(unit.strip()):
+        return Reading.fitting(DIMENSIONS[canonical[0]].si, 10.0 ** canonical[1])
+    quantity = _pint_quantity(unit, "reading", where)
+    if not (base := quantity.to_base_units()).dimensionality:
+        return Reading.fitting("1")
+    si = next((name for name in NAMED_UNITS if quantity.is_compatible_with(name)), "")
+    si = si or f"{base.units:~C}".replace("**", "^")
+    return Reading.fitting(si, float(quantity.to(si).magnitude))
 
 
 def dimension_of(unit: str, where: str) -> str:
@@ -149,30 +129,27 @@ def _scaled(numbers: FloatArray, power: int) -> FloatArray:
 def _pint_factor(unit: str, dimension: str, where: str) -> float:
     import pint
 
-    si = DIMENSIONS[dimension].si
     try:
-        quantity = _pint_quantity(unit, 1.0, dimension, where)
+        quantity, si = _pint_quantity(unit, dimension, where), DIMENSIONS[dimension].si
         return float(quantity.to("dimensionless" if si == "1" else si).magnitude)
     except pint.DimensionalityError as error:
         raise _wrong_dimension(where, unit, dimension) from error
 
 
-def _pint_quantity(unit: str, value: float, dimension: str, where: str) -> Any:
-    """Return a number with a unit, which pint must know."""
-    stored = DIMENSIONS[dimension].stored if dimension in DIMENSIONS else "pA"
+def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
+    """Return one of a unit, which pint must know, and whose zero is that of the SI unit."""
+    cure = f'Write it like "{DIMENSIONS.get(dimension, DIMENSIONS["voltage"]).stored}".'
     if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
-        raise UnitError(
-            f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.',
-            cure=f'Write it like "{stored}".',
-        )
-    registry = _registry()
+        problem = f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.'
+        raise UnitError(problem, cure=cure)
     try:
-        return registry.Quantity(value, registry.parse_units(unit))
+        quantity = _registry().Quantity(1.0, _registry().parse_units(unit))
+        return quantity + 0 * quantity  # no sum of degrees above another zero, or of logarithms
     except Exception as error:  # pint raises what its parser happens to meet
         raise UnitError(
-            f'{where} has the unit "{_shown(unit)}", which is unknown.',
+            f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.',
             why=f"It is a {dimension}.",
-            cure=f'Write it like "{stored}".',
+            cure=cure,
         ) from error
 
 

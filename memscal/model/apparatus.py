@@ -12,7 +12,7 @@ from memscal.model.arrays import FloatArray, FrozenArrays
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.notation import VOLTS, Reading, format_measured
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
@@ -189,16 +189,10 @@ class ApparatusData(Checked):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        constant = self.reading.over(self.reading.unit)
-        a, sigma = (
-            format_measured(
-                self.parameters[name] / scale, self.parameters.uncertainty(name) / scale, unit
-            )
-            for name, scale, unit in (
-                ("conversion_constant", self.reading.scale, constant),
-                ("gaussian_sigma", 1e-3, "mm"),
-            )
-        )
+        from memscal.model.quantities import measured_text  # it imports this module
+
+        names = "conversion_constant", "gaussian_sigma"
+        a, sigma = (measured_text(self.parameters, name) for name in names)
         state = state_of_checks(self.checks)
         return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"
 
@@ -207,28 +201,15 @@ class ApparatusData(Checked):
         """Unit of the sensor's readings, and of the reference."""
         return self.parameters.reading
 
-    @property
-    def relative(self) -> bool:
-        """Whether A is relative: the reading by the reference at its largest stress."""
-        return self.reading.per == "relative"
-
     def require_pascals(self) -> None:
         """Refuse to state pascals by a conversion constant that is not per pascal."""
-        if self.reading.per != "Pa":
+        if (per := self.reading.per) != "Pa":
+            whose = "relative" if per == "relative" else "per unit of a reference that is no stress"
             raise InputError(
-                "The conversion constant of the artifact is not per pascal: it is "
-                + ("relative." if self.relative else "per unit of a reference that is no stress."),
+                f"The conversion constant of the artifact is {whose}.",
                 why="The stress of its calibration was not known, and no reading tells another.",
-                cure="Calibrate with a scan of known load and a stress in Pa, without --relative; "
-                "G needs none of them.",
+                cure="Calibrate with a known load and a stress in Pa, without --relative.",
             )
-
-    @property
-    def load_factor(self) -> float:
-        """The stress that A refers to over the stored reference."""
-        if self.relative:
-            return 1 / float(np.abs(self.reference.sigma_zz).max())
-        return (self.load or self.reference.load) / self.reference.load
 
     @property
     def conversion_constant(self) -> float:

@@ -11,11 +11,9 @@ _PLAIN_EXPONENTS = range(-3, 5)
 _NEGLIGIBLE = 1e-12
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
-#: Prefixes by their powers of ten, and the SI units that take one.
-_PREFIXES = dict(
-    zip(range(-18, 12, 3), ("a", "f", "p", "n", "u", "m", "", "k", "M", "G"), strict=True)
-)
+#: SI units that take prefixes, and these, from 10^-18 to 10^9.
 NAMED_UNITS = ("V", "A", "T", "Pa", "N", "m", "Hz", "W", "J", "C", "F", "ohm", "S", "K", "s")
+_PREFIXES = "afpnum kMG"
 
 
 @dataclass(frozen=True)
@@ -31,16 +29,16 @@ class Reading:
     per: str = "Pa"
 
     @classmethod
-    def fitting(cls, si: str, size: float) -> "Reading":
+    def fitting(cls, si: str, size: float = 0.0) -> "Reading":
         """Return the unit in which readings up to a size are shown: volts are in mV always."""
-        if si not in NAMED_UNITS[1:] or not (math.isfinite(size) and size > 0):
+        if si not in NAMED_UNITS[1:] or not 0 < size < math.inf:
             return cls(si, -3 if si == "V" else 0)
         return cls(si, min(max(3 * math.floor(math.log10(size) / 3 + 1e-9), -18), 9))
 
     @property
     def unit(self) -> str:
         """The unit that is shown, with its prefix."""
-        return _PREFIXES[self.power] + self.si
+        return _PREFIXES[self.power // 3 + 6].strip() + self.si
 
     @property
     def scale(self) -> float:
@@ -51,18 +49,18 @@ class Reading:
         """Return a unit of readings over that of the reference."""
         if self.per in ("1", "relative"):
             return unit
-        if unit == self.per:
-            return "1"
-        inverse = self.per.startswith("1/")
-        return f"{unit}*{self.per[2:]}" if inverse else f"{unit}/{self.per}"
+        return "1" if unit == self.per else f"{unit}/{self.per}".replace("/1/", "*")
 
     def text(self, value: float, form: str = ".3g") -> str:
         """Write a reading, given in its SI unit."""
         return f"{value / self.scale:{form}} {self.unit}".removesuffix(" 1")
 
+    def constant(self, value: float) -> str:
+        """Write a conversion constant, given in SI units."""
+        return f"{value / self.scale:.4g} {self.over(self.unit)}"
+
 
 VOLTS = Reading()
-"""Volts, shown in mV, over Pa."""
 
 
 def format_measured(value: float, uncertainty: float | None, unit: str = "") -> str:

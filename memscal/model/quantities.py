@@ -44,23 +44,21 @@ DIMENSIONS = {
 
 def dimension_in(dimension: str, reading: Reading) -> str:
     """Return a dimension for readings in a unit, which is entered where they are not in volts."""
-    if dimension not in OF_READINGS or reading == VOLTS:
+    if not dimension.startswith("voltage") or reading == VOLTS:
         return dimension
-    si, shown, scale = reading.si, reading.unit, reading.scale
-    if dimension == "voltage per stress":
-        scale = 1.0 if reading.over(si) == "1" != si else scale
-        si, shown = reading.over(si), reading.over(si if scale == 1.0 else shown)
-    elif dimension == "voltage per length":
-        si, shown, scale = f"{si}/m", f"{shown}/mm", scale / MM
-    text = "" if shown == "1" else shown
-    if dimension == "voltage per stress" and reading.per == "relative":
-        text = f"{text} (relative)".strip()
-    key = f"reading in {text or 1}"
-    DIMENSIONS[key] = Dimension(si, shown, text, scale)
+    si, unit, scale = reading.si, reading.unit, reading.scale
+    if dimension == "voltage per length":
+        si, unit, scale = f"{si}/m", f"{unit}/mm", scale / MM
+    elif dimension == "voltage per stress":
+        si, unit = reading.over(si), reading.over(unit)
+    if si == "1":
+        unit, scale = "1", 1.0
+    relative = "(relative)" * (dimension == "voltage per stress" and reading.per == "relative")
+    shown = f"{unit if unit != '1' else ''} {relative}".strip()
+    key = f"reading in {shown or 1}"
+    DIMENSIONS[key] = Dimension(si, unit, shown, scale)
     return key
 
-
-OF_READINGS = ("voltage", "voltage per stress", "voltage per length")
 
 # Units other than a dimension's own in which some quantities are shown, in SI units.
 _OTHER_UNITS = {"um": 1e-6, "MPa": 1e6, "1/mm^2": PER_MM2, "percent": 1e-2}
@@ -246,7 +244,7 @@ def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
 def parameter_quantity(parameters: ParameterSet, name: str) -> Quantity:
     """Return how one of a set's parameters is shown, by its stated unit where there is one."""
     declared = estimated_quantity(name)
-    if not parameters.units or declared.dimension in OF_READINGS:
+    if not parameters.units or parameters.reading != VOLTS:
         return declared.read_in(parameters.reading)
     return estimated_quantity(name, parameters.units[parameters.names.index(name)])
 

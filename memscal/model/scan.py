@@ -452,17 +452,13 @@ class Scan:
         film, indenter, load = self.film, self.indenter, self.load
         if film is not None and indenter is not None and load is not None:
             return SetUp(film, indenter, load)
-        stated = {
-            "film (/entry/sample/film)": film,
-            "indenter (/entry/indenter)": indenter,
-            "load (/entry/indenter/load)": load,
-        }
-        missing = " and no ".join(name for name, value in stated.items() if value is None)
+        places = ("film (/entry/sample/film)", "indenter (/entry/indenter)", "load (.../load)")
+        absent = zip(places, (film, indenter, load), strict=True)
+        missing = " and no ".join(place for place, value in absent if value is None)
         raise InputError(
             f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
             why="The stress that an indenter makes at the base of a film is calculated from them.",
-            cure="State them (memscal import --thickness, --radius, --load ...), or calibrate with "
-            "a stress that is known (--reference).",
+            cure="State them (memscal import --thickness, --radius, --load), or give --reference.",
         )
 
     @property

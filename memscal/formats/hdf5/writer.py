@@ -74,11 +74,6 @@ def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
     return Number(converted, units, axes)
 
 
-def without_empty(children: Mapping[str, Node]) -> dict[str, Node]:
-    """Return the children without groups that hold nothing, of what was not stated."""
-    return {k: v for k, v in children.items() if not isinstance(v, Group) or v.children}
-
-
 def count(value: int) -> Number:
     """Return a whole number, or a truth value as 0 or 1."""
     return Number(np.asarray(value, dtype=np.int64), "1")

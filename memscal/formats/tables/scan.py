@@ -10,10 +10,11 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.text_table import Table, read_table
-from memscal.formats.units import reading_unit, readings_in_si
+from memscal.formats.units import reading_of
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.quantities import dimension_in
 from memscal.model.scan import BRANCHES, Scan, branch_numbers, places_of
 
 Column = str | int
@@ -69,15 +70,16 @@ def read_scan_table(
     channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
     u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
     x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
-    unit = reading_unit(u_unit, table.where(u))
+    reading = reading_of(u_unit, table.where(u))
+    of_unit = dimension_in("voltage", reading)
     columns = {
-        name: readings_in_si(table.column(column), u_unit, table.where(column))
+        name: table.quantity(column, u_unit, of_unit)
         for name, column in channels.items()
         if column is not None
     }
     columns["u_zz"] = u_sign * columns["u_zz"]
     notes += ["The sign of u_zz was changed."] if u_sign < 0 else []
-    if unit != "V":
+    if reading.si != "V":
         notes.append(f"The readings are in {u_unit}.")
     if load_column is not None:
         columns["normal_load"] = table.quantity(load_column, load_unit, "force")
@@ -114,7 +116,7 @@ def read_scan_table(
         normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
         channels={name: arrays[name] for name in ("u_xz", "u_yz") if name in arrays},
         load=load,
-        unit=unit,
+        unit=reading.si,
         notes="\n".join(marked_texts(messages)),
         source=table.source,
         **stated,

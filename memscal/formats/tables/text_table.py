@@ -57,14 +57,10 @@ class Table:
     def unit_of(self, column_name: str | int, unit: str | None, option: str) -> str:
         """Return the unit of a column: the one given, or that of its head."""
         head = _HEAD.fullmatch(self.names[self._index(column_name)])
-        stated = unit or (head and next(filter(None, head.groups()[1:])))
-        if not stated:
-            raise InputError(
-                f"{self.where(column_name)} states no unit.",
-                why="A bare number could be in any unit.",
-                cure=f"Give it in the head of the column, as in 'x/mm', or as {option}.",
-            )
-        return stated.strip()
+        if stated := unit or (head and next(filter(None, head.groups()[1:]))):
+            return stated.strip()
+        cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
+        raise InputError(f"{self.where(column_name)} states no unit.", cure=cure)
 
     def where(self, column_name: str | int) -> str:
         """Return file and column as messages name them."""
