@@ -21,6 +21,8 @@ SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 FILE_UNITS = {name: dimension.stored for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension that our writers use."""
 
+#: Words for readings in a unit of their own.
+ARBITRARY = ("a.u.", "arb", "adu", "lsb", "digits")
 # Canonical units of each dimension with the power of ten that takes them to SI; the micro sign and
 # the Greek mu are two characters.
 _POWERS = {
@@ -38,7 +40,7 @@ _POWERS = {
     "angle": {"rad": 0},
     "energy": {"J": 0},
     "stress per length": {"MPa/mm": 9},
-    "dimensionless": {"1": 0, "": 0, "a.u.": 0, "arb": 0, "adu": 0, "lsb": 0, "digits": 0},
+    "dimensionless": dict.fromkeys(("1", "", *ARBITRARY), 0),
 }
 _CANONICAL = {
     unit: (dimension, power)

@@ -303,6 +303,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         position_scale_uncertainty=scan.position_scale_uncertainty,
         synthetic=bool(scan.synthetic),
         source=scan.source,
+        unit="" if scan.unit == "V" else scan.unit,
     )
 
 

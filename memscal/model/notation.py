@@ -48,7 +48,7 @@ class Reading:
     def over(self, unit: str) -> str:
         """Return a unit of readings over that of the reference."""
         if self.per in ("1", "relative"):
-            return unit
+            return unit if self.per == "1" else f"{unit} (relative)"
         return "1" if unit == self.per else f"{unit}/{self.per}".replace("/1/", "*")
 
     def text(self, value: float, form: str = ".3g") -> str:

@@ -46,17 +46,16 @@ def dimension_in(dimension: str, reading: Reading) -> str:
     """Return a dimension for readings in a unit, which is entered where they are not in volts."""
     if not dimension.startswith("voltage") or reading == VOLTS:
         return dimension
-    si, unit, scale = reading.si, reading.unit, reading.scale
+    si, shown, scale = reading.si, reading.unit, reading.scale
     if dimension == "voltage per length":
-        si, unit, scale = f"{si}/m", f"{unit}/mm", scale / MM
+        si, shown, scale = f"{si}/m", f"{shown}/mm", scale / MM
     elif dimension == "voltage per stress":
-        si, unit = reading.over(si), reading.over(unit)
+        si, shown = reading.over(si), reading.over(shown)
     if si == "1":
-        unit, scale = "1", 1.0
-    relative = "(relative)" * (dimension == "voltage per stress" and reading.per == "relative")
-    shown = f"{unit if unit != '1' else ''} {relative}".strip()
-    key = f"reading in {shown or 1}"
-    DIMENSIONS[key] = Dimension(si, unit, shown, scale)
+        shown, scale = "1", 1.0
+    si, stored = (name.removesuffix(" (relative)") for name in (si, shown))
+    key = f"reading in {shown}"
+    DIMENSIONS[key] = Dimension(si, stored, shown.removeprefix("1 ") if shown != "1" else "", scale)
     return key
 
 

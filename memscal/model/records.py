@@ -216,6 +216,7 @@ MEASURED_SCAN = record(
         "relative uncertainty of all positions",
         stored="position_scale_errors",
     ),
+    Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 
 

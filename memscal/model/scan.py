@@ -17,7 +17,7 @@ from memscal.model import arrays
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.notation import Reading
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
@@ -469,8 +469,8 @@ class Scan:
     @property
     def reading(self) -> Reading:
         """The unit in which the readings are shown."""
-        sizes = np.abs(self.u_zz[np.isfinite(self.u_zz)])
-        return Reading.fitting(self.unit, float(sizes.max(initial=0.0)))
+        largest = float(np.nanmax(np.abs(self.u_zz), initial=0.0))
+        return VOLTS if self.unit == "V" else Reading.fitting(self.unit, largest)
 
     @property
     def kind(self) -> str:

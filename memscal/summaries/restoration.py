@@ -46,7 +46,8 @@ def _determined(restored: Restoration) -> list[Quantity]:
     free = restored.points.free[0]
     fixed = [name for i, name in enumerate(("centre", "centre_y")) if not free[i]]
     hidden = {name + end for name in fixed for end in ("", "_uncertainty")}
-    return [quantity for quantity in RESTORED if quantity.name not in hidden]
+    of = restored.points.reading
+    return [quantity.read_in(of) for quantity in RESTORED if quantity.name not in hidden]
 
 
 def _errors(restored: Restoration) -> FloatArray:

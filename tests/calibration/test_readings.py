@@ -18,11 +18,15 @@ TABLE = memscal.indent(FILM, ROD, load=1.0).profile()
 BARE = replace(TABLE, film=None, indenter=None, depth=None, contact_radius=None)
 
 
-def without_set_up(scan=SCAN, factor=1.0, unit="V"):
-    errors = None if scan.u_zz_errors is None else factor * scan.u_zz_errors
+def scaled(factor, unit):
+    """Return the scan with readings in another unit."""
+    errors = None if SCAN.u_zz_errors is None else factor * SCAN.u_zz_errors
+    return replace(SCAN, u_zz=factor * SCAN.u_zz, u_zz_errors=errors, unit=unit)
+
+
+def without_set_up(scan=SCAN):
     stated = dict.fromkeys(("film", "indenter", "load", "load_uncertainty", "rod_friction"))
-    u = {"u_zz": factor * scan.u_zz, "u_zz_errors": errors, "unit": unit}
-    return replace(scan, **stated, **u)
+    return replace(scan, **stated)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +60,7 @@ def test_a_film_that_the_reference_does_not_need_changes_nothing(bare, thickness
     [("A", 1e-9, "pA/Pa"), ("T", 1e-4, "uT/Pa"), ("Pa", 1e6, ""), ("1", 1e5, "1/Pa")],
 )
 def test_readings_in_another_unit_are_volts_times_a_factor(bare, tmp_path, unit, factor, shown):
-    scan = without_set_up(factor=factor, unit=unit)
+    scan = without_set_up(scaled(factor, unit))
     write_scan(scan, tmp_path / "scan.h5")
     stored = read_scan(tmp_path / "scan.h5")
     assert (stored.unit, stored.film, stored.indenter, stored.load) == (unit, None, None, None)
@@ -79,7 +83,7 @@ def test_readings_in_another_unit_are_volts_times_a_factor(bare, tmp_path, unit,
 
 
 def test_scans_of_several_units_are_refused():
-    with pytest.raises(InputError, match="in V.*in A"):
+    with pytest.raises(InputError, match=r"in V.*in A"):
         memscal.calibrate([SCAN, replace(SCAN, unit="A")])
 
 
@@ -123,10 +127,24 @@ def test_a_new_user_imports_and_calibrates_currents(tmp_path, monkeypatch, capsy
     table = np.stack([SCAN.x * 1e3, SCAN.u_zz * 1e4], axis=1)
     np.savetxt("scan.csv", table, delimiter=",", header="x/mm,current/pA", comments="")
     write_reference(BARE, "table.h5")
-    assert main("import scan.csv -o scan.h5 --x x --u current".split()) == 0
+    assert main(["import", "scan.csv", "-o", "scan.h5", "--x", "x", "--u", "current"]) == 0
     capsys.readouterr()
-    assert main("calibrate scan.h5 --reference table.h5 --figure scan.png".split()) == 0
+    assert main(["calibrate", "scan.h5", "--reference", "table.h5", "--figure", "scan.png"]) == 0
     assert "pA/Pa" in capsys.readouterr().out.partition("\n")[0]
     assert main(["inspect", "scan.apparatus.h5"]) == 0
-    assert main("calibrate scan.h5 -o none.h5".split()) == 2
+    assert main(["calibrate", "scan.h5", "-o", "none.h5"]) == 3
     assert "--reference" in capsys.readouterr().err
+
+
+def test_currents_are_turned_into_stress_and_come_back(tmp_path):
+    currents = scaled(1e-9, "A")
+    measured = memscal.measure_stress(currents, memscal.calibrate(currents).apparatus)
+    volts = memscal.measure_stress(SCAN, CALIBRATED)
+    np.testing.assert_allclose(measured.profiles[0].s_zz, volts.profiles[0].s_zz, rtol=1e-6)
+    measured.save(tmp_path / "a.stress.h5")
+    stored = memscal.read_stress(tmp_path / "a.stress.h5")
+    np.testing.assert_allclose(
+        stored.profiles[0].points["zz"].u, measured.profiles[0].points["zz"].u
+    )
+    assert "A/Pa" in str(stored)
+    assert "V" not in str(stored.to_dict()["conversion_constant"])

@@ -16,7 +16,7 @@ from memscal.formats.units import FILE_UNITS, SI_UNITS, dimension_of, from_si, t
 PINT = pint.UnitRegistry()
 
 
-@pytest.mark.parametrize("unit", [u for u in units._CANONICAL if u])
+@pytest.mark.parametrize("unit", {*units._CANONICAL} - {"", *units.ARBITRARY})
 def test_the_table_agrees_with_pint(unit):
     dimension, power = units._CANONICAL[unit]
     si = "dimensionless" if SI_UNITS[dimension] == "1" else SI_UNITS[dimension]

@@ -23,7 +23,7 @@ _MAX_COLUMNS = 1000
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 # A name and its unit: x/mm, x (mm) or x [mm].
-_HEAD = re.compile(r"(.*?)\s*(?:/([^/()\[\]]+)|\(([^()]+)\)|\[([^\[\]]+)\])")
+_HEAD = re.compile(r"([^/(\[]+?)\s*(?:/(.+)|\((.+)\)|\[(.+)\])")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 _MAX_NAME = 80
 _MAX_COMMENTS = 20
