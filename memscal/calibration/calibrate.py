@@ -66,7 +66,7 @@ def assemble(
     configuration: Mapping[str, Any],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
-    # Film and indenter are those of the scan as ``stated`` where nothing was calculated with them.
+    # Film and indenter are as ``stated`` by the scan where nothing was calculated with them.
     scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
     reference = _table(stress)
     versions = {"numpy": np.__version__, "scipy": scipy.__version__}
@@ -162,8 +162,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
-#: What a relative calibration leaves out of a scan.
-_OF_LOADS = ("load_uncertainty", "normal_load", "normal_load_errors")
+_OF_POINTS = ("normal_load", "normal_load_errors")
 #: Methods whose derivatives are complete.
 _LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
@@ -331,11 +330,11 @@ def calibrate(
     scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
     if relative:
         # A rod that has to be solved keeps its nominal load.
-        loads: dict[str, Any] = dict.fromkeys(_OF_LOADS)
-        pairs_of = zip(scans, references, strict=True)
-        scans = tuple(
-            replace(s, **loads, load=None if r or s.reference else s.load) for s, r in pairs_of
-        )
+        loads: dict[str, Any] = dict.fromkeys(("load_uncertainty", *_OF_POINTS))
+        kept = [
+            None if r or s.reference else s.load for s, r in zip(scans, references, strict=True)
+        ]
+        scans = tuple(replace(s, load=p, **loads) for s, p in zip(scans, kept, strict=True))
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
@@ -374,10 +373,8 @@ def calibrate(
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
     configuration |= {"reference_unit": reading.per} if reading.per != "Pa" else {}
     if reading.per == "Pa" and any(s.load is None and s.normal_load is None for s in as_stated):
-        text = "No load is stated: it is taken to be that of the reference, "
-        text += (
-            f"{solution.scan.stated_load:.4g} N (--relative takes none, and states a relative A)."
-        )
+        load = f"{solution.scan.stated_load:.4g} N (--relative takes none)"
+        text = f"No load is stated: it is taken to be that of the reference, {load}."
         messages = (Message("load_of_reference", text), *messages)
     if freed is not None:
         messages = (*freed.messages, *messages)

@@ -276,11 +276,7 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
         for group in groups if len(groups) > 1 else ():
             part = scan.only_passes(sorted(number for _, number in group))
             load = float(np.mean([load for load, _ in group]))
-            u = (
-                None
-                if scan.load_uncertainty is None
-                else scan.load_uncertainty * load / scan.stated_load
-            )
+            u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
             split.append(replace(part, load=load, load_uncertainty=u))
         owners += [i] * (len(split) - len(owners))
     return split, tuple(owners)

@@ -138,7 +138,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
     if not net:
         curve = _turned(data, x) * curve + _background(data, x)
     (line,) = axes.plot(x / MM, curve / data.reading.scale, "-.", lw=1.0, zorder=1.5)
-    line.set_color(COLOURS["reference"])
+    line.set(color=COLOURS["reference"])
     line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
 
 
@@ -172,10 +172,8 @@ def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     """Draw the rod's diameter (or the sphere's contact) as the paper's black patch."""
-    form = "rod" if isinstance(data.indenter, Rod) else "contact"
-    radius = (
-        data.indenter.radius if data.indenter and form == "rod" else data.reference.contact_radius
-    )
+    rod, radius = isinstance(data.indenter, Rod), data.reference.contact_radius
+    form, radius = ("rod", data.indenter.radius) if rod and data.indenter else ("contact", radius)
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
@@ -188,13 +186,12 @@ def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
     """Add the right-hand axis (U - baseline)/A in kPa; without a positive A there is none."""
     if not (np.isfinite(constant := data.conversion_constant) and constant > 0):
         return
-    scale, unit = {"Pa": (KPA, "kPa"), "relative": (1.0, "over the largest")}.get(
-        data.reading.per, (1.0, data.reading.per)
-    )
-    per_mv, offset = data.reading.scale / constant / scale, baseline / data.reading.scale
+    unit, shown = data.reading, {"Pa": "kPa"}.get(data.reading.per, data.reading.per)
+    per_mv = unit.scale / constant / (KPA if shown == "kPa" else 1.0)
+    offset = baseline / unit.scale
     both_ways = (lambda u: (u - offset) * per_mv, lambda stress: stress / per_mv + offset)
     right = axes.secondary_yaxis("right", functions=both_ways)
-    right.set_ylabel(rf"stress $\sigma_{{{channel_indices(data)}}}$, $U/A$ ({unit})")
+    right.set_ylabel(rf"stress $\sigma_{{{channel_indices(data)}}}$, $U/A$ ({shown})")
 
 
 def _centre(data: ApparatusData) -> float:
@@ -439,17 +436,14 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     name, _, channel = sensor_title(data).rpartition(", channel ")
     name = textwrap.shorten(name, 82, placeholder=" …")
     title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
-    film, rod, stated = data.film, data.indenter, []
-    if rod is not None:
-        load = "" if data.load is None else f", {data.load:.3g} N"
-        stated.append(f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}")
+    film, rod = data.film, data.indenter
+    load = f", {data.load:.3g} N; " if data.load else "; "
+    setting = f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}" if rod else ""
     if film is not None:
-        law = f", {film.law_text}" if film.law else ""
-        stated.append(
-            f"film {film.thickness / MM:.3g} mm, E = {film.young_modulus / KPA / 1e3:.3g} MPa, "
-            f"ν = {film.poisson_ratio:.3g}{law}"
-        )
-    setting = "; ".join([*stated, "± is the standard uncertainty (k = 1)"])
+        setting += f"film {film.thickness / MM:.3g} mm, "
+        setting += f"E = {film.young_modulus / KPA / 1e3:.3g} MPa, ν = {film.poisson_ratio:.3g}"
+        setting += f", {film.law_text}; " if film.law else "; "
+    setting += "± is the standard uncertainty (k = 1)"
     rows = [(title, ink, "bold"), (setting, COLOURS["muted"], "normal")]
     rows.append((values_text(data), ink, "normal"))
     if data.checks and data.passed:

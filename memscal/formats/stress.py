@@ -175,15 +175,12 @@ def _entry(measured: MeasuredStress) -> Group:
     }
     first = measured.scans[0]
     sensor, digest = first.sensor.name, measured.artifact_digest
+    of_artifact = {"content_sha256": digest} if digest else {}
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", list(profiles)),
         **profiles,
-        "sensor": write_record(
-            records.CONVERSION.read_in(first.reading),
-            measured,
-            **({"content_sha256": digest} if digest else {}),
-        ),
+        "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **of_artifact),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.

@@ -18,8 +18,6 @@ from memscal.model.quantities import DIMENSIONS
 
 SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
-FILE_UNITS = {name: dimension.stored for name, dimension in DIMENSIONS.items()}
-"""The unit of each dimension that our writers use."""
 
 #: Words for readings in a unit of their own.
 ARBITRARY = ("a.u.", "arb", "adu", "lsb", "digits")
@@ -98,8 +96,8 @@ def reading_of(unit: str, where: str) -> Reading:
     quantity = _pint_quantity(unit, "reading", where)
     if not (base := quantity.to_base_units()).dimensionality:
         return Reading.fitting("1")
-    si = next((name for name in NAMED_UNITS if quantity.is_compatible_with(name)), "")
-    si = si or f"{base.units:~C}".replace("**", "^")
+    named = (name for name in NAMED_UNITS if quantity.is_compatible_with(name))
+    si = next(named, f"{base.units:~C}".replace("**", "^"))
     return Reading.fitting(si, float(quantity.to(si).magnitude))
 
 

@@ -51,11 +51,7 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     singles = []
     for group in np.split(order, starts):
         load = float(np.nanmedian(scan.normal_load[np.isin(passes, group)]))
-        u = (
-            None
-            if scan.load_uncertainty is None
-            else scan.load_uncertainty * load / scan.stated_load
-        )
+        u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
         only = scan.only_passes(np.sort(group))
         singles.append(replace(only, load=load, load_uncertainty=u))
     return tuple(singles)

@@ -349,9 +349,8 @@ def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
             *films, share = ends
             more, less = (film_transfer(replace(scan, film=film), wavenumbers) for film in films)
             columns.append(share * (more - less))
-    rubber = replace(
-        scan, film=replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    )
+    film = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    rubber = replace(scan, film=film)
     if law_at_once(rubber) != LINEAR:
         changes = law_sensitivities(scan, linear).values()
         columns += [_per_pressure(scan, linear, change * scan.stated_load) for change in changes]

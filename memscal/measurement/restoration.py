@@ -55,13 +55,11 @@ def compare_stress(
     posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
 ) -> StressComparison:
     """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
-    if (
-        not isinstance(scan.set_up.indenter, Rod)
-        and abs(stress.load / scan.stated_load - 1) > SAME_LOAD
-    ):
+    _, indenter, load = scan.set_up
+    if not isinstance(indenter, Rod) and abs(stress.load / load - 1) > SAME_LOAD:
         raise InputError(
             f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
-            why=f"The contact of a {scan.set_up.indenter.shape} grows with its load: stress is not "
+            why=f"The contact of a {indenter.shape} grows with its load: stress is not "
             "proportional to it.",
             cure="Calculate the stress for the scan's load.",
         )

@@ -68,12 +68,10 @@ def require_covariance(apparatus: ApparatusFunction) -> None:
 def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: bool) -> list[str]:
     """Refuse a scan of another sensor, channel or film; with ``override`` return what differs."""
     apparatus.require_pascals()
-    reading = apparatus.reading
-    if reading.si != scan.unit:
+    if (si := apparatus.reading.si) != scan.unit:
+        place = scan_points.file_in_words(scan.source, "scan")
         raise InputError(
-            f"The readings of {scan_points.file_in_words(scan.source, 'scan')} are in "
-            f"{scan.unit}, those of the artifact in {reading.si}.",
-            why="A divides readings of the unit that it was calibrated with.",
+            f"The readings of {place} are in {scan.unit}, those of the artifact in {si}.",
             cure="Give the artifact of this sensor, or correct the units of /entry/data/u_zz.",
         )
     if apparatus.order:
@@ -213,8 +211,7 @@ def restoration_messages(
     messages += failed_calibration_messages(restored.apparatus)
     messages += profile.point_messages(restored.posterior.estimate)
     if points.u_errors is None:
-        noise = points.reading.text(float(restored.noise.min()))
-        messages.append(noise_unstated_message(noise))
+        messages.append(noise_unstated_message(points.reading.text(restored.noise.min())))
     if not restored.apparatus.radial_profile.g_errors.any():
         text = "The artifact states no uncertainty of G: nothing is counted for it."
         messages.append(Message("uncertainty_unstated", text))

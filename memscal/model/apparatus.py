@@ -189,13 +189,11 @@ class ApparatusData(Checked):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        unit, values = self.reading, self.parameters
+        of_a = ("conversion_constant", self.reading.scale, self.reading.over(self.reading.unit))
+        values = self.parameters
         a, sigma = (
-            format_measured(values[name] / scale, values.uncertainty(name) / scale, shown)
-            for name, scale, shown in (
-                ("conversion_constant", unit.scale, unit.over(unit.unit)),
-                ("gaussian_sigma", 1e-3, "mm"),
-            )
+            format_measured(values[name] / scale, values.uncertainty(name) / scale, unit)
+            for name, scale, unit in (of_a, ("gaussian_sigma", 1e-3, "mm"))
         )
         state = state_of_checks(self.checks)
         return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"

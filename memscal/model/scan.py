@@ -452,9 +452,9 @@ class Scan:
         film, indenter, load = self.film, self.indenter, self.load
         if film is not None and indenter is not None and load is not None:
             return SetUp(film, indenter, load)
-        places = ("film (/entry/sample/film)", "indenter (/entry/indenter)", "load (.../load)")
-        absent = zip(places, (film, indenter, load), strict=True)
-        missing = " and no ".join(place for place, value in absent if value is None)
+        names = {"sample/film": film, "indenter": indenter, "indenter/load": load}
+        absent = [name for name, value in names.items() if value is None]
+        missing = " and no ".join(f"{n.rpartition('/')[2]} (/entry/{n})" for n in absent)
         raise InputError(
             f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
             why="The stress that an indenter makes at the base of a film is calculated from them.",

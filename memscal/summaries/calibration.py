@@ -144,15 +144,12 @@ def dataset(result: Calibrated) -> Dataset:
 
     apparatus = apparatus_of(result)
     field = {"g": "field", "g_errors": "field_errors"}
+    of_scan = records.RECONVOLUTION.read_in(apparatus.reading)
     return xarray.Dataset(
         record_arrays(records.RADIAL, apparatus.radial_profile)
         | record_arrays(records.RADIAL_COVARIANCE, apparatus.radial_profile)
         | record_arrays(records.TRANSFER, apparatus.transfer)
-        | record_arrays(
-            records.RECONVOLUTION.read_in(apparatus.reading),
-            apparatus.reconvolution,
-            {"x": "position"},
-        )
+        | record_arrays(of_scan, apparatus.reconvolution, {"x": "position"})
         | record_arrays(records.FIELD, apparatus.field, field),
         attrs={"title": sensor_title(apparatus)},
     )

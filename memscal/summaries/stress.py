@@ -16,6 +16,7 @@ _QUANTITIES = by_name(records.STRESS_PROFILE.quantities) | _NUMBERS
 _POINTS = ("r", "x", "y", "s_zz", "s_zz_errors")
 _SCALARS = tuple(name for name in _NUMBERS if not name.startswith("centre"))
 _IN_JSON = [q for name, q in _NUMBERS.items() if not name.startswith("centre_y")]
+_IN_JSON += [records.FORCE_BUDGET, records.MAXIMUM_BUDGET]
 _POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors")]
 
 
@@ -40,11 +41,7 @@ def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
     return {
         "scan": getattr(profile.scan.source, "file_name", None),
         **declared.members(
-            [
-                *(quantity.read_in(profile.scan.reading) for quantity in _IN_JSON),
-                records.FORCE_BUDGET,
-                records.MAXIMUM_BUDGET,
-            ],
+            [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON],
             profile,
             **_centre(profile),
         ),

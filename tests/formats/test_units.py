@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from memscal.errors import UnitError
 from memscal.formats import units
-from memscal.formats.units import FILE_UNITS, SI_UNITS, dimension_of, from_si, to_si
+from memscal.formats.units import SI_UNITS, dimension_of, from_si, to_si
+from memscal.model.quantities import DIMENSIONS
 
 PINT = pint.UnitRegistry()
 
@@ -60,7 +61,7 @@ def test_text_that_is_no_unit_of_length_is_refused_at_once(unit):
 def test_only_a_dimensionless_number_may_be_bare(dimension):
     with pytest.raises(UnitError, match="has no unit") as caught:
         to_si(1.0, None, dimension, "scan.h5: /entry/x")
-    assert FILE_UNITS[dimension] in caught.value.cure
+    assert DIMENSIONS[dimension].stored in caught.value.cure
     assert to_si(0.5, None, "dimensionless", "here") == 0.5
 
 
