@@ -91,7 +91,7 @@ def _beside_calculated(restored: Restoration) -> Restoration:
 
     scan = restored.scan
     try:
-        contact = press_rod(scan.film, scan.indenter, scan.load, scan.rod_friction)
+        contact = press_rod(*scan.set_up, scan.rod_friction)
         return replace(restored, comparison=restored.compare(contact))
     except MemscalError as failure:
         out.note(f"No contact is shown beside the result: {failure.problem}")

@@ -197,10 +197,8 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
-    of = parameters.reading
-    dimensions = [
-        parameter_dimension(n, u, of) for n, u in zip(parameters.names, stated, strict=True)
-    ]
+    pairs, of = zip(parameters.names, stated, strict=True), parameters.reading
+    dimensions = [parameter_dimension(name, unit, of) for name, unit in pairs]
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
         raise InputError(

@@ -67,13 +67,6 @@ def require_covariance(apparatus: ApparatusFunction) -> None:
 
 def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: bool) -> list[str]:
     """Refuse a scan of another sensor, channel or film; with ``override`` return what differs."""
-    apparatus.require_pascals()
-    if (si := apparatus.reading.si) != scan.unit:
-        place = scan_points.file_in_words(scan.source, "scan")
-        raise InputError(
-            f"The readings of {place} are in {scan.unit}, those of the artifact in {si}.",
-            cure="Give the artifact of this sensor, or correct the units of /entry/data/u_zz.",
-        )
     if apparatus.order:
         raise InputError(
             f"The artifact is of the tangential channel {apparatus.sensor.channel}, but "
@@ -90,6 +83,13 @@ def accept_other_sensor(
     """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
     sources = (scan.source, "scan"), (apparatus.source, "artifact")
     places = tuple(scan_points.file_in_words(*source) for source in sources)
+    apparatus.require_pascals()
+    unit, si = scan.unit or "V", apparatus.reading.si
+    if unit != si:
+        raise InputError(
+            f"The readings of {places[0]} are in {unit}, those of the artifact in {si}.",
+            cure="Give the artifact of this sensor, or correct the units of /entry/data/u_zz.",
+        )
     sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
     return scan_points.accepted_differences(
         [

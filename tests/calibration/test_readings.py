@@ -103,6 +103,11 @@ def test_a_relative_calibration_takes_no_load_and_states_no_pascals(bare, tmp_pa
             state()
 
 
+def test_an_artifact_without_a_film_measures_the_stress_of_a_scan_that_states_its_own(bare):
+    measured, usual = (memscal.measure_stress(SCAN, a).profiles[0] for a in (bare, CALIBRATED))
+    np.testing.assert_allclose(measured.s_zz, usual.s_zz, rtol=0.01, atol=0.01 * usual.maximum)
+
+
 def test_a_scan_without_a_load_is_taken_at_that_of_its_reference(bare):
     assert bare.load == BARE.load
     assert any("No load is stated" in message.text for message in bare.process.messages)
