@@ -95,6 +95,8 @@ def test_a_relative_calibration_takes_no_load_and_states_no_pascals(bare, tmp_pa
     assert apparatus.gaussian_sigma == pytest.approx(bare.gaussian_sigma, rel=1e-9)
     assert "load" not in apparatus.budget["conversion_constant"]
     assert "relative: the load is not known" in str(calibration).partition("\n")[0]
+    drawn = memscal.monte_carlo(calibration, draws=4)
+    assert drawn.to_dict()["parameters"]["conversion_constant"]["unit"] == "mV (relative)"
     apparatus.save(tmp_path / "sensor.h5")
     stored = memscal.load_apparatus(tmp_path / "sensor.h5")
     assert stored.load is None
