@@ -161,6 +161,7 @@ class ApparatusFunction(Result, ApparatusData):
         The paper's definition: the stress as the sensor blurs it, to be compared with
         :meth:`convolve`.  Baselines must have been subtracted.
         """
+        self.require_pascals()
         return np.asarray(u_zz, dtype=np.float64) / self.conversion_constant
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:

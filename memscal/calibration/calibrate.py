@@ -24,8 +24,9 @@ from memscal.errors import InputError, MemscalError
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import loads_differ, scans_by_load
 from memscal.estimation.reference import (
+    at_load_of,
+    film_of,
     is_source,
-    of_source,
     press_neo_hookean,
     reference_profile,
     reference_spectra,
@@ -33,6 +34,7 @@ from memscal.estimation.reference import (
     require_one_kind,
     require_one_sensor,
     require_same_set_up,
+    with_film_of,
 )
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
@@ -45,6 +47,7 @@ from memscal.model.apparatus import (
 )
 from memscal.model.checks import Message, QualityCheck, override_messages
 from memscal.model.film import LINEAR
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
@@ -58,6 +61,7 @@ _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noi
 
 def assemble(
     solution: Solution,
+    stated: Scan,
     results: Results,
     other: Results | None,
     checks: tuple[QualityCheck, ...],
@@ -65,8 +69,9 @@ def assemble(
     configuration: Mapping[str, Any],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
+    # Film and indenter are as ``stated`` by the scan where nothing was calculated with them.
     scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
-    reference = stress.profile() if isinstance(stress, Contact) else stress
+    reference = _table(stress)
     versions = {"numpy": np.__version__, "scipy": scipy.__version__}
     record: dict[str, Any] = {
         **configuration,
@@ -94,10 +99,10 @@ def assemble(
         reconvolution=_reconvolution(solution),
         parameters=results.parameters,
         checks=checks,
-        film=scan.film,
-        indenter=scan.indenter,
+        film=scan.film or stated.film,
+        indenter=scan.indenter or stated.indenter,
         sensor=scan.sensor if channel == "zz" else replace(scan.sensor, channel=channel),
-        load=scan.load,
+        load=None if results.parameters.reading.per != "Pa" else scan.load,
         reference=reference,
         process=Process(
             program="memscal",
@@ -166,6 +171,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
+_OF_POINTS = ("normal_load", "normal_load_errors")
 #: Methods whose derivatives are complete.
 _LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
@@ -231,7 +237,8 @@ class Calibration(Result):
         InputError
             If a number is out of range, or the scan's fields cannot be divided.
         """
-        return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+        swept = sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+        return replace(swept, reading=self.apparatus.reading)
 
 
 @single_threaded()
@@ -251,6 +258,7 @@ def calibrate(
     free: str | Sequence[str] = (),
     seed: int = 0,
     override: bool = False,
+    relative: bool = False,
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -306,6 +314,9 @@ def calibrate(
         Seed of methods that draw random numbers.
     override : bool, default False
         Accept a reference or alternative of another film, rod or load than the scan's; recorded.
+    relative : bool, default False
+        For scans at constant depth, or of unknown load: loads count for nothing, A is the reading
+        by the reference over its largest stress, and no result states pascals from it.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -330,24 +341,32 @@ def calibrate(
     """
     scans, pairs = require_one_sensor(opened_scans(scan)), correlations or {}
     references = _references(reference, scans, pixel_size)
-    for rod_scan, given in zip(scans, references, strict=True):
-        if not is_source(given or rod_scan.reference):
-            require_calibration_rod(rod_scan)
+    for rod_scan, of_scan in zip(scans, references, strict=True):
+        require_calibration_rod(rod_scan, of_scan)
+    as_stated = scans
     known = film_law, mooney_rivlin_ratio, rod_friction
-    scans = tuple(
-        of_source(s, r or s.reference) if is_source(r or s.reference) else _of_law(s, r, known)
-        for s, r in zip(scans, references, strict=True)
-    )
+    scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
+    if relative:
+        # A rod that has to be solved keeps its nominal load.
+        loads: dict[str, Any] = dict.fromkeys(("load_uncertainty", *_OF_POINTS))
+        kept = [
+            None if r or s.reference else s.load for s, r in zip(scans, references, strict=True)
+        ]
+        scans = tuple(replace(s, load=p, **loads) for s, p in zip(scans, kept, strict=True))
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
+    scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
     owners: Sequence[int] | None = None
     stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
     require_one_kind(stated, alternatives or ())
-    if not any(stated) and any(s.film.law != LINEAR for s in scans):
+    if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
         # Under another law than the linear one each load has a stress of its own shape.
         of_loads, owners = scans_by_load(scans)
         scans, references = tuple(of_loads), [None] * len(of_loads)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
+    peak = float(np.abs(_table(stresses[0]).sigma_zz).max()) if relative else None
+    scans = tuple(at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True))
+    reading = replace(scans[0].reading, per="relative" if relative else stresses[0].unit)
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
@@ -363,18 +382,24 @@ def calibrate(
         stresses = [reference_profile(s, None) for s in scans]
     solution = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
     effects = _effects(solution, alternatives)
-    results = uncertainties(solution, solution.deconvolution, effects, pairs)
+    results = uncertainties(solution, solution.deconvolution, effects, pairs, reading)
     beside = solution.other
-    other = None if beside is None else uncertainties(solution, beside, effects, pairs)
+    other = None if beside is None else uncertainties(solution, beside, effects, pairs, reading)
     checks = quality_checks(solution, results)
     messages = calibration_messages(solution, results, checks)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
+    configuration |= {"reference_unit": reading.per} if reading.per != "Pa" else {}
+    if reading.per == "Pa" and any(s.load is None and s.normal_load is None for s in as_stated):
+        load = f"{solution.scan.stated_load:.4g} N (--relative takes none)"
+        text = f"No load is stated: it is taken to be that of the reference, {load}."
+        messages = (Message("load_of_reference", text), *messages)
     if freed is not None:
         messages = (*freed.messages, *messages)
         configuration["free"] = freed.record
-    if loads_differ([s.load for s in solution.scans]) and not is_source(solution.stress):
+    loads_of_film = not (relative or is_source(solution.stress))
+    if loads_of_film and loads_differ([s.stated_load for s in solution.scans]):
         from memscal.calibration.film_inference import weigh_laws
 
         if (compared := weigh_laws(solution)) is not None:
@@ -393,7 +418,7 @@ def calibrate(
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     messages = (*override_messages(overridden), *messages)
-    apparatus = assemble(solution, results, other, checks, messages, configuration)
+    apparatus = assemble(solution, as_stated[0], results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
 
 
@@ -409,11 +434,11 @@ def _of_law(
                 why="A reference has been calculated by a law already.",
                 cure="Give one of them (film_law, --film-law; reference, --reference).",
             )
-        film = replace(scan.film, law=law, mooney_rivlin_ratio=ratio)
+        film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=ratio)
         scan = replace(scan, film=film, reference=None)
     stress = scan.reference if reference is None else reference
-    theirs = stress.film_of_law if isinstance(stress, Contact) else stress and stress.film
-    if stress is not None and theirs and theirs.law and not scan.film.law:
+    theirs = stress and film_of(stress)
+    if stress is not None and theirs and theirs.law and scan.film and not scan.film.law:
         stated = {name: getattr(theirs, name) for name in ("law", "mooney_rivlin_ratio")}
         scan = replace(scan, film=replace(scan.film, **stated))
         used = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
@@ -422,20 +447,26 @@ def _of_law(
     return scan if friction is None else replace(scan, rod_friction=friction)
 
 
+def _table(stress: BaseStress) -> StressProfile:
+    return stress.profile() if isinstance(stress, Contact) else stress
+
+
 def _references(
     reference: Reference | Sequence[Reference],
     scans: Sequence[Scan],
     pixel_size: float | None = None,
 ) -> list[BaseStress | None]:
     """Read a reference for each scan; a single one is that of all scans."""
+    loads = scans[0].normal_load
+    strength = scans[0].load or (1.0 if loads is None else float(np.nanmedian(loads)))
     if isinstance(reference, Sequence) and not isinstance(reference, str):
         if len(reference) != len(scans):
             count = "is one scan" if len(scans) == 1 else f"are {len(scans)} scans"
             problem = f"{len(reference)} references were given, but there {count}."
             cure = "Give one for each scan, in their order, or one for all."
             raise InputError(problem, cure=cure)
-        return [_read(item, scans[0].load, pixel_size) for item in reference]
-    return [_read(reference, scans[0].load, pixel_size)] * len(scans)
+        return [_read(item, strength, pixel_size) for item in reference]
+    return [_read(reference, strength, pixel_size)] * len(scans)
 
 
 def _read(reference: Reference, load: float, pixel_size: float | None) -> BaseStress | None:
@@ -485,6 +516,7 @@ def uncertainties(
     deconvolution: Deconvolution,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
+    reading: Reading = VOLTS,
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
@@ -493,4 +525,5 @@ def uncertainties(
     drawn = None if linear else drawn_scatter(solution)
     results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
     plane = field_errors(solution, deconvolution, effects, correlations)
-    return replace(results, field_errors=plane)
+    parameters = replace(results.parameters, reading=reading)
+    return replace(results, field_errors=plane, parameters=parameters)

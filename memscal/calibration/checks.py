@@ -147,7 +147,9 @@ def _hysteresis(solution: Solution) -> list[QualityCheck]:
     extra = assumptions.hysteresis_test(solution.estimate, owner)
     if extra is None:
         return []
-    scales = ("A", 1e2, "%"), ("the centre's position", 1e6, "um"), ("the baseline", 1e3, "mV")
+    unit = solution.estimate.points.reading
+    scales = [("A", 1e2, "%"), ("the centre's position", 1e6, "um")]
+    scales.append(("the baseline", 1 / unit.scale, unit.unit))
     differences = [
         f"of {name} by {format_measured(value * scale, error * scale, unit)}"
         for (name, scale, unit), value, error in zip(
@@ -262,7 +264,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_agreements(solution, results),
         *_shape(solution, results.parameters),
         *_set_up(solution),
-        *([] if is_source(solution.stress) else [_indentation(solution, results)]),
+        *([] if solution.scan.film is None else [_indentation(solution, results)]),
         *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
@@ -391,13 +393,14 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     transfer = float(gaussian_transfer(np.array(resolved), sigma))
     tail = _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT
     values = {
-        "width_over_thickness": (sigma / solution.scan.film.thickness, _WIDTH_LIMIT),
         "resolved_band": (transfer, _BAND_LIMIT),
         "tail_share": (solution.tail_share, tail),
         "baseline_drift": (change, _BASELINE_DRIFT_LIMIT),
         "reference_force": (force, _FORCE_LIMIT),
         "outliers": (outliers, quality.OUTLIER_LIMIT),
     }
+    if (film := solution.scan.film) is not None:
+        values = {"width_over_thickness": (sigma / film.thickness, _WIDTH_LIMIT), **values}
     meanings = {
         "width_over_thickness": "Width of G over the film's thickness. A failure means that the "
         "unit of the positions or of the film's thickness should be looked at.",
@@ -424,11 +427,11 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
 
 def _indentation(solution: Solution, results: Results) -> QualityCheck:
     """Compare the depth with the thickness: beyond the limit a linear film is formal."""
-    film, depths = solution.scan.film, []
-    for scan, stress in zip(solution.scans, solution.stresses, strict=True):
-        linear = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None)
-        depth = stress.depth or press_rod(linear, scan.indenter, scan.load).depth
-        depths.append(depth / scan.film.thickness)
+    film, depths = solution.scan.set_up.film, []
+    pairs = zip(solution.scans, solution.stresses, strict=True)
+    for (below, *rod), stress in ((scan.set_up, stress) for scan, stress in pairs if scan.film):
+        linear = replace(below, law=LINEAR, mooney_rivlin_ratio=None)
+        depths.append((stress.depth or press_rod(linear, *rod).depth) / below.thickness)
     meaning = "Largest depth of the rod over the film's thickness. "
     formal = film.law == LINEAR or not (film.law or "model_form" in results.changes)
     if formal:

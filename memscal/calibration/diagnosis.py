@@ -19,7 +19,7 @@ from memscal.estimation.forward import forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints, joined_points, mistaken_unit
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
-from memscal.estimation.reference import is_source, reference_spectra
+from memscal.estimation.reference import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
@@ -36,7 +36,7 @@ _CLEARLY, _KNEE, _AS_GOOD = 25.0, 3.0, 4.0
 _RATIO, _MOST_POINTS, _RISEN, _PROMISING, _HALVINGS = 1.4, 200, 1.05, 0.9, 7
 #: Lengths are scaled until the scan spans so many thicknesses of the film, and a rod until its
 #: radius is so small a share of the thickness that it acts as a point.
-_LONGEST_SPAN, _THINNEST = 60.0, 0.02
+_LONGEST_SPAN, _USUAL_SPAN, _THINNEST = 60.0, 8.0, 0.02
 #: Load of the rods that are tried, in N: the reference per newton does not depend on it.
 _LOAD = 1e-6
 
@@ -146,15 +146,13 @@ class _Search:
     @cached_property
     def lengths(self) -> tuple[_Length, ...]:
         """Lengths that make the reference narrower than the scan."""
-        h = min(scan.film.thickness for scan in self.scans)
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
-        # A source has no film: it is scaled up to a third of the longest span.
-        thick = span / 3 if is_source(self.stresses[0]) else h
-        stretch = _grid(_LONGEST_SPAN * thick / span)
+        h = min(scan.film.thickness if scan.film else span / _USUAL_SPAN for scan in self.scans)
+        stretch = _grid(_LONGEST_SPAN * h / span)
         positions = _Length("positions", "data/x", 1.0, stretch)
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
             return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
-        a = self.scans[0].indenter.radius
+        a = self.scans[0].set_up.indenter.radius
         # A calibration asks for a rod no wider than its film is thick.
         thinner = _grid(min(_LONGEST_SPAN * h / span, h / (2 * a)))
         return (

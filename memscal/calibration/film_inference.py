@@ -22,15 +22,14 @@ from memscal.errors import InputError, MemscalError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import log_marginal_likelihood
-from memscal.estimation.reference import reference_spectra
-from memscal.mechanics.contact import Contact
+from memscal.estimation.reference import film_of, reference_spectra
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, law_in_words
-from memscal.model.notation import format_measured
-from memscal.model.quantities import MM, MV
+from memscal.model.notation import VOLTS, Reading, format_measured
+from memscal.model.quantities import MM
 from memscal.model.scan import Scan
 
 #: Name of an input that scans may be asked to determine.
@@ -54,6 +53,7 @@ class FilmLawComparison:
     laws: tuple[WeighedLaw, ...]
     reference: str
     loads: tuple[float, ...]  # in N
+    reading: Reading = VOLTS
 
     def factor(self, law: WeighedLaw) -> BayesFactor:
         """Return the Bayes factor of the best law against one."""
@@ -69,7 +69,10 @@ class FilmLawComparison:
                 "is_reference": law.law == self.reference,
                 "log_evidence_below_best": self.factor(law).log_factor,
                 "best_against_it": self.factor(law).words if law is not self.laws[0] else None,
-                "conversion_constant": {"value": law.conversion_constant / MV, "unit": "mV/Pa"},
+                "conversion_constant": {
+                    "value": law.conversion_constant / self.reading.scale,
+                    "unit": self.reading.over(self.reading.unit),
+                },
                 "gaussian_sigma": {"value": law.gaussian_sigma / MM, "unit": "mm"},
             }
             for law in self.laws
@@ -89,8 +92,8 @@ class FilmLawComparison:
         against = best.law != self.reference
         if against and 2 * factor.log_factor >= POSITIVE:
             text += (
-                f" By the {names[0]} film A = {best.conversion_constant / MV:.4g} mV/Pa and "
-                f"σ = {best.gaussian_sigma / MM:.4g} mm; --film-law {best.law} makes it the "
+                f" By the {names[0]} film A = {self.reading.constant(best.conversion_constant)} and"
+                f" σ = {best.gaussian_sigma / MM:.4g} mm; --film-law {best.law} makes it the "
                 "reference."
             )
         strong = against and 2 * factor.log_factor >= STRONG
@@ -99,21 +102,21 @@ class FilmLawComparison:
 
 def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     """Weigh the film's laws by scans at several loads; ``None`` where one load or law is left."""
-    loads = tuple(scan.load for scan in solution.scans)
-    if not loads_differ(loads):
+    loads = tuple(scan.stated_load for scan in solution.scans)
+    if not loads_differ(loads) or any(scan.film is None for scan in solution.scans):
         return None
-    made_on = [s.film_of_law if isinstance(s, Contact) else s.film for s in solution.stresses]
+    made_on = [film_of(stress) for stress in solution.stresses]
     stated = {("", None) if f is None else (f.law, f.mooney_rivlin_ratio) for f in made_on}
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
     solved: dict[str, Solution] = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
         of_law = ratio if law == reference else None
-        films = [replace(s.film, law=law, mooney_rivlin_ratio=of_law) for s in solution.scans]
-        scans = [replace(s, film=f) for s, f in zip(solution.scans, films, strict=True)]
+        form: dict[str, Any] = {"law": law, "mooney_rivlin_ratio": of_law}
+        scans = [replace(s, film=replace(s.set_up.film, **form)) for s in solution.scans]
         if law == reference:
             solved[law] = replace(solution, scans=tuple(scans))
             continue
-        keys = [(s.film, s.indenter, s.load, s.rod_friction) for s in scans]
+        keys = [(*s.set_up, s.rod_friction) for s in scans]
         # Finite elements take long: other laws are weighed where closed form or table has them.
         if law == LINEAR or all(is_tabulated(*key) for key in keys):
             stresses = [press_rod(*key) for key in keys]
@@ -133,7 +136,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
         a, sigma = by_law.deconvolution.conversion_constant, estimate.gaussian.sigma
         laws.append(WeighedLaw(law, evidence, a, sigma))
     ranked = sorted(laws, key=lambda law: -law.log_evidence)
-    return FilmLawComparison(tuple(ranked), reference, loads)
+    return FilmLawComparison(tuple(ranked), reference, loads, solution.scan.reading)
 
 
 def _input_columns(solution: Solution, without: str = "") -> FloatArray:
@@ -144,10 +147,8 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     columns = [effects[name].voltage for name in names]
     # A balance's error may differ from load to load; repeats at one load share it.
     signal, scan_of_points = estimate.predicted - estimate.background, estimate.points.scan
-    keys = [
-        (o, s.load, s.load_uncertainty)
-        for o, s in zip(solution.owners, solution.scans, strict=True)
-    ]
+    pairs = zip(solution.owners, solution.scans, strict=True)
+    keys = [(o, s.stated_load, s.load_uncertainty) for o, s in pairs]
     for key in dict.fromkeys(keys):
         _, load, u = key
         chosen = np.array([other == key for other in keys])[scan_of_points]
@@ -163,7 +164,7 @@ class FreeThickness:
 
     def of(self, scans: Sequence[Scan]) -> list[Scan]:
         """Return the scans with the thickness and its uncertainty as estimated."""
-        return [replace(scan, film=self.films[scan.film]) for scan in scans]
+        return [replace(scan, film=self.films[scan.set_up.film]) for scan in scans]
 
     @property
     def record(self) -> dict[str, Any]:
@@ -217,9 +218,9 @@ def require_free(
     names = [free] if isinstance(free, str) else free
     if unknown := [name for name in names if name != THICKNESS]:
         raise InputError(f"There is no free input {unknown[0]!r}.", cure=f"Give {THICKNESS!r}.")
-    rods, laws = {scan.indenter for scan in scans}, {scan.film.law for scan in scans}
+    rods, laws = {scan.set_up.indenter for scan in scans}, {scan.set_up.film.law for scan in scans}
     if len(rods) < 2 and not (
-        loads_differ([s.load for s in scans]) and laws.isdisjoint(("", LINEAR))
+        loads_differ([s.stated_load for s in scans]) and laws.isdisjoint(("", LINEAR))
     ):
         raise InputError(
             "The scans do not determine the film's thickness.",
@@ -233,7 +234,7 @@ def require_free(
             f"The scans have {count} films of unknown thickness.",
             cure=f"Give scans on at most {len(_NODES)} films.",
         )
-    if not all(scan.film.thickness_uncertainty for scan in scans):
+    if not all(scan.set_up.film.thickness_uncertainty for scan in scans):
         raise InputError(
             "A film states no uncertainty of its thickness.",
             why="It is the standard deviation of the prior of a thickness that is estimated.",
@@ -251,7 +252,7 @@ def require_free(
 def free_thickness(solution: Solution) -> FreeThickness:
     """Estimate the thickness of each film, from its stated one as a Gaussian prior."""
     scans, estimate = solution.scans, solution.estimate
-    films = list(dict.fromkeys(scan.film for scan in scans))
+    films = list(dict.fromkeys(scan.set_up.film for scan in scans))
     stated = np.array([film.thickness for film in films])
     u = np.array([film.thickness_uncertainty or 0.0 for film in films])
     points = [estimate.points.only(i) for i in range(len(scans))]
@@ -261,7 +262,7 @@ def free_thickness(solution: Solution) -> FreeThickness:
     def log_posterior(z: FloatArray) -> FloatArray:
         pairs = zip(films, stated + z * u, strict=True)
         at = {film: replace(film, thickness=float(h)) for film, h in pairs}
-        rods = [press_rod(at[s.film], s.indenter, s.load, s.rod_friction) for s in scans]
+        rods = [press_rod(at[s.set_up.film], *s.set_up[1:], s.rod_friction) for s in scans]
         references = reference_spectra(rods, points, nodes)
         model = ForwardModel(estimate.points, references)
         both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)

@@ -62,8 +62,8 @@ class FleetCalibration(Result):
         if self.parameters is None:
             problem = self.error.problem if self.error is not None else "no result"
             return f"<FleetCalibration {self.index}: {problem}>"
-        a = self.parameters["conversion_constant"] * 1e3
-        return f"<FleetCalibration {self.index}: A = {a:.4g} mV/Pa>"
+        a = self.parameters.reading.constant(self.parameters["conversion_constant"])
+        return f"<FleetCalibration {self.index}: A = {a}>"
 
     @property
     def passed(self) -> bool:
@@ -111,7 +111,7 @@ def calibrate_many(
             cure="Give a list of scans; calibrate one with memscal.calibrate(scan).",
         )
     method, seed = options.get("method", "white-noise"), options.get("seed", 0)
-    others = ("reference", "alternative", "channel", "method", "correlations", "seed")
+    others = ("reference", "alternative", "channel", "method", "correlations", "seed", "relative")
     of_method = {name: value for name, value in options.items() if name not in others}
     chosen_method(method, of_method, seed=seed)
     task = partial(_calibrated, options=options)

@@ -67,7 +67,7 @@ def _centres(solution: Solution) -> list[Message]:
     owners, centres = np.array(solution.owners), solution.estimate.centres
     apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
     test, way = solution.apart, "as asked for (--centre per-repeat)"
-    if loads_differ([scan.load for scan in solution.scans]):
+    if loads_differ([scan.stated_load for scan in solution.scans]):
         way = "as their loads differ, and with them the shape of the stress"
     elif test is not None:
         way = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
@@ -83,7 +83,8 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
     messages = point_messages(estimate)
     if points.u_errors is None:
         text = (
-            f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
+            f"u_{points.channel}_errors is absent: a noise of "
+            f"{points.reading.text(estimate.noise_scale)} "
             "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
             "misfit of the same size, and has no p-value."
         )
@@ -136,14 +137,17 @@ def _method(solution: Solution) -> list[Message]:
 
 def _law(solution: Solution, results: Results) -> list[Message]:
     """Return which law the reference has, and what is not known of it."""
-    law, changes = solution.scan.film.law, results.changes
+    if any(scan.film is None for scan in solution.scans):
+        return []
+    film = solution.scan.set_up.film
+    law, changes = film.law, results.changes
     if law == LINEAR:
-        rubber_films = [replace(scan.film, law=NEO_HOOKEAN) for scan in solution.scans]
+        rubber_films = [replace(s.set_up.film, law=NEO_HOOKEAN) for s in solution.scans]
         pairs = list(zip(solution.scans, rubber_films, strict=True))
-        if not all(is_tabulated(film, s.indenter, s.load, s.rod_friction) for s, film in pairs):
+        if not all(is_tabulated(f, *s.set_up[1:], s.rod_friction) for s, f in pairs):
             text = "The film is taken as linear elastic, as stated; no other law is counted."
             return [Message("film_law", text)]
-        unstated = [replace(scan, film=replace(film, law="")) for scan, film in pairs]
+        unstated = [replace(scan, film=replace(f, law="")) for scan, f in pairs]
         changes = _changes(solution, unstated)
 
     def changed(by: str, sign: int) -> str:
@@ -164,7 +168,7 @@ def _law(solution: Solution, results: Results) -> list[Message]:
             text += " Changes up to that, of either sign, count as equally likely (model_form)."
     else:
         text = (
-            f"The film is taken as {solution.scan.film.law_text}, as stated; how far it departs "
+            f"The film is taken as {film.law_text}, as stated; how far it departs "
             "from that, by viscosity, swelling or slip at the rod, is not in the uncertainties."
         )
         if isinstance(solution.stress, Contact):
@@ -202,16 +206,19 @@ _VARIED = 0.01
 
 def _unstated(solution: Solution, results: Results) -> list[Message]:
     """Return which inputs state no uncertainty, and how much hangs on those of the film."""
-    scan, film = solution.scan, solution.scan.film
-    # At a given load the stress in a linear film does not depend on its modulus.
-    names = [n for n in _OF_FILM if n != "Young's modulus" or film.law not in ("", LINEAR)]
-    missing = {name: getattr(film, f"{_OF_FILM[name][0]}_uncertainty") for name in names}
-    missing |= {"rod radius": scan.indenter.radius_uncertainty, "load": scan.load_uncertainty}
+    scan, film, missing = solution.scan, solution.scan.film, {}
+    if film is not None:
+        # At a given load the stress in a linear film does not depend on its modulus.
+        names = [n for n in _OF_FILM if n != "Young's modulus" or film.law not in ("", LINEAR)]
+        missing = {name: getattr(film, f"{_OF_FILM[name][0]}_uncertainty") for name in names}
+        missing["rod radius"] = scan.set_up.indenter.radius_uncertainty
+    if results.parameters.reading.per == "Pa":
+        missing["load"] = scan.load_uncertainty
     messages = quality.uncertainty_unstated_messages(missing)
     varied = {name: of for name, of in _OF_FILM.items() if missing.get(name, 0.0) is None}
     if varied:
         shares = {f"{a}_uncertainty": _VARIED * getattr(film, a) for a, _ in varied.values()}
-        films = [replace(s.film, **shares) for s in solution.scans]
+        films = [replace(s.set_up.film, **shares) for s in solution.scans]
         pairs = zip(solution.scans, films, strict=True)
         changes = _changes(solution, [replace(s, film=film) for s, film in pairs])
         slopes = [

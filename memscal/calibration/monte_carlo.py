@@ -24,6 +24,7 @@ from memscal.estimation.points import measured_mask
 from memscal.estimation.reference import RECTANGLE, law_at_once, relative, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, single_threaded, worker_pool
@@ -154,7 +155,7 @@ class DrawnScans:
         ):
             owners = [getattr(scan, component) for scan in scans]
             for number, owner in enumerate(dict.fromkeys(owners), start=1):
-                value, u = getattr(owner, attribute), getattr(owner, f"{attribute}_uncertainty")
+                value, u = (getattr(owner, attribute + end, 0.0) for end in ("", "_uncertainty"))
                 source = name if number == 1 else f"{name}_{number}"
                 if u and source in self.effects:
                     bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
@@ -170,7 +171,7 @@ class DrawnScans:
     @cached_property
     def _nominal(self) -> list[FloatArray]:
         pairs = zip(self.solution.scans, self.solution.estimate.model.references, strict=True)
-        return [rod_spectrum(scan, ref, law_at_once(scan)) for scan, ref in pairs]
+        return [_rod(scan, ref, scan) for scan, ref in pairs]
 
     def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""
@@ -180,13 +181,10 @@ class DrawnScans:
             for i in item.scans:
                 owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
                 true[i] = replace(true[i], **{item.component: owner})
-        rods = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
-        laws = [law_at_once(scan) for scan in self.solution.scans]
+        references, stated = self.solution.estimate.model.references, self.solution.scans
         return tuple(
-            replace(
-                ref, values=(rod_spectrum(scan, ref, law) - nominal) * relative(ref.values, nominal)
-            )
-            for (scan, ref, nominal), law in zip(rods, laws, strict=True)
+            replace(ref, values=(_rod(scan, ref, own) - nominal) * relative(ref.values, nominal))
+            for scan, ref, own, nominal in zip(true, references, stated, self._nominal, strict=True)
         )
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
@@ -200,6 +198,13 @@ class DrawnScans:
         numbers, g = uncertainty.read_off(solution.deconvolution, radii)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
+
+
+def _rod(scan: Scan, reference: RadialSpectrum, own: Scan) -> FloatArray:
+    """Transform of a scan's rod, by the law of its own; zero where nothing hangs on a film."""
+    if own.film is None:
+        return np.zeros_like(reference.values)
+    return rod_spectrum(scan, reference, law_at_once(own))
 
 
 def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
@@ -288,6 +293,7 @@ class MonteCarlo(Result):
     g_shortest: FloatArray
     g_first_order: FloatArray
     messages: tuple[Message, ...]
+    reading: Reading = VOLTS
 
     def __repr__(self) -> str:
         """Return what was drawn, and whether the budget agrees."""
@@ -392,6 +398,7 @@ def monte_carlo(
         g_shortest=shortest_interval(g),
         g_first_order=first_order.radial_scatter,
         messages=tuple(_messages(calibration, comparisons, failures, draws)),
+        reading=calibration.apparatus.reading,
     )
 
 

@@ -9,6 +9,7 @@ from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.deconvolution.division import Regulariser, WhiteNoise, WhiteNoiseDraw, require_count
 from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 
 
@@ -40,6 +41,7 @@ class Sweep(Result):
     seed_conversion_constant: FloatArray
     seed_gaussian_sigma: FloatArray
     seed_relative_rms: FloatArray
+    reading: Reading = VOLTS
 
     def __repr__(self) -> str:
         """Return the amplitudes in place of the arrays."""

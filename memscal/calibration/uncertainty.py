@@ -178,7 +178,9 @@ def _of_loads(
     pairs = zip(stresses, estimate.model.references, strict=True)
     shares: dict[str, Sequence[float | None]] = {
         "reference_force": [abs(carried_force(*pair) - 1.0) for pair in pairs],
-        "load": [scan.load_uncertainty and scan.load_uncertainty / scan.load for scan in scans],
+        "load": [
+            scan.load_uncertainty and scan.load_uncertainty / scan.stated_load for scan in scans
+        ],
         "reference_convergence": [stress.convergence for stress in stresses],
     }
     effects = {}

@@ -139,7 +139,7 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "Stress at the base of the film (memscal-reference); or a source, for which film and rod are "
     "not used: disc:R, slit:W, gaussian:S (radius, width, standard deviation: disc:0.5mm), point. "
     "Or a field: HDF5, .npy, PNG, TIFF. By default the one in the scan, or else the rod is solved "
-    "on the film."
+    "on the film. With one that states no film the scan needs none."
 )
 @option("--pixel-size", metavar="LENGTH")(
     "Size of the pixels of a reference that is an array or image, such as 5um."
@@ -189,6 +189,10 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 @option("--override", is_flag=True)(
     "Go on although a reference is of another film, rod or load than its scan: recorded."
 )
+@option("--relative", is_flag=True)(
+    "For scans at constant depth or of unknown load: no load counts, A is relative, and states no "
+    "pascals."
+)
 @json_option
 @option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
@@ -230,10 +234,11 @@ def command(
 ) -> int:
     """Find a sensor's apparatus function from a rod scan, or from several of one sensor.
 
-    Smooths the scan's voltages, divides their field by the stress that the rod makes at the base
-    of the film, and writes the conversion constant A (mV/Pa), the apparatus function G (1/mm^2,
-    unit integral), both Gaussian widths (mm), their standard uncertainties, and quality checks to
-    an artifact. A and G are those of the method; the first line states which to use.
+    Smooths the scan's readings, divides their field by the stress that the rod makes at the base
+    of the film, and writes the conversion constant A (mV/Pa, or the readings' unit over Pa), the
+    apparatus function G (1/mm^2, unit integral), both Gaussian widths (mm), their standard
+    uncertainties, and quality checks to an artifact. A and G are those of the method; the first
+    line states which to use.
 
     Several scans, at other loads, with other rods or films, are fitted together: A and G are
     shared, and each scan has its own centre and baseline.
@@ -283,14 +288,13 @@ def _read(
     paths: tuple[Path, ...], reference: Path | None, pixel_size: str | None
 ) -> tuple[list[Scan], StressProfile | None]:
     """Read the inputs, and refuse an indenter that cannot calibrate."""
-    from memscal.estimation.reference import is_source, require_calibration_rod
+    from memscal.estimation.reference import require_calibration_rod
     from memscal.formats.scan import read_scan
 
     scans = [read_scan(path) for path in paths]
     profile = None if reference is None else _read_reference(reference, pixel_size)
     for scan, path in zip(scans, paths, strict=True):
-        if not is_source(profile or scan.reference):
-            require_calibration_rod(scan)
+        require_calibration_rod(scan, profile)
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")
     return scans, profile
@@ -325,6 +329,7 @@ def _rehearse(
     from memscal.calibration.stages import require_channel_method
     from memscal.estimation.points import joined_points, measured_points, scans_of_repeats
     from memscal.estimation.reference import (
+        at_load_of,
         reference_profile,
         reference_spectra,
         require_one_sensor,
@@ -340,8 +345,10 @@ def _rehearse(
     out.show_messages(override_messages(require_same_set_up(scans, *given, override=override)))
     if settings["centre"] == "per-repeat":
         scans = scans_of_repeats(scans, channel)[0]
-    readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
+    peak = 1.0 if settings["relative"] else None
+    loaded = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
+    readings = [measured_points(scan, channel) for scan in loaded]
     reference_spectra(stresses, readings)
     points, plan = joined_points(readings), (regulariser.name, outputs)
     if as_json:

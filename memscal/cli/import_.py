@@ -65,11 +65,7 @@ reference_options = options_of(
 
 def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
-    setting = _stated(options, (*_SHARED, "load"))
-    if any(options[name] is not None for name in (*common.FILM, *common.LAW)):
-        setting["film"] = common.film_from(options)
-    if options["radius"] is not None:
-        setting["indenter"] = common.indenter_from(options["indenter"], options)
+    setting = _stated(options, (*_SHARED, "load")) | _set_up(options)
     if not mesh:
         from memscal.formats.tables.reference import read_reference_table
 
@@ -94,6 +90,7 @@ Examples:
   memscal import sphere.csv -o dry.h5 --x x --x-unit mm --u U --u-unit mV --load-column "load set"
       --repeat "load set" --repeat pass --load-scatter 2 --lubrication dry
       --indenter sphere --radius 60 --young-modulus 1.9 --poisson-ratio 0.5 --thickness 1.5
+  memscal import current.csv -o scan.h5 --x x --u current
   memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
       --sigma S33 --sigma-unit MPa --sign -1 --load 1
   memscal import fem.vtu -o rod.h5 --format reference --r-unit mm
@@ -105,7 +102,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
 _SCAN_NAMES = [
-    *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "branch", "u_xz"),
+    *("x", "x_unit", "u", "u_unit", "u_sign", "y", "repeat", "branch", "u_xz"),
     *("u_yz", "load_column", "load_unit", "load_uncertainty", "title"),
     *("lubrication", "lubricant", "rod_friction"),
 ]
@@ -118,7 +115,7 @@ _ONLY = {
     "reference": _REFERENCE_NAMES,
 }
 _NEEDED = {
-    "scan": ("x", "x_unit", "u", "u_unit"),
+    "scan": ("x", "u"),
     "reference": ("r_unit", "sigma", "sigma_unit", "load"),
 }
 
@@ -130,9 +127,14 @@ _NEEDED = {
     "What it holds: measured points, or the base stress of a FEM calculation."
 )
 @option("--x", metavar="COLUMN")("Scan: column of the position.")
-@option("--x-unit", metavar="UNIT")("Scan: unit of the positions, such as mm.")
-@option("--u", metavar="COLUMN")("Scan: column of the normal channel's voltage.")
-@option("--u-unit", metavar="UNIT")("Scan: unit of the voltages, such as mV.")
+@option("--x-unit", metavar="UNIT")(
+    "Scan: unit of the positions, such as mm.  [default: that of the column's head, x/mm]"
+)
+@option("--u", metavar="COLUMN")("Scan: column of the normal channel's voltage or reading.")
+@option("--u-unit --unit u_unit", metavar="UNIT")(
+    "Scan: unit of the readings, of any kind, such as mV, pA, uT, Pa, or 1 of counts.  [default: "
+    "that of the column's head]"
+)
 @option("--y", metavar="COLUMN")("Scan: column of the second position, of points in a plane.")
 @option("--repeat", metavar="COLUMN", multiple=True)(
     "Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
@@ -161,9 +163,6 @@ _NEEDED = {
     "Scan: what was between indenter and film."
 )
 @option("--lubricant", metavar="TEXT")("Scan: name of the lubricant.")
-@option("--u-scale", float, metavar="V")(
-    "Scan: volts per unit of the readings, for a sensor whose output is not a voltage."
-)
 @option("--u-sign", _SIGN)(
     "Scan: -1 where the voltage falls when the indenter presses.  [default: 1]"
 )
@@ -184,8 +183,9 @@ def command(
 ) -> int:
     """Convert a TABLE (CSV) to a scan or to a reference, or a mesh (VTU, VTK, XDMF) to a reference.
 
-    The options state the units, the film and the indenter, which a table does not. Readings are
-    kept as they are. The numbers of readings, repeats, places and missing values are printed, and
+    The options state the units, the film and the indenter, which a table does not; a scan to be
+    calibrated with a reference of its own needs no film, indenter or load. Readings are kept as
+    they are. The numbers of readings, repeats, places and missing values are printed, and
     kept in the notes of the file.
     """
     from memscal.formats.meshes.mesh_files import is_mesh
@@ -229,8 +229,6 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
             f"A {kind} needs more: add {_named(missing)}. See the examples of "
             "`memscal import --help`."
         )
-    if kind == "scan" and options["load"] is None and options["load_column"] is None:
-        raise click.UsageError("The load is not given: add --load (in N) or --load-column.")
     other = "reference" if kind == "scan" else "scan"
     if misplaced := _stated(options, _ONLY[other]):
         raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
@@ -250,8 +248,18 @@ def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
     return {name: values[name] for name in names if values[name] is not None}
 
 
+def _set_up(options: dict[str, Any]) -> dict[str, Any]:
+    """Return film and indenter, where options describe them."""
+    stated: dict[str, Any] = {}
+    of_film = [name for name in options if name.startswith((*common.FILM, *common.LAW))]
+    if _stated(options, of_film):
+        stated["film"] = common.film_from(options)
+    if _stated(options, ("radius", "radius_uncertainty", "rod_friction")):
+        stated["indenter"] = common.indenter_from(options["indenter"], options)
+    return stated
+
+
 def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
-    film, indenter = common.film_from(options), common.indenter_from(options["indenter"], options)
     from memscal.formats.tables.scan import read_scan_table
     from memscal.model.scan import StressSensor
 
@@ -261,7 +269,6 @@ def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
         **_stated(options, [*_SCAN_NAMES, *_TABLE_NAMES]),
         load_scatter=si(options["load_scatter"], -2),
         x_error=si(options["position_error"], -6),
-        film=film,
-        indenter=indenter,
+        **_set_up(options),
         sensor=StressSensor(**labels),
     )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.model.arrays import FloatArray
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
 from memscal.model.scan import Places, Scan, places_of
@@ -103,6 +104,7 @@ class ScanPoints:
     missing: int  # how many points were missing
     decorrelation: FloatArray | None = None  # (n, n): makes noise of the stated correlation white
     channel: str = "zz"
+    reading: Reading = VOLTS  # the unit in which voltages are shown
 
     @property
     def order(self) -> int:
@@ -183,7 +185,7 @@ class ScanPoints:
 def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     """Flatten a scan to the measured points of one channel."""
     u, errors = channel_signal(scan, channel)
-    load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
+    load = np.full(u.shape, scan.stated_load) if scan.normal_load is None else scan.normal_load
     x, y = scan.positions
     keep = measured_mask(scan, channel)
     if not keep.any():
@@ -211,6 +213,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         missing=int(u.size - keep.sum()),
         decorrelation=None if channel_order(channel) else _decorrelation(scan, keep),
         channel=channel,
+        reading=scan.reading,
     )
     _require_usable(points)
     return points
@@ -273,7 +276,7 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
         for group in groups if len(groups) > 1 else ():
             part = scan.only_passes(sorted(number for _, number in group))
             load = float(np.mean([load for load, _ in group]))
-            u = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
+            u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
             split.append(replace(part, load=load, load_uncertainty=u))
         owners += [i] * (len(split) - len(owners))
     return split, tuple(owners)
@@ -320,6 +323,7 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
         missing=sum(points.missing for points in scans),
         decorrelation=_joined_decorrelation(scans),
         channel=scans[0].channel,
+        reading=scans[0].reading,
     )
 
 
@@ -353,7 +357,7 @@ def _require_usable(points: ScanPoints) -> None:
         )
     if np.ptp(points.u) == 0:
         raise InputError(
-            f"Every voltage of the scan is {points.u[0]:g} V.",
+            f"Every voltage of the scan is {points.u[0]:g} {points.reading.si}.",
             why="A calibration needs a voltage that follows the indenter.",
             cure="Check the channel.",
         )
@@ -365,8 +369,8 @@ def _require_usable(points: ScanPoints) -> None:
     rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])
     if fall > 1.5 * rise:
         raise InputError(
-            f"The voltage falls by {fall * points.load.mean() * 1e3:.4g} mV where the indenter is "
-            "above the sensor.",
+            f"The voltage falls by {points.reading.text(fall * points.load.mean(), '.4g')} where "
+            "the indenter is above the sensor.",
             why="Normal stress is positive in compression, so the voltage must rise.",
             cure="Change the sign of u_zz (u_sign=-1; memscal import ... --u-sign -1), or swap the "
             "leads of the channel and measure again.",
@@ -409,7 +413,8 @@ def mistaken_unit(factor: float) -> str:
 
 def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
-    h, a = scan.film.thickness, scan.indenter.radius
+    film, rod, _ = scan.set_up
+    h, a = film.thickness, rod.radius
     x, y = (positions.ravel() for positions in scan.positions)
     span = float(max(np.ptp(x), np.ptp(y)))
     step = min((s for s in places_of(x, y, scan.passes.ravel()).steps if s > 0), default=0.0)

@@ -315,9 +315,11 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
     # Rounding makes the variance of a scan without noise negative.
     uncertainty = np.sqrt(max(float(integrals @ estimate.covariance @ integrals), 0.0))
     if not a > LEAST_SIGNIFICANCE * uncertainty:
+        unit = estimate.points.reading
         wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
         raise FitError(
-            f"The conversion constant would be ({a * 1e3:.2g} ± {uncertainty * 1e3:.2g}) mV/Pa: "
+            f"The conversion constant would be ({a / unit.scale:.2g} ± "
+            f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)}: "
             f"it is {wrong}.",
             why=_why_undetermined(estimate),
             cure=cure,
@@ -334,7 +336,8 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
     base = np.linalg.qr(estimate.model.drift_columns)[0]
     rise = float(np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted)))
     ratio = rise / float(np.median(estimate.noise))
-    varies = f"Beside a line the voltage varies by {rise * 1e3:.3g} mV, {ratio:.3g} times its noise"
+    varied = estimate.points.reading.text(rise)
+    varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
     signal = np.abs(estimate.predicted - estimate.background)
@@ -453,7 +456,8 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
         if points.repeat.any():
             place += f" of repeat {points.repeat[i] + 1}"
-        voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
+        seen, expected = (points.reading.text(u[i], ".4g") for u in (points.u, estimate.predicted))
+        voltages = f"{seen} instead of {expected}"
         text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
         messages.append(Message("outlier", text))
     return messages

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -36,7 +35,6 @@ _MARGIN = 1.1
 _DECAYED = 1e-3
 #: A field is taken as round where less than this share of it is not, at so many wavenumbers.
 _ROUND, _SEEN = 0.005, 17
-_OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
 
 
 def is_source(stress: BaseStress | None) -> bool:
@@ -58,28 +56,18 @@ def require_one_kind(
         )
 
 
-def of_source(scan: Scan, stress: BaseStress | None) -> Scan:
-    """Return a scan over a source: nothing that it states of film and rod is uncertain."""
-    field = stress.field if isinstance(stress, StressProfile) else None
-    u = scan.load_uncertainty if field and field.load else None
-    certain: dict[str, Any] = {f"{name}_uncertainty": None for name in _OF_FILM}
-    film = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None, **certain)
-    rod = replace(scan.indenter, radius_uncertainty=None)
-    return replace(scan, film=film, indenter=rod, load_uncertainty=u, rod_friction=None)
-
-
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     """Refuse scans that cannot be fitted together."""
-    sensors = {(scan.sensor.name, scan.sensor.channel): None for scan in scans}
+    sensors = {(s.sensor.name or "unnamed", s.sensor.channel, s.unit): None for s in scans}
     if len(sensors) > 1:
-        named = ", ".join(f"{name or 'unnamed'} ({channel})" for name, channel in sensors)
+        named = ", ".join(f"{name} ({channel}, in {unit})" for name, channel, unit in sensors)
         raise InputError(
             f"The scans are of {len(sensors)} sensors: {named}.",
             why="Scans that are fitted together share one apparatus function.",
             cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
         )
     films: dict[str, ElasticFilm] = {}
-    for film in (scan.film for scan in scans):
+    for film in (scan.film for scan in scans if scan.film is not None):
         first = films.setdefault(film.name, film)
         if film.name and first != film:
             raise InputError(
@@ -94,16 +82,33 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     return tuple(scans)
 
 
-def require_calibration_rod(scan: Scan) -> None:
+def require_calibration_rod(scan: Scan, reference: BaseStress | None) -> None:
     """Refuse an indenter that cannot calibrate, and lengths that no set-up has."""
-    if not isinstance(scan.indenter, Rod):
+    if scan.indenter is not None and not isinstance(scan.indenter, Rod):
         raise InputError(
             f"The scan was made with a {scan.indenter.shape}, but a calibration needs a rod.",
             why="Only a contact smaller than the film's thickness is independent of friction and "
             "linear in load.",
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
-    points.require_plausible(scan)
+    if with_film_of(reference, scan).film is not None:
+        points.require_plausible(scan)
+
+
+def film_of(stress: BaseStress) -> ElasticFilm | None:
+    """Return the film that a stress is stated to be below."""
+    return stress.film_of_law if isinstance(stress, Contact) else stress.film
+
+
+def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
+    """Return a scan with film and rod if the reference depends on them, else without."""
+    stress = scan.reference if reference is None else reference
+    if stress is None:
+        return scan
+    film, rod = film_of(stress), scan.indenter or stress.indenter
+    if film is None or not isinstance(rod, Rod):
+        return replace(scan, film=None, indenter=None, rod_friction=None)
+    return replace(scan, film=scan.film or film, indenter=rod)
 
 
 def require_same_set_up(
@@ -143,10 +148,10 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
     """Return in words what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
     places = points.file_in_words(scan.source, "scan"), points.file_in_words(source, kind)
-    film = stress.film_of_law if isinstance(stress, Contact) else stress.film
+    film = film_of(stress)
     law = "" if film is None else film.law
     names = ["thickness", "poisson_ratio"]
-    finite = {scan.film.law, law} - {"", LINEAR}
+    finite = {law, scan.film.law if scan.film and film else ""} - {"", LINEAR}
     if finite:
         # Equilibrium of a linear film holds its modulus as a factor on both sides: at a given load
         # the modulus changes depths, and no stress.
@@ -163,7 +168,7 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         rods = scan, SimpleNamespace(rod_friction=friction)
         differences += points.stated_differences(LOAD, ("rod_friction",), rods, places)
-    if law == LINEAR:
+    if law == LINEAR or (scan.load is None and scan.normal_load is None):
         return differences
     loads, stated = (_farthest(scan, stress), stress), f"law is {law or 'not stated'}"
     return differences + [
@@ -174,7 +179,7 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
 
 def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
-    loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
+    loads = np.atleast_1d(scan.stated_load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
     i = np.nanargmax(np.abs(loads - stress.load) - points.COVERAGE * spread)
@@ -188,7 +193,21 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
         return reference
     if scan.reference is not None:
         return scan.reference
-    return press_rod(scan.film, scan.indenter, scan.load, scan.rod_friction)
+    return press_rod(*scan.set_up, scan.rod_friction)
+
+
+def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
+    """Return a scan with a load: its own or the reference's; with a ``peak`` (Pa) one for all."""
+    if peak:
+        # A refers to the reference over its peak.
+        factor = np.full(scan.u_zz.shape, stress.load / peak)
+        return replace(scan, load=stress.load, normal_load=factor, normal_load_errors=None)
+    if stress.unit != "Pa":
+        # Loads are strengths, over that of the reference, and no newtons.
+        scan = replace(scan, load_uncertainty=None)
+    if scan.load is None and scan.normal_load is not None:
+        return replace(scan, load=float(np.nanmedian(scan.normal_load)))
+    return scan if scan.load else replace(scan, load=stress.load)
 
 
 def reference_spectra(
@@ -329,7 +348,7 @@ def reference_sensitivities(
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
             number = distinct.index(owner)
             suffix = f"_{number + 1}" if number else ""
-            for source, change in sensitivities(scan, references[i]).items():
+            for source, change in (sensitivities(scan, references[i]) if scan.film else {}).items():
                 blank = [np.zeros_like(change) for _ in scans]
                 changes.setdefault(source + suffix, blank)[i] = change
     return changes
@@ -339,7 +358,7 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
     """Change of the reference's transform by one standard uncertainty of each film property."""
     # Centred differences of the rod's solution (one-sided at nu = 1/2), or its relative change
     # for a reference from elsewhere.
-    film = scan.film
+    film = scan.set_up.film
     changes: dict[str, FloatArray] = {}
     if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
@@ -355,7 +374,7 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
 
 def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of the rod's radius."""
-    rod = scan.indenter
+    rod = scan.set_up.indenter
     if not (u := rod.radius_uncertainty):
         return {}
     radii = (rod.radius + u, max(rod.radius - u, rod.radius / 2))
@@ -366,8 +385,8 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
 def press_neo_hookean(scan: Scan) -> Contact:
     """Press the rod of a scan on its film as if that were neo-Hookean, and stuck to it."""
     # One that slides differs less from a linear film, and is not solved to any depth.
-    rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    return press_rod(rubber, scan.indenter, scan.load)
+    rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    return press_rod(rubber, scan.set_up.indenter, scan.stated_load)
 
 
 def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
@@ -376,7 +395,7 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     # no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
     # at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
     # sliding. Nothing where the rod goes deeper than is solved.
-    film, rod, load = scan.film, scan.indenter, scan.load
+    film, rod, load = scan.set_up
     if film.law == LINEAR or (film.law and scan.rod_friction is not None):
         return {}
     k, order = reference.wavenumbers.k.tobytes(), reference.order
@@ -410,15 +429,16 @@ def relative(values: FloatArray, own: FloatArray) -> FloatArray:
 
 def law_at_once(scan: Scan) -> str:
     """Law by which rods like the scan's are solved in milliseconds: its own, or the nearest one."""
-    if scan.film.law in ("", LINEAR):
+    if scan.set_up.film.law in ("", LINEAR):
         return LINEAR
-    rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    within = is_tabulated(rubber, scan.indenter, _MARGIN * scan.load, scan.rod_friction)
+    rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    rod, load = scan.set_up[1:]
+    within = is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction)
     return NEO_HOOKEAN if within else LINEAR
 
 
 def rod_spectrum(scan: Scan, reference: RadialSpectrum, law: str) -> FloatArray:
     """Transform of the base stress of a scan's rod, by a law, at the nodes of a reference (N)."""
-    film = replace(scan.film, law=law, mooney_rivlin_ratio=None)
-    contact = press_rod(film, scan.indenter, scan.load, scan.rod_friction)
+    film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=None)
+    contact = press_rod(film, *scan.set_up[1:], scan.rod_friction)
     return _base_spectrum(contact, reference.wavenumbers.k.tobytes(), reference.order)

@@ -12,21 +12,23 @@ from memscal.figures.style import COLOURS, channel_indices, legend_above
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES, failed_check_messages
-from memscal.model.quantities import KPA, MM, MV, PER_MM, PER_MM2, measured_text
+from memscal.model.indenter import Rod
+from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit
 
 
 def draw_scan(axes: Axes, data: ApparatusData) -> None:
-    """Draw the scan on a linear axis, in mV; the right-hand axis reads U/A in kPa."""
+    """Draw the scan on a linear axis; the right-hand axis reads U/A in kPa."""
     scan = data.reconvolution
-    _draw_measured(axes, scan.x, scan.u_zz, _finite_errors(scan.u_zz_errors))
+    _draw_measured(axes, data, scan.u_zz, _finite_errors(scan.u_zz_errors))
     _draw_predictions(axes, data)
     _draw_reference(axes, data)
     _draw_indenter(axes, data)
     limit_to_scan(axes, scan.x)
-    axes.set_ylabel(f"voltage $U_{{{channel_indices(data)}}}$ (mV)")
+    word = "voltage" if data.reading.si == "V" else "reading"
+    axes.set_ylabel(f"{word} $U_{{{channel_indices(data)}}}$ ({data.reading.unit})")
     _stress_axis(axes, data, baseline=_baseline(data))
     legend_above(axes, points=scan.x.size)
 
@@ -39,9 +41,10 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     clear = (signal > _EXPANDED * errors) & (signal > 0)
     limit = np.where(clear, np.nan, np.maximum(signal, 0.0) + _EXPANDED * errors)
     limit[~(limit > 0)] = np.nan
-    _draw_measured(axes, scan.x, np.where(clear, signal, np.nan), errors, label="_measured")
+    _draw_measured(axes, data, np.where(clear, signal, np.nan), errors, label="_measured")
+    unit = data.reading
     if np.any(np.isfinite(limit)):
-        (limits,) = axes.plot(scan.x / MM, limit / MV, "v", mfc="none", mew=0.7)
+        (limits,) = axes.plot(scan.x / MM, limit / unit.scale, "v", mfc="none", mew=0.7)
         limits.set(color=COLOURS["muted"], markersize=0.8 * style.marker_size(scan.x.size))
         limits.set(label="less than 2u: upper limit, U + 2u")
         limits.set_rasterized(scan.x.size > style.SCATTER_THRESHOLD)
@@ -51,29 +54,30 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     heights = np.concatenate([signal[clear], limit[np.isfinite(limit)]])
     if heights.size:
         top = max(float(np.max(heights)), _reference_peak(data))
-        axes.set_ylim(0.5 * float(np.min(heights)) / MV, 2.0 * top / MV)
+        axes.set_ylim(0.5 * float(np.min(heights)) / unit.scale, 2.0 * top / unit.scale)
     _draw_indenter(axes, data)
     limit_to_scan(axes, scan.x)
     along = "distance from the centre $r$" if _by_distance(data) else "position $x$"
     aligned = ", repeats moved to one centre" if _aligned(data) and not _by_distance(data) else ""
     axes.set_xlabel(f"{along} (mm){aligned}")
     bar = "|" if _tangential(data) else ""
-    axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} (mV)")
+    axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} ({unit.unit})")
     _stress_axis(axes, data, baseline=0.0)
     if np.any(np.isfinite(limit)):
         axes.legend(handles=[limits], loc="lower left", bbox_to_anchor=(0, 1), borderpad=0.2)
 
 
 def _draw_measured(
-    axes: Axes, x: FloatArray, u: FloatArray, errors: FloatArray, label: str = "scan, ±u"
+    axes: Axes, data: ApparatusData, u: FloatArray, errors: FloatArray, label: str = "scan, ±u"
 ) -> None:
+    x, scale = data.reconvolution.x, data.reading.scale
     size, colour = style.marker_size(x.size), COLOURS["measured"]
     if x.size > style.SCATTER_THRESHOLD:
-        (points,) = axes.plot(x / MM, u / MV, ".", color=colour, ms=1.5, mew=0)
+        (points,) = axes.plot(x / MM, u / scale, ".", color=colour, ms=1.5, mew=0)
         points.set(rasterized=True, label=label.removesuffix(", ±u"))
         return
     axes.errorbar(
-        x / MM, u / MV, errors / MV, fmt="o", ms=size, mfc="white", mew=0.7, color=colour,
+        x / MM, u / scale, errors / scale, fmt="o", ms=size, mfc="white", mew=0.7, color=colour,
         elinewidth=0.7, capsize=1.5 if x.size <= 100 else 0, zorder=2, label=label,
     )  # fmt: skip
 
@@ -92,7 +96,8 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             curve = np.where(curve > 0, curve, np.nan)
         single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
         line_like = single_valued and not _joint(data) and not _aligned(data)
-        (line,) = axes.plot(x / MM, curve / MV, dashes, color=COLOURS[name], label=label, zorder=3)
+        (line,) = axes.plot(x / MM, curve / data.reading.scale, dashes, label=label, zorder=3)
+        line.set_color(COLOURS[name])
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
             line.set(markersize=1.2 if x.size > style.SCATTER_THRESHOLD else 2.5, rasterized=True)
@@ -125,14 +130,15 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
     stress = _seen_stress(data)
     if not (np.isfinite(constant) and constant > 0) or stress is None:
         return
-    voltage = constant * stress * (data.load / reference.load)
+    voltage = constant * stress
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
     curve = np.concatenate([voltage[::-1], voltage])
     if not net:
         curve = _turned(data, x) * curve + _background(data, x)
-    (line,) = axes.plot(x / MM, curve / MV, "-.", color=COLOURS["reference"], lw=1.0, zorder=1.5)
+    (line,) = axes.plot(x / MM, curve / data.reading.scale, "-.", lw=1.0, zorder=1.5)
+    line.set(color=COLOURS["reference"])
     line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
 
 
@@ -140,7 +146,7 @@ def _reference_peak(data: ApparatusData) -> float:
     stress = _seen_stress(data)
     if stress is None:
         return 0.0
-    peak = float(data.conversion_constant * np.max(stress) / data.reference.load * data.load)
+    peak = float(data.conversion_constant * np.max(stress))
     return peak if np.isfinite(peak) else 0.0
 
 
@@ -149,11 +155,14 @@ def _tangential(data: ApparatusData) -> bool:
 
 
 def _seen_stress(data: ApparatusData) -> FloatArray | None:
-    """The reference as the channel sees it where its voltage is positive, in Pa."""
+    """The reference at the load, as the channel sees it where its voltage is positive, in Pa."""
     reference = data.reference
+    factor = (data.load or reference.load) / reference.load
+    if data.reading.per == "relative":
+        factor = 1 / np.abs(reference.sigma_zz).max()
     if not _tangential(data):
-        return reference.sigma_zz
-    return None if reference.sigma_rz is None else -reference.sigma_rz
+        return reference.sigma_zz * factor
+    return None if reference.sigma_rz is None else -reference.sigma_rz * factor
 
 
 def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
@@ -163,8 +172,8 @@ def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     """Draw the rod's diameter (or the sphere's contact) as the paper's black patch."""
-    form = "rod" if data.indenter.shape == "rod" else "contact"
-    radius = data.indenter.radius if form == "rod" else data.reference.contact_radius
+    rod, radius = isinstance(data.indenter, Rod), data.reference.contact_radius
+    form, radius = ("rod", data.indenter.radius) if rod and data.indenter else ("contact", radius)
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
@@ -177,10 +186,12 @@ def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
     """Add the right-hand axis (U - baseline)/A in kPa; without a positive A there is none."""
     if not (np.isfinite(constant := data.conversion_constant) and constant > 0):
         return
-    per_mv, offset = MV / constant / KPA, baseline / MV
+    unit, shown = data.reading, {"Pa": "kPa"}.get(data.reading.per, data.reading.per)
+    per_mv = unit.scale / constant / (KPA if shown == "kPa" else 1.0)
+    offset = baseline / unit.scale
     both_ways = (lambda u: (u - offset) * per_mv, lambda stress: stress / per_mv + offset)
     right = axes.secondary_yaxis("right", functions=both_ways)
-    right.set_ylabel(rf"stress $\sigma_{{{channel_indices(data)}}}$, $U/A$ (kPa)")
+    right.set_ylabel(rf"stress $\sigma_{{{channel_indices(data)}}}$, $U/A$ ({shown})")
 
 
 def _centre(data: ApparatusData) -> float:
@@ -425,13 +436,14 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     name, _, channel = sensor_title(data).rpartition(", channel ")
     name = textwrap.shorten(name, 82, placeholder=" …")
     title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
-    film = data.film
-    law = f", {film.law_text}" if film.law else ""
-    setting = (
-        f"{data.indenter.shape} of radius {data.indenter.radius / MM:.3g} mm, {data.load:.3g} N; "
-        f"film {film.thickness / MM:.3g} mm, E = {film.young_modulus / KPA / 1e3:.3g} MPa, "
-        f"ν = {film.poisson_ratio:.3g}{law}; ± is the standard uncertainty (k = 1)"
-    )
+    film, rod = data.film, data.indenter
+    load = f", {data.load:.3g} N; " if data.load else "; "
+    setting = f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}" if rod else ""
+    if film is not None:
+        setting += f"film {film.thickness / MM:.3g} mm, "
+        setting += f"E = {film.young_modulus / KPA / 1e3:.3g} MPa, ν = {film.poisson_ratio:.3g}"
+        setting += f", {film.law_text}; " if film.law else "; "
+    setting += "± is the standard uncertainty (k = 1)"
     rows = [(title, ink, "bold"), (setting, COLOURS["muted"], "normal")]
     rows.append((values_text(data), ink, "normal"))
     if data.checks and data.passed:

@@ -62,7 +62,7 @@ def _budget(data: ApparatusData) -> str:
         return "<p>No budget by source was stored.</p>"
     columns = []
     for name, budget in data.budget.items():
-        quantity = estimated_quantity(name)
+        quantity = estimated_quantity(name).read_in(data.reading)
         total = float(np.sqrt(sum(u**2 for u in budget.values())))
         cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
         ratio = math.nan
@@ -86,8 +86,8 @@ def _share(u: float | None, total: float, scale: float) -> str:
 def _setting(data: ApparatusData) -> Table:
     rows = [
         *_stated("", records.SENSOR, data.sensor),
-        ("load", f"{data.load:.4g} N"),
-        *_stated(f"{data.indenter.shape}, ", records.ROUND_INDENTER, data.indenter),
+        ("load", "not stated" if data.load is None else f"{data.load:.4g} N"),
+        *_stated(f"{getattr(data.indenter, 'shape', '')}, ", records.ROUND_INDENTER, data.indenter),
         *_stated("film, ", records.FILM, data.film),
         *_stated("reference, ", records.SOLVER, data.reference),
         *_stated("reference, ", records.NUMERICS, data.reference),

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from memscal.calibration.sweep import Sweep
 from memscal.figures.style import COLOURS, panels_of
 from memscal.model.arrays import FloatArray
-from memscal.model.quantities import MM, MV
+from memscal.model.quantities import ESTIMATED, MM
 from memscal.summaries.declared import power_of_ten
 
 _INNER = (0.16, 0.84)  # of the draws: what one standard deviation holds of a normal law
@@ -18,11 +18,12 @@ def sweep_figure(sweep: Sweep) -> Figure:
     """Draw how A, sigma and the reconvolution change with the noise that regularises them."""
     constants = sweep.conversion_constant, sweep.seed_conversion_constant
     widths = sweep.gaussian_sigma_deconvolved, sweep.seed_gaussian_sigma
-    power = power_of_ten(sweep.conversion_constant / MV)
+    constant = ESTIMATED["conversion_constant"].read_in(sweep.reading)
+    power = power_of_ten(sweep.conversion_constant / constant.scale)
     power = 0 if -2 <= power <= 3 else power
-    unit = f"$10^{{{power}}}$ mV/Pa" if power else "mV/Pa"
+    unit = f"$10^{{{power}}}$ {constant.unit}" if power else constant.unit
     rows = (
-        (f"$A$ ({unit})", *constants, MV * 10.0**power),
+        (f"$A$ ({unit})", *constants, constant.scale * 10.0**power),
         (r"$\sigma$ of deconvolved $G$ (mm)", *widths, MM),
         ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
     )

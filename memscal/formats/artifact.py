@@ -1,6 +1,7 @@
 """memscal-artifact: the apparatus function with all that it rests on, as HDF5."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,9 +10,11 @@ from memscal.formats import groups
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
-from memscal.formats.values import altered, require_scalar, require_schema
+from memscal.formats.units import reading_of
+from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import apparatus, records
 from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
+from memscal.model.notation import Reading
 
 
 def artifact_from(file: SafeFile) -> ApparatusData:
@@ -23,26 +26,29 @@ def artifact_from(file: SafeFile) -> ApparatusData:
             why="An apparatus function is used only as its calibration left it.",
             cure="Get the original file, or run the calibration again.",
         )
-    load = require_scalar(file, "/entry/indenter/load", "force")
-    film = groups.read_film(file, "/entry/sample/film")
-    indenter = groups.read_round_indenter(file, "/entry/indenter")
+    load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
+    film, indenter = groups.read_stated(file)
+    process, u_zz = groups.read_process(file, "/entry/process"), "/entry/reconvolution/u_zz"
+    reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
+    reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
-    reconvolution = read_record(records.RECONVOLUTION, file, "/entry/reconvolution")
+    of_scan = records.RECONVOLUTION.read_in(reading)
+    reconvolution = read_record(of_scan, file, "/entry/reconvolution")
     return ApparatusData(
         field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
         transfer=apparatus.TransferFunction(**transfer),
         reconvolution=apparatus.Reconvolution(**reconvolution),
-        parameters=groups.read_parameters(file, "/entry/parameters"),
+        parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file, "/entry/quality"),
         film=film,
         indenter=indenter,
         sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
         load=load,
-        reference=groups.read_profile(file, load=load, film=film, indenter=indenter),
-        process=groups.read_process(file, "/entry/process"),
-        other=_read_other(file),
+        reference=groups.read_profile(file, load=load),
+        process=process,
+        other=_read_other(file, reading),
     )
 
 
@@ -59,14 +65,14 @@ def artifact_tree(data: ApparatusData) -> Group:
 
 
 def _entry(data: ApparatusData) -> Group:
-    sensor = data.sensor.name
+    sensor, of_scan = data.sensor.name, records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "apparatus_function": write_record(records.FIELD, data.field),
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
         "transfer_function": write_record(records.TRANSFER, data.transfer),
-        "reconvolution": write_record(records.RECONVOLUTION, data.reconvolution),
+        "reconvolution": write_record(of_scan, data.reconvolution),
         "parameters": groups.parameter_group(data.parameters, data.budget),
         "quality": groups.quality_group(data.checks),
         "sample": groups.sample_group(data.film),
@@ -85,12 +91,12 @@ def _entry(data: ApparatusData) -> Group:
     return Group("NXentry", children, {"default": "apparatus_function"})
 
 
-def _read_other(file: SafeFile) -> apparatus.OtherEstimate | None:
+def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:
     """Read the estimate by the route that was not chosen; a division is one by white noise."""
     for route, method in (("bayesian", "bayesian"), ("division", "white-noise")):
         places = [f"/entry/{name}_{route}" for name in ("radial_profile", "radial_covariance")]
         if file.has(places[0]):
-            parameters = groups.read_parameters(file, f"/entry/parameters_{route}")
+            parameters = groups.read_parameters(file, f"/entry/parameters_{route}", reading)
             return apparatus.OtherEstimate(method, parameters, _read_radial(file, *places))
     return None
 

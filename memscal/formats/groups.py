@@ -28,6 +28,7 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
 from memscal.model.scan import StressSensor
@@ -178,12 +179,13 @@ _COVARIANCE = (
 )
 
 
-def parameter_dimension(name: str, unit: str = "") -> str:
+def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name."""
+    declared = declared_quantity(name)
+    if declared is not None and (not unit or reading != VOLTS):
+        return declared.read_in(reading).dimension
     if unit:
         return dimension_of(unit, f"parameter {name}")
-    if (declared := declared_quantity(name)) is not None:
-        return declared.dimension
     raise InputError(
         f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",
@@ -196,7 +198,8 @@ def parameter_dimension(name: str, unit: str = "") -> str:
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
-    dimensions = [parameter_dimension(n, u) for n, u in zip(parameters.names, stated, strict=True)]
+    pairs, of = zip(parameters.names, stated, strict=True), parameters.reading
+    dimensions = [parameter_dimension(name, unit, of) for name, unit in pairs]
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
         raise InputError(
@@ -219,7 +222,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     return Group("NXcollection", children)
 
 
-def read_parameters(file: SafeFile, path: str) -> ParameterSet:
+def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet:
     """Read the parameters, in SI units."""
     names = tuple(text_list(file, f"{path}/names"))
     if not names or len(set(names)) != len(names):
@@ -227,6 +230,8 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
             f"{file.where(path)}/names is missing or names a parameter twice.",
             why="It lists the parameters, in the order of their covariance.",
         )
+    for name in names:  # their units are entered
+        estimated_quantity(name).read_in(reading)
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
     scale = np.array([_unit_scale(file, f"{path}/{name}") for name in names])
     covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)
@@ -239,6 +244,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
         values=np.array([value for value, _ in pairs]),
         covariance=covariance * scale[:, None] * scale[None, :],
         units=tuple(unit for _, unit in pairs),
+        reading=reading,
     )
 
 
@@ -284,29 +290,39 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
         return ElasticFilm(**read_record(records.FILM, file, path))
 
 
-def sample_group(film: ElasticFilm, lubrication: str = "", lubricant: str = "") -> Group:
+def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | None]:
+    """Read the film and the indenter of a scan or an artifact, where it states them."""
+    film, indenter = "/entry/sample/film", "/entry/indenter"
+    stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
+    return (
+        read_film(file, film) if file.has(film) else None,
+        read_round_indenter(file, indenter) if stated else None,
+    )
+
+
+def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
     stated = {"lubrication": lubrication, "lubricant": lubricant}
     contact = write_record(records.SAMPLE, stated).children
-    return Group("NXsample", {"film": write_record(records.FILM, film), **contact})
+    of = {} if film is None else {"film": write_record(records.FILM, film)}
+    return Group("NXsample", {**of, **contact})
 
 
 def indenter_group(
-    indenter: Indenter,
+    indenter: Indenter | None,
     load: float | None = None,
     load_uncertainty: float | None = None,
     rod_friction: float | None = None,
 ) -> Group:
     """Return an indenter as an NXcollection, with its nominal load, and a rod's friction."""
-    children: dict[str, Node] = {"shape": indenter.shape}
+    children: dict[str, Node] = {} if indenter is None else {"shape": indenter.shape}
     if isinstance(indenter, Profile):
         children["face"] = write_record(records.INDENTER_FACE, indenter)
-    else:
+    elif indenter is not None:
         round_or_cone = records.CONE if isinstance(indenter, Cone) else records.ROUND_INDENTER
         children |= write_record(round_or_cone, indenter).children
-    if load is not None:
-        stated = {"load": load, "load_uncertainty": load_uncertainty, "rod_friction": rod_friction}
-        children |= write_record(records.LOAD, stated).children
+    stated = {"load": load, "load_uncertainty": load_uncertainty, "rod_friction": rod_friction}
+    children |= write_record(records.LOAD, stated).children
     return Group("NXcollection", children)
 
 
@@ -414,21 +430,16 @@ def read_profile(
     process: str = "/entry/reference_process",
     *,
     load: float | None = None,
-    film: ElasticFilm | None = None,
-    indenter: Indenter | None = None,
 ) -> StressProfile:
-    """Read a stress profile; load, film and indenter are those given where it names none."""
-    if file.has(f"{parameters}/film"):
-        film = read_film(file, f"{parameters}/film")
-    if file.has(f"{parameters}/indenter"):
-        indenter = read_indenter(file, f"{parameters}/indenter")
+    """Read a stress profile; the load is the one given where it names none."""
+    film, indenter = f"{parameters}/film", f"{parameters}/indenter"
     defaults = {} if load is None else {"load": load}
     if (form := _read_form(file, data)) is not None:
         stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
         return replace(form.profile(), **stated)
     return StressProfile(
-        film=film,
-        indenter=indenter,
+        film=read_film(file, film) if file.has(film) else None,
+        indenter=read_indenter(file, indenter) if file.has(indenter) else None,
         source=file.source,
         **read_record(records.PROFILE, file, data),
         **read_record(records.CONTACT, file, parameters, defaults=defaults),

@@ -15,9 +15,11 @@ from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si
-from memscal.formats.values import any_scalar, optional_text, text_list
+from memscal.formats.units import reading_of
+from memscal.formats.values import any_scalar, optional_text, text_list, units_of
 from memscal.model import records
 from memscal.model.arrays import FloatArray
+from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, Scan, branch_numbers, require_rod_friction
 
@@ -77,22 +79,22 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
 def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
     values.require_schema(file, writer.SCAN_SCHEMA)
-    load = read_record(records.LOAD, file, "/entry/indenter")
+    load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
-    film = groups.read_film(file, f"{_SAMPLE}/film")
-    indenter = groups.read_round_indenter(file, "/entry/indenter")
+    film, indenter = groups.read_stated(file)
+    reading = reading_of(units_of(file, f"{_DATA}/u_zz") or "V", file.where(f"{_DATA}/u_zz"))
     axes = _check_axes(file)
     only_y = axes == _POINTS and not file.has(f"{_DATA}/x")
     along = "y" if only_y or axes in _ALONG_Y.values() else "x"
-    arrays = _read_arrays(file, along)
+    arrays = _read_arrays(file, along, reading)
     # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
     numbered = axes == _POINTS and file.has(f"{_DATA}/repeat")
     if "branch" in arrays:
         arrays["branch"] = branch_numbers(file.where(f"{_DATA}/branch"), arrays["branch"])
     reference = None
     if file.has("/entry/reference"):
-        reference = groups.read_profile(file, load=load["load"], film=film, indenter=indenter)
+        reference = groups.read_profile(file, load=load["load"])
     contact = read_record(records.SAMPLE, file, _SAMPLE)
     contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
@@ -106,6 +108,7 @@ def scan_from(file: SafeFile) -> Scan:
         **load,
         indenter=indenter,
         film=film,
+        unit=reading.si,
         **contact,
         sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
         title=optional_text(file, "/entry/title"),
@@ -116,7 +119,7 @@ def scan_from(file: SafeFile) -> Scan:
     )
 
 
-def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
+def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", *(("y_errors",) if along == "x" else ("x", "x_errors"))}
     arrays: dict[str, Any] = {}
@@ -126,7 +129,8 @@ def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
             ndim = len(quantity.axes) if name in _OF_ONE_SHAPE else None
-            arrays[name] = values.require_array(file, path, quantity.dimension, ndim=ndim)
+            dimension = quantity.read_in(reading).dimension
+            arrays[name] = values.require_array(file, path, dimension, ndim=ndim)
     return arrays
 
 
@@ -175,7 +179,7 @@ def _data_group(scan: Scan) -> Group:
     along, points = scan.direction, scan.kind == "points"
     axes = _POINTS if points else (_ALONG_Y if along == "y" else _AXES)[scan.kind]
     data: dict[str, Node] = {"point": writer.index_axis("point", scan.x.size)} if points else {}
-    data |= _nodes({"y": scan.y}, axes if points else ("y",))
+    data |= _nodes(scan, {"y": scan.y}, axes if points else ("y",))
     if scan.repeat is not None:
         data["repeat"] = writer.Number(scan.repeat, "1", axes)
     elif scan.kind == "repeats":
@@ -183,24 +187,26 @@ def _data_group(scan: Scan) -> Group:
     if scan.branch is not None:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
-    data |= _nodes(positions, axes if points else (along,))
+    data |= _nodes(scan, positions, axes if points else (along,))
     if scan.position_scale_uncertainty is not None:
         data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
-    data |= _nodes({"u_zz": scan.u_zz}, axes)
+    data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:
         data |= {axis: writer.index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
-        data |= _nodes({"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
+        data |= _nodes(scan, {"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
     optional = {
         name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
     }
-    data |= _nodes(optional | dict(scan.channels), axes)
+    data |= _nodes(scan, optional | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
-def _nodes(arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]) -> dict[str, Node]:
+def _nodes(
+    scan: Scan, arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]
+) -> dict[str, Node]:
     """Return the arrays that there are, along the axes of this scan."""
     return {
-        name: si(array, _DECLARED[name].dimension, axes)
+        name: si(array, _DECLARED[name].read_in(scan.reading).dimension, axes)
         for name, array in arrays.items()
         if array is not None
     }

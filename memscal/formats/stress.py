@@ -21,17 +21,19 @@ from memscal.model.measured_stress import (
     MeasuredScan,
     MeasuredStress,
 )
+from memscal.model.notation import Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, record
+from memscal.model.records import points_record
 
 _CHANNELS = ("zz", "xz", "yz")
 _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 
-def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
+def _read_points(file: SafeFile, path: str, of: Reading) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
     stored = {
-        channel: read_record(records.points_record(channel), file, f"{path}/points_{channel}")
+        channel: read_record(points_record(channel).read_in(of), file, f"{path}/points_{channel}")
         for channel in _CHANNELS
         if file.has(f"{path}/points_{channel}")
     }
@@ -140,7 +142,7 @@ def stress_from(file: SafeFile) -> MeasuredStress:
             for path, number in zip(paths, numbers, strict=True)
         ),
         scans=scans,
-        **read_record(records.CONVERSION, file, "/entry/sensor"),
+        **read_record(records.CONVERSION.read_in(scans[0].reading), file, "/entry/sensor"),
         checks=groups.read_quality(file, "/entry/quality"),
         overridden=tuple(text_list(file, "/entry/overridden")),
         process=groups.read_process(file, "/entry/process"),
@@ -173,13 +175,12 @@ def _entry(measured: MeasuredStress) -> Group:
     }
     first = measured.scans[0]
     sensor, digest = first.sensor.name, measured.artifact_digest
+    of_artifact = {"content_sha256": digest} if digest else {}
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", list(profiles)),
         **profiles,
-        "sensor": write_record(
-            records.CONVERSION, measured, **({"content_sha256": digest} if digest else {})
-        ),
+        "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **of_artifact),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.
@@ -216,7 +217,8 @@ def _scan_number(file: SafeFile, path: str) -> int:
 
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
     arrays = write_record(records.STRESS_PROFILE, profile)
-    numbers = dict(write_record(records.STRESS_NUMBERS, _numbers(profile)).children)
+    of = profile.scan.reading
+    numbers = dict(write_record(records.STRESS_NUMBERS.read_in(of), _numbers(profile)).children)
     # What not every profile has comes last.
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     if profile.curve_r.size:
@@ -226,7 +228,7 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
         for source, covariance in profile.covariances.items()
     }
     points = {
-        f"points_{channel}": write_record(records.points_record(channel), of_channel)
+        f"points_{channel}": write_record(points_record(channel).read_in(of), of_channel)
         for channel, of_channel in profile.points.items()
     }
     budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
@@ -268,7 +270,7 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
             why="Measured stress without uncertainty means little.",
         )
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
-    profile |= read_record(records.STRESS_NUMBERS, file, path)
+    profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
     if file.has(f"{path}/curve"):
         profile |= read_record(records.STRESS_CURVE, file, f"{path}/curve")
     for end in ("", "_uncertainty"):
@@ -282,5 +284,5 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
         covariances={source: stored[f"{_PREFIX}{source}"] for source in sources},
         force_budget=budget["force"],
         maximum_budget=budget["maximum"],
-        points=_read_points(file, path),
+        points=_read_points(file, path, scan.reading),
     )

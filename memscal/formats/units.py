@@ -4,6 +4,7 @@ Canonical units are powers of ten, so that 0.25 mm is exactly 0.25e-3; others ar
 """
 
 import functools
+import math
 import re
 from typing import Any
 
@@ -12,13 +13,14 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import UnitError
 from memscal.model.arrays import FloatArray
+from memscal.model.notation import NAMED_UNITS, Reading
 from memscal.model.quantities import DIMENSIONS
 
 SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
-FILE_UNITS = {name: dimension.stored for name, dimension in DIMENSIONS.items()}
-"""The unit of each dimension that our writers use."""
 
+#: Words for readings in a unit of their own.
+ARBITRARY = ("a.u.", "arb", "adu", "lsb", "digits")
 # Canonical units of each dimension with the power of ten that takes them to SI; the micro sign and
 # the Greek mu are two characters.
 _POWERS = {
@@ -36,7 +38,7 @@ _POWERS = {
     "angle": {"rad": 0},
     "energy": {"J": 0},
     "stress per length": {"MPa/mm": 9},
-    "dimensionless": {"1": 0, "": 0},
+    "dimensionless": dict.fromkeys(("1", "", *ARBITRARY), 0),
 }
 _CANONICAL = {
     unit: (dimension, power)
@@ -61,20 +63,42 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
         raise UnitError(
             f"{where} has no unit.",
             why=f"It is a {dimension}, and a bare number could be in any unit.",
-            cure=f'Add an attribute units, such as "{FILE_UNITS[dimension]}".',
+            cure=f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".',
         )
-    canonical = _CANONICAL.get(unit.strip())
-    if canonical is not None:
-        if canonical[0] != dimension:
-            raise _wrong_dimension(where, unit, dimension)
-        return _scaled(numbers, canonical[1])
+    power = _power(unit.strip(), dimension)
+    if power is not None:
+        return _scaled(numbers, power)
+    if unit.strip() in _CANONICAL:
+        raise _wrong_dimension(where, unit, dimension)
     return np.asarray(numbers * _pint_factor(unit, dimension, where))
 
 
 def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:
     """Convert SI values to the unit that our files use; return them with that unit."""
-    unit = FILE_UNITS[dimension]
-    return _scaled(np.asarray(values, dtype=np.float64), -_CANONICAL[unit][1]), unit
+    unit = DIMENSIONS[dimension].stored
+    return _scaled(np.asarray(values, dtype=np.float64), -(_power(unit, dimension) or 0)), unit
+
+
+def _power(unit: str, dimension: str) -> int | None:
+    """Return the power of ten that takes a unit of a dimension to SI, where it is known."""
+    of, power = _CANONICAL.get(unit, ("", 0))
+    units = DIMENSIONS[dimension]
+    if of and DIMENSIONS[of].si == units.si:
+        return power
+    # Units of readings are entered among the dimensions by what they are stored in.
+    return round(math.log10(units.scale)) if unit == units.stored and not of else None
+
+
+def reading_of(unit: str, where: str) -> Reading:
+    """Return the unit of readings in any unit: one that has a name, base units, or 1."""
+    if canonical := _CANONICAL.get(unit.strip()):
+        return Reading.fitting(DIMENSIONS[canonical[0]].si, 10.0 ** canonical[1])
+    quantity = _pint_quantity(unit, "reading", where)
+    if not (base := quantity.to_base_units()).dimensionality:
+        return Reading.fitting("1")
+    named = (name for name in NAMED_UNITS if quantity.is_compatible_with(name))
+    si = next(named, f"{base.units:~C}".replace("**", "^"))
+    return Reading.fitting(si, float(quantity.to(si).magnitude))
 
 
 def dimension_of(unit: str, where: str) -> str:
@@ -82,6 +106,8 @@ def dimension_of(unit: str, where: str) -> str:
     canonical = _CANONICAL.get(unit.strip())
     if canonical is not None:
         return canonical[0]
+    if entered := next((d for d, units in DIMENSIONS.items() if units.stored == unit), ""):
+        return entered
     for dimension in SI_UNITS:
         try:
             _pint_factor(unit, dimension, where)
@@ -101,24 +127,29 @@ def _scaled(numbers: FloatArray, power: int) -> FloatArray:
 
 
 def _pint_factor(unit: str, dimension: str, where: str) -> float:
-    if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
-        raise UnitError(
-            f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.',
-            cure=f'Write it like "{FILE_UNITS[dimension]}".',
-        )
     import pint
 
-    registry = _registry()
-    target = dimension if dimension == "dimensionless" else SI_UNITS[dimension]
     try:
-        return float(registry.Quantity(1.0, registry.parse_units(unit)).to(target).magnitude)
+        quantity, si = _pint_quantity(unit, dimension, where), DIMENSIONS[dimension].si
+        return float(quantity.to("dimensionless" if si == "1" else si).magnitude)
     except pint.DimensionalityError as error:
         raise _wrong_dimension(where, unit, dimension) from error
+
+
+def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
+    """Return one of a unit, which pint must know, and whose zero is that of the SI unit."""
+    cure = f'Write it like "{DIMENSIONS.get(dimension, DIMENSIONS["voltage"]).stored}".'
+    if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
+        problem = f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.'
+        raise UnitError(problem, cure=cure)
+    try:
+        quantity = _registry().Quantity(1.0, _registry().parse_units(unit))
+        return quantity + 0 * quantity  # no sum of degrees above another zero, or of logarithms
     except Exception as error:  # pint raises what its parser happens to meet
         raise UnitError(
-            f'{where} has the unit "{_shown(unit)}", which is unknown.',
+            f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.',
             why=f"It is a {dimension}.",
-            cure=f'Write it like "{FILE_UNITS[dimension]}".',
+            cure=cure,
         ) from error
 
 
@@ -133,7 +164,7 @@ def _wrong_dimension(where: str, unit: str, dimension: str) -> UnitError:
     return UnitError(
         f'{where} has the unit "{_shown(unit)}", but it must be a {dimension}.',
         why="A number in a unit of another kind cannot be converted.",
-        cure=f'Give it in "{FILE_UNITS[dimension]}" or another unit of {dimension}.',
+        cure=f'Give it in "{DIMENSIONS[dimension].stored}" or another unit of {dimension}.',
     )
 
 

@@ -9,8 +9,9 @@ from memscal.errors import FormatError, InputError, SchemaVersionError
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import CONTENTS_PATH, SCHEMA_VERSION, VERSION_ATTRIBUTE
-from memscal.formats.units import SI_UNITS, dimension_of, to_si
+from memscal.formats.units import dimension_of, to_si
 from memscal.model.arrays import FloatArray
+from memscal.model.quantities import DIMENSIONS
 
 _MAX_ITEMS = 10_000
 
@@ -61,7 +62,7 @@ def require_array(
         raise FormatError(
             f"{file.where(path)} is missing.",
             why=f"It should hold a {dimension}.",
-            cure=f'Write it, with an attribute units such as "{SI_UNITS[dimension]}".',
+            cure=f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".',
         )
     values = file.array(path)
     if ndim is not None and values.ndim != ndim:
@@ -85,7 +86,7 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
 def any_scalar(file: SafeFile, path: str) -> tuple[float, str]:
     """Return a number of any dimension in SI units, with its SI unit."""
     dimension = dimension_of(units_of(file, path) or "1", file.where(path))
-    return require_scalar(file, path, dimension), SI_UNITS[dimension]
+    return require_scalar(file, path, dimension), DIMENSIONS[dimension].si
 
 
 def require_text(file: SafeFile, path: str) -> str:

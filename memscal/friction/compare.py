@@ -50,7 +50,9 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
         place = scan.source.file_name if scan.source else "The scan"
         if not isinstance(scan.indenter, Sphere):
             raise InputError(
-                f"{place} was made with a {scan.indenter.shape}, not with a sphere.",
+                f"{place} was made with a rod, not with a sphere."
+                if scan.indenter
+                else f"{place} states no sphere (/entry/indenter).",
                 why="The stress under a rod barely depends on friction, and its contact does not "
                 "grow: a rod scan calibrates a sensor.",
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",

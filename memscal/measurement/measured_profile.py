@@ -51,7 +51,7 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     singles = []
     for group in np.split(order, starts):
         load = float(np.nanmedian(scan.normal_load[np.isin(passes, group)]))
-        u = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
+        u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
         only = scan.only_passes(np.sort(group))
         singles.append(replace(only, load=load, load_uncertainty=u))
     return tuple(singles)
@@ -127,7 +127,7 @@ def contact_signal(scan: Scan, apparatus: ApparatusFunction) -> ContactSignal:
     try:
         settings: dict[str, Any] = {"load": loads, "strain": "linear", "rings": _RINGS}
         contacts = [
-            indent(scan.film, scan.indenter, friction=friction, **settings)
+            indent(scan.set_up.film, scan.set_up.indenter, friction=friction, **settings)
             for friction in ((0.0,) if slides else (0.0, math.inf))
         ]
     except DomainError as failure:
@@ -138,7 +138,7 @@ def contact_signal(scan: Scan, apparatus: ApparatusFunction) -> ContactSignal:
         ) from failure
     width = float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y)))
     r = np.linspace(0.0, 1.5 * width, _DISTANCES)
-    nodes = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, 3 * width)
+    nodes = Wavenumbers.covering(_LARGEST_KH / scan.set_up.film.thickness, 3 * width)
     through = apparatus.conversion_constant * sensor_transfer(apparatus, nodes.k)
     spectra = [through * contact.base_spectrum(nodes.k) for path in contacts for contact in path]
     voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, loads.size, r.size)
@@ -213,7 +213,7 @@ def prepared_scan(
     if scan.normal_load is None:
         return level, electronic, estimated
     errors, (x, y) = scan.normal_load_errors, scan.positions
-    load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.load
+    load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.stated_load
     for _ in range(_ROUNDS):
         estimate, _ = gaussian_pressure(level, apparatus, measured_points(level))
         distance = np.hypot(x - estimate.centre[0], y - estimate.centre[1])
@@ -235,7 +235,7 @@ def _at_nominal(scan: Scan, slope: FloatArray) -> Scan:
     """Return the scan at its nominal load; points without a load are missing."""
     if scan.normal_load is None:
         return scan
-    shift = slope * np.log(scan.normal_load / scan.load)
+    shift = slope * np.log(scan.normal_load / scan.stated_load)
     return replace(scan, u_zz=scan.u_zz - shift, normal_load=None, normal_load_errors=None)
 
 
@@ -273,14 +273,15 @@ _CURVE = 301
 def measured_scan(scan: Scan) -> MeasuredScan:
     """Return film, indenter, sensor and the other data of a scan without its points."""
     return MeasuredScan(
-        film=scan.film,
-        indenter=scan.indenter,
+        film=scan.set_up.film,
+        indenter=scan.set_up.indenter,
         sensor=scan.sensor,
         width=float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y))),
         lubrication=scan.lubrication,
         position_scale_uncertainty=scan.position_scale_uncertainty,
         synthetic=bool(scan.synthetic),
         source=scan.source,
+        unit="" if scan.unit == "V" else scan.unit,
     )
 
 
@@ -310,7 +311,7 @@ def measured_profile(
     curve_r = np.linspace(0.0, float(r[order][-1]), _CURVE)
     return MeasuredProfile(
         scan=origin,
-        load=scan.load,
+        load=scan.stated_load,
         load_uncertainty=scan.load_uncertainty,
         x=x[order],
         y=y[order],
@@ -390,7 +391,7 @@ def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatA
     nodes, free = posterior.nodes, restored.points.free
     geometry = model.geometry(np.atleast_2d(restored.centre))
     film = film_transfer(restored.scan, model.reference.wavenumbers)
-    pressure = posterior.state[:nodes] / restored.scan.load / film
+    pressure = posterior.state[:nodes] / restored.scan.stated_load / film
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     columns = [average @ column / restored.apparatus.conversion_constant for column in columns]
     sigma, n = posterior.covariance[nodes:, nodes:], int(free.sum())

@@ -60,7 +60,7 @@ def film_transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
     """Transform of the base's normal stress under a pressure of unit transform."""
     # A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
     # on a linear film makes the rod's own base stress.  Other indenters sink less.
-    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.film, wavenumbers.k))
+    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
     if (law := law_at_once(scan)) == LINEAR:
         return linear.values
     own, other = (rod_spectrum(scan, linear, name) for name in (law, LINEAR))
@@ -74,7 +74,7 @@ def _linear_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
 def _per_pressure(scan: Scan, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
     """Divide a change of the base stress (N) by the rod's pressure on a linear film."""
     pressure = rod_spectrum(scan, linear, LINEAR) / linear.values
-    return change * pressure / (pressure**2 + (_LEAST_PRESSURE * scan.load) ** 2)
+    return change * pressure / (pressure**2 + (_LEAST_PRESSURE * scan.stated_load) ** 2)
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,7 @@ def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.film)]
+    fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.set_up.film)]
     log_marginal = np.array([fit.log_marginal for fit in fits])
     weight = np.exp(log_marginal - log_marginal.max())
     weight[weight < _NEGLIGIBLE] = 0.0
@@ -273,7 +273,7 @@ def posterior_of(
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan, model.reference.wavenumbers)
-    scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
+    scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
     of_film = _film_changes(scan, model.reference.wavenumbers)
     of_sensor = apparatus_changes(apparatus, model.k)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
@@ -285,11 +285,11 @@ def posterior_of(
     }
     covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
     changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
-    changes["film"][:nodes] += scan.load * of_film * mean[:nodes, None]
+    changes["film"][:nodes] += scan.stated_load * of_film * mean[:nodes, None]
     covariances |= {source: columns @ columns.T for source, columns in changes.items()}
     names = [(fit.shape.exponent, fit.shape.shear) for fit in fits]
     variance = np.sum([np.diag(covariance)[:nodes] for covariance in covariances.values()], axis=0)
-    gaussian = scan.load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
+    gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
     lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
     resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
     return Posterior(
@@ -334,15 +334,16 @@ def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray
 
 def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
-    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.film, wavenumbers.k))
+    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
     columns = []
     for name in ("thickness", "poisson_ratio"):
         if ends := more_and_less(scan.film, name):
             *films, share = ends
             more, less = (film_transfer(replace(scan, film=film), wavenumbers) for film in films)
             columns.append(share * (more - less))
-    rubber = replace(scan, film=replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None))
+    film = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    rubber = replace(scan, film=film)
     if law_at_once(rubber) != LINEAR:
         changes = law_sensitivities(scan, linear).values()
-        columns += [_per_pressure(scan, linear, change * scan.load) for change in changes]
+        columns += [_per_pressure(scan, linear, change * scan.stated_load) for change in changes]
     return np.stack(columns, axis=1) if columns else np.zeros((wavenumbers.k.size, 0))

@@ -56,10 +56,11 @@ def compare_stress(
     posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
 ) -> StressComparison:
     """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
-    if not isinstance(scan.indenter, Rod) and abs(stress.load / scan.load - 1) > SAME_LOAD:
+    _, indenter, load = scan.set_up
+    if not isinstance(indenter, Rod) and abs(stress.load / load - 1) > SAME_LOAD:
         raise InputError(
             f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
-            why=f"The contact of a {scan.indenter.shape} grows with its load: stress is not "
+            why=f"The contact of a {indenter.shape} grows with its load: stress is not "
             "proportional to it.",
             cure="Calculate the stress for the scan's load.",
         )
@@ -70,7 +71,7 @@ def compare_stress(
     else:
         spectrum = hankel_transform(stress.r, stress.sigma_zz, model.k) / stress.load
     synthesis = model.reference.wavenumbers.synthesise(np.eye(nodes), r)
-    calculated = scan.load * (synthesis @ spectrum)
+    calculated = scan.stated_load * (synthesis @ spectrum)
     covariance = synthesis @ posterior.covariance[:nodes, :nodes] @ synthesis.T
     peak = float(np.abs(calculated).max())
     allowed = np.hypot(_EXPANDED * np.sqrt(np.maximum(np.diag(covariance), 0)), _NEGLIGIBLE * peak)
@@ -100,7 +101,7 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     # The film is not part of the direct way: the calculated stress is at its base already.
     added = np.hstack([posterior.shifts["apparatus"], posterior.shifts["position_scale"]])
     if scan.load_uncertainty is not None:
-        added = np.column_stack([added, (scan.load_uncertainty / scan.load) * signal])
+        added = np.column_stack([added, (scan.load_uncertainty / scan.stated_load) * signal])
     # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
     root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
@@ -280,7 +281,7 @@ class Restoration(Result, Checked):
         """Measured stress S_zz = U/A at each point, less baseline, for the nominal load, in Pa."""
         drift = self.posterior.state[self._first_drift :]
         signal = self.points.u - self.posterior.estimate.model.drift_columns @ drift
-        return self.apparatus.stress(signal * self.scan.load / self.points.load)
+        return self.apparatus.stress(signal * self.scan.stated_load / self.points.load)
 
     def blurred_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
@@ -305,7 +306,7 @@ class Restoration(Result, Checked):
             r=self.r,
             sigma_zz=self.sigma_zz,
             sigma_zz_errors=np.sqrt(np.maximum(np.diag(self.covariance), 0.0)),
-            load=self.scan.load,
+            load=self.scan.stated_load,
             film=self.scan.film,
             indenter=self.scan.indenter,
             solver="memscal, restored from a scan",

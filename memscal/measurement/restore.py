@@ -40,11 +40,11 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     if load is None or isinstance(scan.indenter, Rod):
         return
     low, high = float(np.nanmin(load)), float(np.nanmax(load))
-    if high - low > SAME_LOAD * scan.load:
+    if high - low > SAME_LOAD * scan.stated_load:
         raise InputError(
             f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
-            why=f"The contact of a {scan.indenter.shape} grows with its load: each has a stress of "
-            "its own.",
+            why=f"The contact of a {scan.set_up.indenter.shape} grows with its load: each has a "
+            "stress of its own.",
             cure="Give the scan of one load.",
         )
 
@@ -83,6 +83,13 @@ def accept_other_sensor(
     """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
     sources = (scan.source, "scan"), (apparatus.source, "artifact")
     places = tuple(scan_points.file_in_words(*source) for source in sources)
+    apparatus.require_pascals()
+    unit, si = scan.unit or "V", apparatus.reading.si
+    if unit != si:
+        raise InputError(
+            f"The readings of {places[0]} are in {unit}, those of the artifact in {si}.",
+            cure="Give the artifact of this sensor, or correct the units of /entry/data/u_zz.",
+        )
     sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
     return scan_points.accepted_differences(
         [
@@ -115,7 +122,7 @@ def _reconvolution(restored: Restoration) -> QualityCheck:
 
 
 def _force(restored: Restoration) -> QualityCheck:
-    load = restored.scan.load
+    load = restored.scan.stated_load
     allowed = np.hypot(restored.force_uncertainty, restored.scan.load_uncertainty or 0.0)
     allowed = float(np.hypot(allowed, _NEGLIGIBLE_FORCE * load))
     return check(
@@ -204,11 +211,11 @@ def restoration_messages(
     messages += failed_calibration_messages(restored.apparatus)
     messages += profile.point_messages(restored.posterior.estimate)
     if points.u_errors is None:
-        messages.append(noise_unstated_message(float(restored.noise.min())))
+        messages.append(noise_unstated_message(points.reading.text(restored.noise.min())))
     if not restored.apparatus.radial_profile.g_errors.any():
         text = "The artifact states no uncertainty of G: nothing is counted for it."
         messages.append(Message("uncertainty_unstated", text))
-    film = restored.scan.film
+    film = restored.scan.set_up.film
     unstated = {
         "film thickness": film.thickness_uncertainty,
         "Poisson's ratio": film.poisson_ratio_uncertainty,
@@ -223,9 +230,9 @@ def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
     return [] if apparatus.passed else [Message(quality.FAILED_CALIBRATION, text)]
 
 
-def noise_unstated_message(noise: float) -> Message:
-    """Return the message for a scan without u_zz_errors, with the estimated noise in V."""
-    text = f"u_zz_errors is absent: a noise of {noise * 1e3:.3g} mV was estimated from the scatter."
+def noise_unstated_message(noise: str) -> Message:
+    """Return the message for a scan without u_zz_errors, with the estimated noise in its unit."""
+    text = f"u_zz_errors is absent: a noise of {noise} was estimated from the scatter."
     return Message(quality.NOISE_UNSTATED, text)
 
 
@@ -320,7 +327,7 @@ def gaussian_pressure(
     scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
-    wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
+    wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.set_up.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
     through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers))
     try:

@@ -95,6 +95,7 @@ class Contact(Result):
     interface: Interface = field(default_factory=Interface)
     strain: str = "linear"
 
+    unit: ClassVar[str] = "Pa"
     _summary: ClassVar[str] = "contact"
     _figure: ClassVar[str] = "stress.contact_figure"
 

@@ -12,7 +12,7 @@ from memscal.model.arrays import FloatArray, FrozenArrays
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.notation import format_measured
+from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
@@ -93,6 +93,8 @@ class ParameterSet(FrozenArrays):
         names that the file format does not define.
     values, covariance : ndarray, shape (n,), (n, n)
         Estimates and their joint covariance, systematic contributions included.
+    reading : Reading
+        The unit of the sensor's readings, in which baseline and conversion constant are shown.
 
     Examples
     --------
@@ -105,6 +107,7 @@ class ParameterSet(FrozenArrays):
     values: FloatArray
     covariance: FloatArray
     units: tuple[str, ...] = ()
+    reading: Reading = VOLTS
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -133,7 +136,7 @@ class ParameterSet(FrozenArrays):
         chosen = [self._index(name) for name in names]
         units = tuple(self.units[i] for i in chosen) if self.units else ()
         covariance = self.covariance[np.ix_(chosen, chosen)]
-        return ParameterSet(tuple(names), self.values[chosen], covariance, units)
+        return ParameterSet(tuple(names), self.values[chosen], covariance, units, self.reading)
 
     def _index(self, name: str) -> int:
         if name not in self.names:
@@ -164,6 +167,7 @@ class OtherEstimate:
 class ApparatusData(Checked):
     """Everything that an apparatus-function artifact stores, in SI units.
 
+    ``film``, ``indenter`` and ``load`` are ``None`` where a scan with a reference states none.
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
     of the conversion constant and of both Gaussian widths by source; ``other`` is the estimate by
     the route that was not chosen, where there is one.
@@ -175,10 +179,10 @@ class ApparatusData(Checked):
     reconvolution: Reconvolution
     parameters: ParameterSet
     checks: tuple[QualityCheck, ...]
-    film: ElasticFilm
-    indenter: RoundIndenter
+    film: ElasticFilm | None
+    indenter: RoundIndenter | None
     sensor: StressSensor
-    load: float
+    load: float | None
     reference: StressProfile
     process: Process
     budget: Mapping[str, Mapping[str, float]]
@@ -186,18 +190,33 @@ class ApparatusData(Checked):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
+        of_a = ("conversion_constant", self.reading.scale, self.reading.over(self.reading.unit))
+        values = self.parameters
         a, sigma = (
-            format_measured(
-                self.parameters[name] * 1e3, self.parameters.uncertainty(name) * 1e3, unit
-            )
-            for name, unit in (("conversion_constant", "mV/Pa"), ("gaussian_sigma", "mm"))
+            format_measured(values[name] / scale, values.uncertainty(name) / scale, unit)
+            for name, scale, unit in (of_a, ("gaussian_sigma", 1e-3, "mm"))
         )
         state = state_of_checks(self.checks)
         return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"
 
     @property
+    def reading(self) -> Reading:
+        """Unit of the sensor's readings, and of the reference."""
+        return self.parameters.reading
+
+    def require_pascals(self) -> None:
+        """Refuse to state pascals by a conversion constant that is not per pascal."""
+        if (per := self.reading.per) != "Pa":
+            whose = "relative" if per == "relative" else "per unit of a reference that is no stress"
+            raise InputError(
+                f"The conversion constant of the artifact is {whose}.",
+                why="The stress of its calibration was not known, and no reading tells another.",
+                cure="Calibrate with a known load and a stress in Pa, without --relative.",
+            )
+
+    @property
     def conversion_constant(self) -> float:
-        """Conversion constant A, in V/Pa."""
+        """Conversion constant A, in V/Pa, or in the unit of the readings per Pa."""
         return self.parameters["conversion_constant"]
 
     @property

@@ -23,7 +23,7 @@ from memscal.model.arrays import ByContent, FloatArray, frozen_array
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.notation import format_measured
+from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
 from memscal.model.scan import StressSensor
@@ -39,7 +39,8 @@ class MeasuredScan:
     """What is known of a scan beside its points.
 
     ``width``: its largest extent, in m; ``position_scale_uncertainty``: relative, of the stage;
-    ``synthetic``: whether it was simulated; ``source``: the file it was read from.
+    ``synthetic``: whether it was simulated; ``source``: the file it was read from; ``unit``: SI
+    unit of its readings where they are no voltages.
     """
 
     film: ElasticFilm
@@ -50,6 +51,12 @@ class MeasuredScan:
     position_scale_uncertainty: float | None = None
     synthetic: bool = False
     source: SourceFile | None = None
+    unit: str = ""
+
+    @property
+    def reading(self) -> Reading:
+        """The unit in which its readings are stored and shown."""
+        return Reading.fitting(self.unit) if self.unit else VOLTS
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "film", _kept_record(self.film, "thickness", "roughness_rms"))

@@ -1,6 +1,7 @@
 """Notation of measured values: with uncertainty, rounded by it, and unit; printable text."""
 
 import math
+from dataclasses import dataclass
 from decimal import Decimal, localcontext
 
 from memscal.errors import InputError
@@ -9,6 +10,57 @@ from memscal.errors import InputError
 _PLAIN_EXPONENTS = range(-3, 5)
 _NEGLIGIBLE = 1e-12
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+#: SI units that take prefixes, and these, from 10^-18 to 10^9.
+NAMED_UNITS = ("V", "A", "T", "Pa", "N", "m", "Hz", "W", "J", "C", "F", "ohm", "S", "K", "s")
+_PREFIXES = "afpnum kMG"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Unit of a sensor's readings: SI unit in Python (1: counts), the power of ten shown with it.
+
+    ``per``: the unit of the reference, by which A divides that of the readings; ``"1"``: by none,
+    ``"relative"``: by the reference's largest value, as the load is not known.
+    """
+
+    si: str = "V"
+    power: int = -3
+    per: str = "Pa"
+
+    @classmethod
+    def fitting(cls, si: str, size: float = 0.0) -> "Reading":
+        """Return the unit in which readings up to a size are shown: volts are in mV always."""
+        if si not in NAMED_UNITS[1:] or not 0 < size < math.inf:
+            return cls(si, -3 if si == "V" else 0)
+        return cls(si, min(max(3 * math.floor(math.log10(size) / 3 + 1e-9), -18), 9))
+
+    @property
+    def unit(self) -> str:
+        """The unit that is shown, with its prefix."""
+        return _PREFIXES[self.power // 3 + 6].strip() + self.si
+
+    @property
+    def scale(self) -> float:
+        """How many SI units that is."""
+        return 10.0**self.power
+
+    def over(self, unit: str) -> str:
+        """Return a unit of readings over that of the reference."""
+        if self.per in ("1", "relative"):
+            return unit if self.per == "1" else f"{unit} (relative)"
+        return "1" if unit == self.per else f"{unit}/{self.per}".replace("/1/", "*")
+
+    def text(self, value: float, form: str = ".3g") -> str:
+        """Write a reading, given in its SI unit."""
+        return f"{value / self.scale:{form}} {self.unit}".removesuffix(" 1")
+
+    def constant(self, value: float) -> str:
+        """Write a conversion constant, given in SI units."""
+        return f"{value / self.scale:.4g} {self.over(self.unit)}"
+
+
+VOLTS = Reading()
 
 
 def format_measured(value: float, uncertainty: float | None, unit: str = "") -> str:

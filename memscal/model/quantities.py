@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from memscal.model.apparatus import ParameterSet
-from memscal.model.notation import format_measured
+from memscal.model.notation import VOLTS, Reading, format_measured
 
 # SI units in the unit that is shown: m in a mm, V in a mV, ...; dividing by MM shows mm.
 MM, MV, KPA, PER_MM, PER_MM2 = 1e-3, 1e-3, 1e3, 1e3, 1e6
@@ -40,6 +40,24 @@ DIMENSIONS = {
     "energy": Dimension("J", "J", "J", 1.0),
     "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
+
+
+def dimension_in(dimension: str, reading: Reading) -> str:
+    """Return a dimension for readings in a unit, which is entered where they are not in volts."""
+    if not dimension.startswith("voltage") or reading == VOLTS:
+        return dimension
+    si, shown, scale = reading.si, reading.unit, reading.scale
+    if dimension == "voltage per length":
+        si, shown, scale = f"{si}/m", f"{shown}/mm", scale / MM
+    elif dimension == "voltage per stress":
+        si, shown = reading.over(si), reading.over(shown)
+    if si == "1":
+        shown, scale = "1", 1.0
+    si, stored = (name.removesuffix(" (relative)") for name in (si, shown))
+    key = f"reading in {shown}"
+    DIMENSIONS[key] = Dimension(si, stored, shown.removeprefix("1 ") if shown != "1" else "", scale)
+    return key
+
 
 # Units other than a dimension's own in which some quantities are shown, in SI units.
 _OTHER_UNITS = {"um": 1e-6, "MPa": 1e6, "1/mm^2": PER_MM2, "percent": 1e-2}
@@ -102,6 +120,10 @@ class Quantity:
             return _OTHER_UNITS.get(self.shown, 1.0)
         return DIMENSIONS[self.dimension].scale
 
+    def read_in(self, reading: Reading) -> "Quantity":
+        """Return the quantity for readings in a unit."""
+        return replace(self, dimension=dimension_in(self.dimension, reading))
+
 
 @dataclass(frozen=True)
 class Record:
@@ -115,6 +137,10 @@ class Record:
     def axes(self) -> tuple[str, ...]:
         """Names of the axes of the signal."""
         return next((q.axes for q in self.quantities if q.key == self.signal), ())
+
+    def read_in(self, reading: Reading) -> "Record":
+        """Return the record for readings in a unit."""
+        return replace(self, quantities=tuple(q.read_in(reading) for q in self.quantities))
 
 
 def record(nx_class: str, *quantities: Quantity, signal: str = "") -> Record:
@@ -216,8 +242,9 @@ def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
 
 def parameter_quantity(parameters: ParameterSet, name: str) -> Quantity:
     """Return how one of a set's parameters is shown, by its stated unit where there is one."""
-    if not parameters.units:
-        return estimated_quantity(name)
+    declared = estimated_quantity(name)
+    if not parameters.units or parameters.reading != VOLTS:
+        return declared.read_in(parameters.reading)
     return estimated_quantity(name, parameters.units[parameters.names.index(name)])
 
 

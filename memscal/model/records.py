@@ -230,6 +230,7 @@ MEASURED_SCAN = record(
         "relative uncertainty of all positions",
         stored="position_scale_errors",
     ),
+    Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 
 

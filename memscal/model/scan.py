@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from memscal.model import arrays
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
+from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
@@ -286,6 +287,14 @@ class StressSensor:
     channel: str = "zz"
 
 
+class SetUp(NamedTuple):
+    """What a scan was made with, all of it stated; the load in N."""
+
+    film: ElasticFilm
+    indenter: RoundIndenter
+    load: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scan:
     """Sensor voltage against the position of the indenter, with what it was measured on.
@@ -307,11 +316,14 @@ class Scan:
     x : ndarray, shape (n,)
         Positions along the scan, in m; need not be sorted, centred or evenly spaced.
     u_zz : ndarray, shape (n,), (repeat, n) or (m, n)
-        Normal channel's voltage, in V; NaN marks a missing point.
-    load, load_uncertainty : float
+        Normal channel's voltage, in V, or reading, in ``unit``; NaN marks a missing point.
+    unit : str
+        SI unit of the readings: ``"V"``, ``"A"``, ``"T"``, ``"Pa"`` ..., ``"1"`` of counts.
+    load, load_uncertainty : float, optional
         Nominal load of the indenter and its standard uncertainty, common to all points, in N.
     indenter, film, sensor
-        What was pressed, on what, measured by what.
+        What was pressed, on what, measured by what.  A calibration with a reference of its own
+        needs no load, indenter or film; all else does.
     rod_friction : float, optional
         0 where a rod slides freely under the film, ``inf`` where it sticks.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
@@ -365,9 +377,10 @@ class Scan:
 
     x: FloatArray
     u_zz: FloatArray
-    load: float
-    indenter: RoundIndenter
-    film: ElasticFilm
+    load: float | None = None
+    indenter: RoundIndenter | None = None
+    film: ElasticFilm | None = None
+    unit: str = "V"
     sensor: StressSensor = field(default_factory=StressSensor)
     y: FloatArray | None = None
     repeat: NDArray[np.int64] | None = None
@@ -430,7 +443,34 @@ class Scan:
         shape = " x ".join(map(str, self.u_zz.shape))
         form = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
-        return f"<Scan: {form} points, x from {reach}, load {self.load:.4g} N>"
+        load = "no load stated" if self.load is None else f"load {self.load:.4g} N"
+        return f"<Scan: {form} points, x from {reach}, {load}>"
+
+    @property
+    def set_up(self) -> SetUp:
+        """Film, indenter and load; a scan that does not state all of them is refused."""
+        film, indenter, load = self.film, self.indenter, self.load
+        if film is not None and indenter is not None and load is not None:
+            return SetUp(film, indenter, load)
+        names = {"sample/film": film, "indenter": indenter, "indenter/load": load}
+        absent = [name for name, value in names.items() if value is None]
+        missing = " and no ".join(f"{n.rpartition('/')[2]} (/entry/{n})" for n in absent)
+        raise InputError(
+            f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
+            why="The stress that an indenter makes at the base of a film is calculated from them.",
+            cure="State them (memscal import --thickness, --radius, --load), or give --reference.",
+        )
+
+    @property
+    def stated_load(self) -> float:
+        """The nominal load, in N; a scan that states none is refused."""
+        return self.set_up.load if self.load is None else self.load
+
+    @property
+    def reading(self) -> Reading:
+        """The unit in which the readings are shown."""
+        largest = float(np.nanmax(np.abs(self.u_zz), initial=0.0))
+        return VOLTS if self.unit == "V" else Reading.fitting(self.unit, largest)
 
     @property
     def kind(self) -> str:
@@ -513,7 +553,7 @@ class Scan:
             raise InputError(
                 "u_zz holds an infinite voltage.", cure="Mark missing points with NaN."
             )
-        if not (np.isfinite(self.load) and self.load > 0):
+        if self.load is not None and not (np.isfinite(self.load) and self.load > 0):
             raise InputError(
                 f"The load of the scan is {self.load:g} N, but it must be above zero.",
                 why="A calibration divides the voltage by the stress that this load produces.",

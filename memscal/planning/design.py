@@ -135,7 +135,7 @@ class Plan:
 def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
     """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
-    reference.require_calibration_rod(scan)
+    reference.require_calibration_rod(scan, None)
     stress = reference.reference_profile(scan, None)
     points = measured_points(scan)
     references = reference.reference_spectra([stress], [points])

@@ -447,12 +447,12 @@ def simulate_experiment(
         **_described_film(reality.film),
         "indenter_radius": reality.rod.radius,
         "load_scale": reality.rod_load_scale,
-        "load_1": calibration.load,
+        "load_1": calibration.stated_load,
         **common,
         "gain": 1.0,
     }
     if (spread := calibration.load_uncertainty) is not None:
-        spread *= rod_load / calibration.load
+        spread *= rod_load / calibration.stated_load
     nominal = replace(calibration, load=rod_load, load_uncertainty=spread)
     return Experiment(
         rod=_as_stated(nominal, of_rod, film=film, indenter=rod),

@@ -67,6 +67,7 @@ def advice(apparatus: ApparatusData) -> str:
     ).replace("_", " ")
     by = f" (method {method})" if method else ""
     a = measured_text(parameters, "conversion_constant")
+    a = a.replace("(relative)", "(relative: the load is not known)")
     return f"{_of_the_law(apparatus)}Use A = {a}{by}; {which}"
 
 
@@ -77,7 +78,7 @@ def _of_the_law(apparatus: ApparatusData) -> str:
         form = apparatus.budget.get(name, {}).get("model_form", 0.0)
         if (share := (form / apparatus.parameters.uncertainty(name)) ** 2) > 0.5:
             dominated.append(f"{share:.0%} of the variance of {symbol}")
-    if not dominated or apparatus.film.law:
+    if not dominated or apparatus.film is None or apparatus.film.law:
         return ""
     return (
         "The film's law, which is not stated, dominates the uncertainty: it makes up "
@@ -116,7 +117,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
     }
-    values["film_law"] = apparatus.film.law or None
+    values["film_law"] = (apparatus.film and apparatus.film.law) or None
     choice = apparatus.process.configuration.get("centre")
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
@@ -143,11 +144,12 @@ def dataset(result: Calibrated) -> Dataset:
 
     apparatus = apparatus_of(result)
     field = {"g": "field", "g_errors": "field_errors"}
+    of_scan = records.RECONVOLUTION.read_in(apparatus.reading)
     return xarray.Dataset(
         record_arrays(records.RADIAL, apparatus.radial_profile)
         | record_arrays(records.RADIAL_COVARIANCE, apparatus.radial_profile)
         | record_arrays(records.TRANSFER, apparatus.transfer)
-        | record_arrays(records.RECONVOLUTION, apparatus.reconvolution, {"x": "position"})
+        | record_arrays(of_scan, apparatus.reconvolution, {"x": "position"})
         | record_arrays(records.FIELD, apparatus.field, field),
         attrs={"title": sensor_title(apparatus)},
     )
@@ -210,16 +212,19 @@ def rehearsal_table(
     outputs: Sequence[Path],
 ) -> Table:
     """Return what ``calibrate --dry-run`` would do."""
-    film = scan.film
+    film, rod, load = scan.film, scan.indenter, scan.load
     missing = f", {points.missing} missing" if points.missing else ""
-    elasticity = f"E = {film.young_modulus / 1e6:.4g} MPa, Poisson's ratio {film.poisson_ratio:.4g}"
     slip = {None: "", 0.0: ", sliding freely", math.inf: ", sticking"}[scan.rod_friction]
-    rod = f"{scan.indenter.shape} of radius {scan.indenter.radius / MM:.4g} mm{slip}"
-    rows = [
-        ("scan", f"{scan.kind}, {points.u.size} points{missing}"),
-        ("indenter", rod),
-        ("load", f"{scan.load:.4g} N"),
-        ("film", f"{film.thickness / MM:.4g} mm, {elasticity}, {film.law_text}"),
+    rows = [("scan", f"{scan.kind}, {points.u.size} points{missing}")]
+    if rod is not None:
+        rows.append(("indenter", f"{rod.shape} of radius {rod.radius / MM:.4g} mm{slip}"))
+    if load is not None:
+        rows.append(("load", f"{load:.4g} N"))
+    if film is not None:
+        elasticity = f"E = {film.young_modulus / 1e6:.4g} MPa"
+        elasticity += f", Poisson's ratio {film.poisson_ratio:.4g}, {film.law_text}"
+        rows.append(("film", f"{film.thickness / MM:.4g} mm, {elasticity}"))
+    rows += [
         ("reference", _origin(stress)),
         ("method", method),
         *(("would write", str(path)) for path in outputs),

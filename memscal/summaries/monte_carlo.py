@@ -13,7 +13,7 @@ def tables(result: MonteCarlo) -> list[Table]:
     """Return each parameter's standard uncertainty by the budget and by draws."""
     rows = []
     for comparison in result.comparisons:
-        quantity = estimated_quantity(comparison.name)
+        quantity = estimated_quantity(comparison.name).read_in(result.reading)
         scale = quantity.scale
         low, high = (end / scale for end in comparison.symmetric)
         first, draws = comparison.first_order / scale, comparison.uncertainty / scale
@@ -35,13 +35,13 @@ def mapping(result: MonteCarlo) -> dict[str, Any]:
         "seed": result.seed,
         "sources": list(result.sources),
         "agrees": result.agrees,
-        "parameters": {c.name: _comparison_json(c) for c in result.comparisons},
+        "parameters": {c.name: _comparison_json(c, result) for c in result.comparisons},
         "messages": texts_of(result.messages),
     }
 
 
-def _comparison_json(comparison: BudgetComparison) -> dict[str, Any]:
-    quantity = estimated_quantity(comparison.name)
+def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> dict[str, Any]:
+    quantity = estimated_quantity(comparison.name).read_in(result.reading)
     return {
         **{q.label or q.name: plain(getattr(comparison, q.name), quantity.scale) for q in DRAWN},
         "unit": quantity.unit_text,
@@ -55,5 +55,6 @@ def frame(result: MonteCarlo) -> DataFrame:
     import pandas as pd
 
     names = [comparison.name for comparison in result.comparisons]
-    columns = [f"{name} ({estimated_quantity(name).si_unit})" for name in names]
+    quantities = [estimated_quantity(name).read_in(result.reading) for name in names]
+    columns = [f"{q.name} ({q.si_unit})" for q in quantities]
     return pd.DataFrame(result.samples, columns=columns)

@@ -46,7 +46,8 @@ def _determined(restored: Restoration) -> list[Quantity]:
     free = restored.points.free[0]
     fixed = [name for i, name in enumerate(("centre", "centre_y")) if not free[i]]
     hidden = {name + end for name in fixed for end in ("", "_uncertainty")}
-    return [quantity for quantity in RESTORED if quantity.name not in hidden]
+    of = restored.points.reading
+    return [quantity.read_in(of) for quantity in RESTORED if quantity.name not in hidden]
 
 
 def _errors(restored: Restoration) -> FloatArray:
@@ -88,7 +89,7 @@ def tables(restored: Restoration) -> list[Table]:
         fit = f"χ²/ν = {comparison.chi_square:.3g}, p = {comparison.p_value:.2g}"
         beside = f"within 95 % bounds at {within:.0%} of radii"
         rows += [(f"{origin}, blurred", fit), (f"{origin}, beside the restored", beside)]
-    indenter, film = restored.scan.indenter, restored.scan.film
+    film, indenter, _ = restored.scan.set_up
     title = (
         f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
         f"radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"

@@ -22,12 +22,17 @@ _POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors
 
 def mapping(stress: MeasuredStress) -> dict[str, Any]:
     """Return the object of ``apply --json`` without its files; the contract fixes its form."""
+    applied = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED]
     return {
-        **declared.members(records.APPLIED, stress, **_force_over_load(stress)),
+        **declared.members(applied, stress, **_force_over_load(stress)),
         "profiles": [
             {
                 "scan": getattr(profile.scan.source, "file_name", None),
-                **declared.members(_IN_JSON, profile, **_centre(profile)),
+                **declared.members(
+                    [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON],
+                    profile,
+                    **_centre(profile),
+                ),
                 "stress": declared.members(_POINTS_IN_JSON, profile),
             }
             for profile in stress.profiles
@@ -73,7 +78,8 @@ def tables(stress: MeasuredStress) -> list[Table]:
     kinds = ("applied_force", "applied_force_all")
     checks_shown = [check for check in stress.checks if check.kind in kinds or not check.passed]
     ratio = _force_over_load(stress)
-    numbers = [(q.words, declared.cell(q, stress, **ratio)) for q in records.APPLIED[::2]]
+    shown = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED[::2]]
+    numbers = [(q.words, declared.cell(q, stress, **ratio)) for q in shown]
     points = sum(profile.r.size for profile in stress.profiles)
     farthest = max(float(profile.r[-1]) for profile in stress.profiles)
     places = ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from memscal.calibration.sweep import Sweep
-from memscal.model.quantities import ESTIMATED, MM, MV, Quantity
+from memscal.model.quantities import ESTIMATED, MM, Quantity
 from memscal.summaries.declared import Dataset, plain, power_of_ten
 from memscal.summaries.table import Table
 
@@ -19,8 +19,9 @@ _RESULTS = (
 
 def tables(result: Sweep) -> list[Table]:
     """Return every second amplitude: the exact expectation, and the median of the draws."""
-    power = power_of_ten(result.conversion_constant / MV)
-    scales, forms = (MV * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
+    constant = _RESULTS[0][0].read_in(result.reading)
+    power = power_of_ten(result.conversion_constant / constant.scale)
+    scales, forms = (constant.scale * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
     for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
         values = getattr(result, quantity.name) / scale
@@ -33,7 +34,7 @@ def tables(result: Sweep) -> list[Table]:
         "Dependence on the noise amplitude (1 is the rule's choice): the expectation, and the "
         f"median of {result.seed_relative_rms.shape[1]} draws"
     )
-    head = ("amplitude", f"A (1e{power} mV/Pa)", "σ(G) (mm)", "rms (%)")
+    head = ("amplitude", f"A (1e{power} {constant.unit})", "σ(G) (mm)", "rms (%)")
     rows = list(zip(*columns, strict=True))[::2]
     return [Table(title, (*head, "A, draws", "σ(G), draws", "rms, draws"), rows)]
 
@@ -46,7 +47,7 @@ def mapping(result: Sweep) -> dict[str, Any]:
             "draws": plain(getattr(result, draws), quantity.scale),
             "unit": quantity.unit_text,
         }
-        for quantity, draws in _RESULTS
+        for quantity, draws in ((q.read_in(result.reading), name) for q, name in _RESULTS)
     }
 
 
@@ -57,7 +58,7 @@ def dataset(result: Sweep) -> Dataset:
     axes = ("amplitude", "draw")
     variables: dict[str, Any] = {"amplitude": (axes[:1], result.amplitude, {"units": "1"})}
     for quantity, draws in _RESULTS:
-        attributes = {"units": quantity.si_unit}
+        attributes = {"units": quantity.read_in(result.reading).si_unit}
         variables[quantity.name] = (axes[:1], getattr(result, quantity.name), attributes)
         variables[draws] = (axes, getattr(result, draws), attributes)
     return xarray.Dataset(variables)

@@ -136,8 +136,7 @@ def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folde
 
 
 @pytest.mark.parametrize(("arguments", "hints"), [
-    ([], ["--x", "--x-unit", "--u", "--u-unit"]), (COLUMNS, ["--load-column"]),
-    ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
+    ([], ["--x", "--u"]), ([*COLUMNS, "--thickness", 1], ["--young-modulus", "--poisson-ratio"]),
     ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
     ([*COLUMNS, *SET_UP, "--shear-sign", -1], ["--shear-sign"]),
     (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),

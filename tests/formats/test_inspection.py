@@ -51,10 +51,10 @@ def test_only_an_artifact_must_have_a_digest(folder: Path, name, passed):
 
 def test_a_scan_of_another_program_fails_at_what_it_lacks(folder: Path):
     with h5py.File(folder / "scan.h5", "r+") as file:
-        del file.attrs["memscal_content_sha256"], file["/entry/indenter/load"]
+        del file.attrs["memscal_content_sha256"], file["/entry/indenter/radius"]
     last = check(folder / "scan.h5")[-1]
     assert (last.name, last.passed) == ("content", False)
-    assert "/entry/indenter/load" in last.meaning
+    assert "/entry/indenter/radius" in last.meaning
 
 
 def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path: Path):

@@ -10,7 +10,7 @@ from helpers.builders import make_film
 from hypothesis import given
 from hypothesis import strategies as st
 
-from memscal.errors import FormatError, InputError, UnitError
+from memscal.errors import FormatError, InputError
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, read_scan_table
 from memscal.formats.tables.text_table import read_table
@@ -22,8 +22,9 @@ def scan_table(path: Path, text: str, **options: Any) -> ImportedScan:
     """Import a table with the usual options."""
     table = path / "table.csv"
     table.write_text(text, encoding="utf-8")
-    given = {"x": "x", "u": "u", "x_unit": "mm", "u_unit": "mV", "load": 1.0, **options}
-    return read_scan_table(table, film=make_film(), indenter=Rod(radius=0.25e-3), **given)
+    given = {"x": "x", "u": "u", "x_unit": "mm", "u_unit": "mV", "load": 1.0}
+    given |= {"film": make_film(), "indenter": Rod(radius=0.25e-3), **options}
+    return read_scan_table(table, **given)
 
 
 def rows(*columns: Any, header: str, separator: str = ",") -> str:
@@ -122,7 +123,9 @@ NO_TABLES = ("", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0")
 
 @pytest.mark.parametrize(("text", "options", "words"), [
     *((TWO_ROWS, {"u": column}, r"columns are: x, u\.") for column in ("volts", "0", "3", -1)),
-    *((TWO_ROWS, {"u_unit": "uT", "u_scale": value}, "scale") for value in (0.0, np.nan, np.inf)),
+    *((TWO_ROWS, {"u_unit": unit}, f'"{unit}"') for unit in ("parsnip", "degC", "9/")),
+    (TWO_ROWS, {"u_unit": None}, r"column 'u' states no unit(.|\n)*--u-unit"),
+    (TWO_ROWS, {"load": None, "load_scatter": 0.1}, "no load"),
     *((text, {}, r"table\.csv") for text in NO_TABLES),
     ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
 ])  # fmt: skip
@@ -131,12 +134,20 @@ def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
         scan_table(tmp_path, text, **options)
 
 
-def test_a_foreign_sensor_needs_a_scale_and_the_scale_is_recorded(tmp_path: Path):
-    with pytest.raises(UnitError, match=r'"uT"(.|\n)*u-scale'):
-        scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT")
-    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT", u_scale=1e-6)
-    assert found.scan.u_zz.tolist() == [1e-6, 2e-6]
-    assert "1e-06 V was taken for one uT" in found.scan.notes
+@pytest.mark.parametrize(("unit", "si", "factor"), [
+    ("uT", "T", 1e-6), ("pA", "A", 1e-12), ("kPa", "Pa", 1e3), ("counts", "1", 1.0),
+    ("a.u.", "1", 1.0), ("percent", "1", 0.01), ("mV", "V", 1e-3), ("mV/s", "V/s", None),
+])  # fmt: skip
+@pytest.mark.parametrize("head", ["u/{}", "u ({})", "u[{}]"])
+def test_readings_of_any_unit_state_it_in_their_head(tmp_path: Path, unit, si, factor, head):
+    text = f"x,{head.format(unit)}\n0,1\n1,2\n"
+    found = scan_table(tmp_path, text, u_unit=None, film=None, indenter=None, load=None)
+    if factor is not None:
+        assert found.scan.unit == si
+        np.testing.assert_allclose(found.scan.u_zz, [factor, 2 * factor], rtol=1e-15)
+    else:
+        np.testing.assert_allclose(found.scan.u_zz, [1e-3, 2e-3], rtol=1e-15)
+    assert (found.scan.film, found.scan.indenter, found.scan.load) == (None, None, None)
 
 
 def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Path):
@@ -144,8 +155,7 @@ def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Pa
     found = scan_table(tmp_path, text, load=None, load_column="f", load_unit="mN")
     assert found.scan.load == 1.0
     np.testing.assert_allclose(found.scan.normal_load, [0.99, 1.0, 1.03])
-    with pytest.raises(InputError, match="load of the scan is not given"):
-        scan_table(tmp_path, text, load=None)
+    assert scan_table(tmp_path, text, load=None).scan.load is None
 
 
 def test_rows_without_a_position_are_left_out_and_counted_and_a_header_may_be(tmp_path: Path):

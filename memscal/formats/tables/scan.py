@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from memscal.errors import InputError, UnitError
+from memscal.errors import InputError
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.text_table import Table, read_table
+from memscal.formats.units import reading_of
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.quantities import dimension_in
 from memscal.model.scan import BRANCHES, Scan, branch_numbers, places_of
 
 Column = str | int
@@ -37,9 +39,8 @@ def read_scan_table(
     *,
     x: Column,
     u: Column,
-    x_unit: str,
-    u_unit: str,
-    indenter: RoundIndenter,
+    x_unit: str | None = None,
+    u_unit: str | None = None,
     load: float | None = None,
     y: Column | None = None,
     repeat: Column | Sequence[Column] | None = None,
@@ -50,7 +51,6 @@ def read_scan_table(
     load_unit: str = "N",
     load_scatter: float | None = None,
     x_error: float | None = None,
-    u_scale: float | None = None,
     u_sign: int = 1,
     delimiter: str | None = None,
     decimal: str | None = None,
@@ -58,26 +58,36 @@ def read_scan_table(
 ) -> ImportedScan:
     """Read a scan from a table with one row per reading, in the order of the file.
 
-    Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit`` for
-    all channels.  ``load_scatter``, relative, and ``x_error``, in m, are independent from point to
-    point.  ``u_scale`` is in volts per unit of the readings.  ``stated`` are the scan's ``film``
-    and other fields of :class:`Scan` that no table holds, such as ``load_uncertainty``.
+    Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit``, of any
+    kind, for all channels; by default they are those of the columns' heads (``x/mm``).
+    ``load_scatter``, relative, and ``x_error``, in m, are independent from point to point.
+    ``stated`` are the scan's ``film``, ``indenter`` and other fields of :class:`Scan` that no table
+    holds, such as ``load_uncertainty``.
     """
     require_sign("sign of the voltage", u_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     notes = [*table.notes]
     channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
+    u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
+    x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
+    reading = reading_of(u_unit, table.where(u))
+    of_unit = dimension_in("voltage", reading)
     columns = {
-        name: _voltage(table, column, u_unit, u_scale)
+        name: table.quantity(column, u_unit, of_unit)
         for name, column in channels.items()
         if column is not None
     }
     columns["u_zz"] = u_sign * columns["u_zz"]
-    notes += _about_voltages(u_sign, u_unit, u_scale)
+    notes += ["The sign of u_zz was changed."] if u_sign < 0 else []
+    if reading.si != "V":
+        notes.append(f"The readings are in {u_unit}.")
     if load_column is not None:
         columns["normal_load"] = table.quantity(load_column, load_unit, "force")
     load = _nominal_load(load, columns, notes)
     if load_scatter is not None and "normal_load" not in columns:
+        if load is None:
+            problem = "The scatter of the loads is given, but no load."
+            raise InputError(problem, cure="Give the load in N, or its column.")
         columns["normal_load"] = np.full(columns["u_zz"].shape, load)
     columns["x"] = table.quantity(x, x_unit, "length")
     if y is not None:
@@ -91,6 +101,7 @@ def read_scan_table(
     notes += _counted(columns)
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
+        indenter = stated.get("indenter")
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), indenter)
     arrays = _as_rows(columns)
     loads = arrays.get("normal_load")
@@ -105,7 +116,7 @@ def read_scan_table(
         normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
         channels={name: arrays[name] for name in ("u_xz", "u_yz") if name in arrays},
         load=load,
-        indenter=indenter,
+        unit=reading.si,
         notes="\n".join(marked_texts(messages)),
         source=table.source,
         **stated,
@@ -198,13 +209,13 @@ def _as_rows(columns: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
 
 
 def _mixed_loads(
-    loads: FloatArray, repeat: FloatArray | None, indenter: RoundIndenter
+    loads: FloatArray, repeat: FloatArray | None, indenter: RoundIndenter | None
 ) -> list[Message]:
     """Warn of lines at several loads: only a rod's voltage is proportional to its load."""
     line = np.zeros(loads.size) if repeat is None else repeat
     of_lines = [loads[(line == i) & np.isfinite(loads)] for i in np.unique(line)]
     mixed = [v for v in of_lines if v.size and np.ptp(v) > _MIXED * np.median(v)]
-    if isinstance(indenter, Rod) or not mixed:
+    if indenter is None or isinstance(indenter, Rod) or not mixed:
         return []
     text = (
         f"The loads of a line go from {mixed[0].min():.4g} to {mixed[0].max():.4g} N, "
@@ -215,40 +226,12 @@ def _mixed_loads(
     return [Message("mixed_loads", text, "warning")]
 
 
-def _about_voltages(sign: int, unit: str, scale: float | None) -> list[str]:
-    notes = ["The sign of u_zz was changed."] if sign < 0 else []
-    if scale is not None:
-        notes.append(
-            f"The readings are in {unit}, not in volts: {scale:g} V was taken for one {unit}, and "
-            "every voltage and conversion constant carries this choice."
-        )
-    return notes
-
-
-def _nominal_load(load: float | None, columns: Mapping[str, FloatArray], notes: list[str]) -> float:
+def _nominal_load(
+    load: float | None, columns: Mapping[str, FloatArray], notes: list[str]
+) -> float | None:
     """Return the load in N: the one given, or the median of the column of loads."""
-    if load is not None:
+    if load is not None or "normal_load" not in columns:
         return load
-    if "normal_load" not in columns:
-        raise InputError(
-            "The load of the scan is not given.", cure="Give the load in N, or its column."
-        )
     median = float(np.nanmedian(columns["normal_load"]))
     notes.append(f"The nominal load is the median of the column: {median:g} N.")
     return median
-
-
-def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:
-    if scale is not None:
-        if not (np.isfinite(scale) and scale != 0):
-            raise InputError(f"The scale of the readings is {scale:g} V per {unit}.")
-        return table.column(column) * scale
-    try:
-        return table.quantity(column, unit, "voltage")
-    except UnitError as error:
-        raise UnitError(
-            error.problem,
-            why="Conversion constants are in volts per pascal.",
-            cure="Give a unit of voltage; for another kind of sensor give the volts that one unit "
-            "stands for (u_scale; --u-scale).",
-        ) from error

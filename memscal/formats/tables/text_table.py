@@ -22,6 +22,8 @@ from memscal.model.scan import BRANCHES
 _MAX_COLUMNS = 1000
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+# A name and its unit: x/mm, x (mm) or x [mm].
+_HEAD = re.compile(r"([^/(\[]+?)\s*(?:/(.+)|\((.+)\)|\[(.+)\])")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 _MAX_NAME = 80
 _MAX_COMMENTS = 20
@@ -52,6 +54,14 @@ class Table:
         """Return a column of numbers in a unit, in SI units."""
         return to_si(self.column(column_name), unit, dimension, self.where(column_name))
 
+    def unit_of(self, column_name: str | int, unit: str | None, option: str) -> str:
+        """Return the unit of a column: the one given, or that of its head."""
+        head = _HEAD.fullmatch(self.names[self._index(column_name)])
+        if stated := unit or (head and next(filter(None, head.groups()[1:]))):
+            return stated.strip()
+        cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
+        raise InputError(f"{self.where(column_name)} states no unit.", cure=cure)
+
     def where(self, column_name: str | int) -> str:
         """Return file and column as messages name them."""
         return f"{self.source.file_name}: column {column_name!r}"
@@ -64,6 +74,9 @@ class Table:
                     cure="Give the number of the column, counted from 1.",
                 )
             return self.names.index(column_name)
+        heads = [match and match[1] for match in map(_HEAD.fullmatch, self.names)]
+        if heads.count(str(column_name)) == 1:
+            return heads.index(str(column_name))
         number = int(column_name) if isinstance(column_name, int) or column_name.isdecimal() else 0
         if not 1 <= number <= len(self.names):
             raise InputError(

@@ -1,0 +1,157 @@
+"""Calibrations with readings of any unit, and with a reference in place of film, rod and load."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.cli import main
+from memscal.errors import InputError
+from memscal.formats.reference import write_reference
+from memscal.formats.scan import read_scan, write_scan
+
+FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="linear")
+ROD = memscal.Rod(radius=0.25e-3)
+SCAN = replace(memscal.simulate(film=FILM, noise=0.005, seed=1), synthetic=None)
+TABLE = memscal.indent(FILM, ROD, load=1.0).profile()
+BARE = replace(TABLE, film=None, indenter=None, depth=None, contact_radius=None)
+
+
+def scaled(factor, unit):
+    """Return the scan with readings in another unit."""
+    errors = None if SCAN.u_zz_errors is None else factor * SCAN.u_zz_errors
+    return replace(SCAN, u_zz=factor * SCAN.u_zz, u_zz_errors=errors, unit=unit)
+
+
+def without_set_up(scan=SCAN):
+    stated = dict.fromkeys(("film", "indenter", "load", "load_uncertainty", "rod_friction"))
+    return replace(scan, **stated)
+
+
+@pytest.fixture(scope="module")
+def bare():
+    return memscal.calibrate(without_set_up(), reference=BARE).apparatus
+
+
+def numbers(apparatus):
+    names = [n for n in apparatus.parameters.names if n not in ("baseline", "drift")]
+    return np.array([[apparatus.parameters[n], apparatus.parameters.uncertainty(n)] for n in names])
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 4e-3])
+def test_a_film_that_the_reference_does_not_need_changes_nothing(bare, thickness):
+    film = replace(FILM, thickness=thickness, thickness_uncertainty=1e-4, law="")
+    scan = replace(SCAN, film=film, load_uncertainty=None)
+    stated = memscal.calibrate(scan, reference=BARE).apparatus
+    np.testing.assert_allclose(numbers(stated), numbers(bare), rtol=1e-12)
+    for name in ("g", "g_errors"):
+        values = [getattr(a.radial_profile, name) for a in (stated, bare)]
+        np.testing.assert_allclose(*values, rtol=1e-12, atol=1e-12 * values[1].max())
+    assert stated.film == film
+    assert bare.film is None
+    assert [c.name for c in stated.checks] == [c.name for c in bare.checks]
+    assert not {"indentation", "width_over_thickness"} & {c.name for c in bare.checks}
+    assert set(stated.budget["conversion_constant"]) == set(bare.budget["conversion_constant"])
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "shown"),
+    [("A", 1e-9, "pA/Pa"), ("T", 1e-4, "uT/Pa"), ("Pa", 1e6, ""), ("1", 1e5, "1/Pa")],
+)
+def test_readings_in_another_unit_are_volts_times_a_factor(bare, tmp_path, unit, factor, shown):
+    scan = without_set_up(scaled(factor, unit))
+    write_scan(scan, tmp_path / "scan.h5")
+    stored = read_scan(tmp_path / "scan.h5")
+    assert (stored.unit, stored.film, stored.indenter, stored.load) == (unit, None, None, None)
+    np.testing.assert_allclose(stored.u_zz, scan.u_zz, rtol=1e-14)
+    calibration = memscal.calibrate(stored, reference=BARE)
+    apparatus, scale = calibration.apparatus, np.ones((len(numbers(bare)), 1))
+    names = [n for n in bare.parameters.names if n not in ("baseline", "drift")]
+    scale[["conversion_constant" in name for name in names]] = factor
+    np.testing.assert_allclose(numbers(apparatus), scale * numbers(bare), rtol=1e-6)
+    first = str(calibration).partition("\n")[0]
+    assert shown in first
+    assert "V" not in first
+    apparatus.save(tmp_path / "sensor.h5")
+    again = memscal.load_apparatus(tmp_path / "sensor.h5")
+    np.testing.assert_allclose(numbers(again), numbers(apparatus), rtol=1e-12)
+    assert repr(again) == repr(apparatus)
+    again.save(tmp_path / "again.h5")
+    shown = {label.get_text() for axes in again.plot().axes for label in [axes.yaxis.label]}
+    assert not any("mV" in label for label in shown)
+
+
+def test_scans_of_several_units_are_refused():
+    with pytest.raises(InputError, match=r"in V.*in A"):
+        memscal.calibrate([SCAN, replace(SCAN, unit="A")])
+
+
+def test_a_relative_calibration_takes_no_load_and_states_no_pascals(bare, tmp_path):
+    scan = replace(SCAN, load=3.0, load_uncertainty=0.3, normal_load=np.full(SCAN.x.shape, 2.0))
+    calibration = memscal.calibrate(scan, reference=BARE, relative=True)
+    apparatus, peak = calibration.apparatus, BARE.sigma_zz.max()
+    assert apparatus.conversion_constant == pytest.approx(bare.conversion_constant * peak, rel=1e-9)
+    assert apparatus.gaussian_sigma == pytest.approx(bare.gaussian_sigma, rel=1e-9)
+    assert "load" not in apparatus.budget["conversion_constant"]
+    assert "relative: the load is not known" in str(calibration).partition("\n")[0]
+    drawn = memscal.monte_carlo(calibration, draws=4)
+    assert drawn.to_dict()["parameters"]["conversion_constant"]["unit"] == "mV (relative)"
+    apparatus.save(tmp_path / "sensor.h5")
+    stored = memscal.load_apparatus(tmp_path / "sensor.h5")
+    assert stored.load is None
+    for state in (lambda: stored.stress(0.01), lambda: memscal.restore(SCAN, stored)):
+        with pytest.raises(InputError, match="relative"):
+            state()
+
+
+def test_an_artifact_without_a_film_measures_the_stress_of_a_scan_that_states_its_own(bare):
+    measured, usual = (memscal.measure_stress(SCAN, a).profiles[0] for a in (bare, CALIBRATED))
+    np.testing.assert_allclose(measured.s_zz, usual.s_zz, rtol=0.01, atol=0.01 * usual.maximum)
+
+
+def test_a_scan_without_a_load_is_taken_at_that_of_its_reference(bare):
+    assert bare.load == BARE.load
+    assert any("No load is stated" in message.text for message in bare.process.messages)
+
+
+@pytest.mark.parametrize("use", [memscal.calibrate, lambda s: memscal.restore(s, CALIBRATED)])
+def test_what_needs_the_film_says_what_is_missing(use):
+    with pytest.raises(InputError, match=r"states no film \(/entry/sample/film\)(.|\n)*reference"):
+        use(without_set_up())
+
+
+CALIBRATED = memscal.calibrate(SCAN).apparatus
+
+
+def test_readings_of_another_unit_than_the_artifact_are_refused():
+    with pytest.raises(InputError, match="in A, those of the artifact in V"):
+        memscal.restore(replace(SCAN, unit="A"), CALIBRATED)
+
+
+def test_a_new_user_imports_and_calibrates_currents(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    table = np.stack([SCAN.x * 1e3, SCAN.u_zz * 1e4], axis=1)
+    np.savetxt("scan.csv", table, delimiter=",", header="x/mm,current/pA", comments="")
+    write_reference(BARE, "table.h5")
+    assert main(["import", "scan.csv", "-o", "scan.h5", "--x", "x", "--u", "current"]) == 0
+    capsys.readouterr()
+    assert main(["calibrate", "scan.h5", "--reference", "table.h5", "--figure", "scan.png"]) == 0
+    assert "pA/Pa" in capsys.readouterr().out.partition("\n")[0]
+    assert main(["inspect", "scan.apparatus.h5"]) == 0
+    assert main(["calibrate", "scan.h5", "-o", "none.h5"]) == 3
+    assert "--reference" in capsys.readouterr().err
+
+
+def test_currents_are_turned_into_stress_and_come_back(tmp_path):
+    currents = scaled(1e-9, "A")
+    measured = memscal.measure_stress(currents, memscal.calibrate(currents).apparatus)
+    volts = memscal.measure_stress(SCAN, CALIBRATED)
+    np.testing.assert_allclose(measured.profiles[0].s_zz, volts.profiles[0].s_zz, rtol=1e-6)
+    measured.save(tmp_path / "a.stress.h5")
+    stored = memscal.read_stress(tmp_path / "a.stress.h5")
+    np.testing.assert_allclose(
+        stored.profiles[0].points["zz"].u, measured.profiles[0].points["zz"].u
+    )
+    assert "A/Pa" in str(stored)
+    assert "V" not in str(stored.to_dict()["conversion_constant"])
