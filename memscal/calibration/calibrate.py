@@ -14,7 +14,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
-from memscal.calibration.field_uncertainty import field_errors
+from memscal.calibration.fields import RasterFields
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
@@ -524,6 +524,10 @@ def uncertainties(
     linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
     drawn = None if linear else drawn_scatter(solution)
     results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    results = replace(results, parameters=replace(results.parameters, reading=reading))
+    if not isinstance(solution.fields, RasterFields):
+        return results
+    from memscal.calibration.field_uncertainty import field_errors
+
     plane = field_errors(solution, deconvolution, effects, correlations)
-    parameters = replace(results.parameters, reading=reading)
-    return replace(results, field_errors=plane, parameters=parameters)
+    return replace(results, field_errors=plane)

@@ -41,14 +41,12 @@ def field_errors(
     deconvolution: Deconvolution,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
-) -> FloatArray | None:
+) -> FloatArray:
     """Standard uncertainties of G on its grid (2, m, n), in 1/m^2: of noise alone, and in all."""
-    # Of a field that is lifted from a profile: ``None``.
     from scipy.interpolate import RectBivariateSpline
 
-    fields, estimate, g = solution.fields, solution.estimate, deconvolution.g
-    if not isinstance(fields, RasterFields):
-        return None
+    fields: Any = solution.fields
+    estimate, g = solution.estimate, deconvolution.g
     voltages = np.array([effect.voltage for effect in effects.values()])
     inputs = np.zeros((estimate.points.u.size, 0))
     if effects:

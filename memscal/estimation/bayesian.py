@@ -183,11 +183,9 @@ class DepartureBasis:
 
     def signals(self, model: ForwardModel, fit: GaussianFit) -> FloatArray:
         """Voltages of all columns at the points, about the fit, shape (n, p), in V."""
-        columns = [fit.jacobian]
-        if self.angular:
-            columns.append(self.angular.signal(model, fit.centre))
-        columns.append(model.signal(fit.geometry, self.kernels(model.k)[:, self.flat :]))
-        return np.hstack(columns)
+        around = [self.angular.signal(model, fit.centre)] if self.angular else []
+        rings = model.signal(fit.geometry, self.kernels(model.k)[:, self.flat :])
+        return np.hstack([fit.jacobian, *around, rings])
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values of all columns at radii ``r`` (m), shape (r, p)."""
@@ -500,17 +498,16 @@ def weigh_departures(
     standardised, flat = model.points.standardised, basis.flat
     unexplained, signals = model.points.u - fit.predicted, basis.signals(model, fit)
     columns, data = standardised(signals, weights), standardised(unexplained, weights)
-    count = data.size
-    if basis.angular:
+    count, size = data.size, basis.angular.count if basis.angular else 0
+    if size:
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
-        size = basis.angular.count
         prior = least_noise * np.eye(size, columns.shape[1], flat - size)
         columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
-        effective_count += size
     # Down-weighted points carry no full degree of freedom.
-    noise = effective_count - flat, expected_noise**2, least_noise**2
-    conditionals = list(_conditionals(basis, columns, data, noise))
-    averaged = _average(conditionals, expected_noise**2, basis.integrals)
+    noise = effective_count + size - flat, expected_noise**2, least_noise**2
+    averaged = _average(
+        list(_conditionals(basis, columns, data, noise)), expected_noise**2, basis.integrals
+    )
     gain = averaged.gain[:, :count] @ standardised(np.eye(count), weights)
     return replace(averaged, gain=gain, residual=unexplained - signals @ averaged.mean)
 

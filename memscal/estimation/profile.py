@@ -10,12 +10,11 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
 from memscal.estimation import bayesian
-from memscal.estimation.angular import angular_departures
+from memscal.estimation.angular import angular_departures, isolated, raster_noise
 from memscal.estimation.bayesian import DepartureBasis, WeighedFit
 from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.raster_noise import isolated, raster_noise
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 

@@ -9,10 +9,9 @@ from helpers.scans import estimated, reference_spectrum, simulated
 from scipy.signal import fftconvolve
 
 import memscal
-from memscal.estimation.angular import ORDERS, AngularDepartures
+from memscal.estimation.angular import ORDERS, AngularDepartures, raster_noise
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
-from memscal.estimation.raster_noise import raster_noise
 from memscal.model.scan import Scan
 
 RADII = np.array([0.3e-3, 0.8e-3])
