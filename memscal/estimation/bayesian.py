@@ -162,8 +162,7 @@ class DepartureBasis:
     flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
     families: tuple[FamilyFit, ...]  # as many as fit the scan
-    # The last of the flat parameters have a prior of unit variance: amplitudes of these kernels.
-    angular: AngularDepartures | None
+    angular: AngularDepartures | None  # the last flat ones: theirs is a prior of unit variance
 
     @property
     def blocks(self) -> tuple[slice, ...]:
@@ -492,9 +491,9 @@ def weigh_departures(
     least_noise: float = 0.0,
 ) -> WeighedFit:
     """Average departures from a Gaussian fit over the hypotheses."""
-    # ``effective_count``: number of readings in the data, more than points if each is a mean of
-    # repeats.  Of a point of weight one, ``expected_noise`` is that of voltages that have none
-    # (zero for data), ``least_noise`` the least that there is, as stated.
+    # ``effective_count``: readings in the data, of which a point may be a mean; those of less weight
+    # count less.  Of a point of weight one, ``expected_noise`` is that of voltages without any,
+    # ``least_noise`` the least, as stated.
     standardised, flat = model.points.standardised, basis.flat
     unexplained, signals = model.points.u - fit.predicted, basis.signals(model, fit)
     columns, data = standardised(signals, weights), standardised(unexplained, weights)
@@ -503,7 +502,6 @@ def weigh_departures(
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
         prior = least_noise * np.eye(size, columns.shape[1], flat - size)
         columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
-    # Down-weighted points carry no full degree of freedom.
     noise = effective_count + size - flat, expected_noise**2, least_noise**2
     averaged = _average(
         list(_conditionals(basis, columns, data, noise)), expected_noise**2, basis.integrals
@@ -585,10 +583,9 @@ def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasi
     used = [bool(np.diag(weighed.covariance)[block].any()) for block in blocks]
     columns = [np.arange(basis.flat)]
     columns += [np.arange(b.start, b.stop) for b, use in zip(blocks, used, strict=True) if use]
-    chosen = np.concatenate(columns)
-    rings = tuple(compress(basis.rings, used))
-    families = tuple(compress(basis.families, used[len(basis.rings) :]))
-    return replace(basis, rings=rings, families=families), replace(
+    chosen, families = np.concatenate(columns), compress(basis.families, used[len(basis.rings) :])
+    kept = replace(basis, rings=tuple(compress(basis.rings, used)), families=tuple(families))
+    return kept, replace(
         weighed,
         mean=weighed.mean[chosen],
         covariance=weighed.covariance[np.ix_(chosen, chosen)],
