@@ -1,17 +1,30 @@
 """Figure of a calibration: the paper's Fig. 2, with residuals, transfer function and checks."""
 
 import textwrap
+from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from memscal.estimation.points import loads_differ
 from memscal.figures import style
+from memscal.figures.maps import (
+    Loads,
+    by_load,
+    draw_maps,
+    few_loads,
+    residual_limit,
+    rms_of,
+    standardised,
+)
 from memscal.figures.style import COLOURS, channel_indices, legend_above
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES, failed_check_messages
+from memscal.model.film import LINEAR
 from memscal.model.quantities import KPA, MM, MV, PER_MM, PER_MM2, measured_text
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
@@ -28,7 +41,18 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
     limit_to_scan(axes, scan.x)
     axes.set_ylabel(f"voltage $U_{{{channel_indices(data)}}}$ (mV)")
     _stress_axis(axes, data, baseline=_baseline(data))
-    legend_above(axes, points=scan.x.size)
+
+
+def draw_scans(panels: Sequence[Axes], loads: Loads) -> None:
+    """Draw the scan; of several loads each in a panel of its own, with one label in the middle."""
+    for i, (axes, (load, part)) in enumerate(zip(panels, loads, strict=True)):
+        draw_scan(axes, part)
+        axes.text(0.98, 0.92, load, ha="right", va="top", transform=axes.transAxes)
+        for labelled in (axes, *axes.child_axes) if len(loads) > 1 else ():
+            label = labelled.yaxis.label
+            label.set(visible=i == len(loads) // 2, y=0.5 if len(loads) % 2 else 1.0)
+            labelled.set_in_layout(labelled is axes)
+    legend_above(panels[0], points=loads[0][1].reconvolution.x.size)
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
@@ -46,11 +70,11 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
         limits.set(label="less than 2u: upper limit, U + 2u")
         limits.set_rasterized(scan.x.size > style.SCATTER_THRESHOLD)
     _draw_predictions(axes, data, net=True)
-    _draw_reference(axes, data, net=True)
+    peak = _draw_reference(axes, data, net=True)
     axes.set_yscale("log")
     heights = np.concatenate([signal[clear], limit[np.isfinite(limit)]])
     if heights.size:
-        top = max(float(np.max(heights)), _reference_peak(data))
+        top = max(float(np.max(heights)), peak)
         axes.set_ylim(0.5 * float(np.min(heights)) / MV, 2.0 * top / MV)
     _draw_indenter(axes, data)
     limit_to_scan(axes, scan.x)
@@ -92,6 +116,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             curve = np.where(curve > 0, curve, np.nan)
         single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
         line_like = single_valued and not _joint(data) and not _aligned(data)
+        line_like &= scan.offset_x is None
         (line,) = axes.plot(x / MM, curve / MV, dashes, color=COLOURS[name], label=label, zorder=3)
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
@@ -119,13 +144,17 @@ def _aligned(data: ApparatusData) -> bool:
     return any(message.kind == REPEAT_CENTRES for message in data.process.messages)
 
 
-def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:
+def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> float:
     """Draw baseline + A sigma_zz for the scan's load about the centre; ``net``: only A sigma_zz."""
+    # Returns the largest A sigma_zz that is drawn, in V.
     reference, constant = data.reference, data.conversion_constant
     stress = _seen_stress(data)
     if not (np.isfinite(constant) and constant > 0) or stress is None:
-        return
+        return 0.0
+    if data.film.law not in ("", LINEAR) and loads_differ((data.load, reference.load)):
+        return 0.0  # the stress at another load has another shape
     voltage = constant * stress * (data.load / reference.load)
+    peak = float(np.max(voltage))
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
@@ -134,14 +163,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
         curve = _turned(data, x) * curve + _background(data, x)
     (line,) = axes.plot(x / MM, curve / MV, "-.", color=COLOURS["reference"], lw=1.0, zorder=1.5)
     line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
-
-
-def _reference_peak(data: ApparatusData) -> float:
-    stress = _seen_stress(data)
-    if stress is None:
-        return 0.0
-    peak = float(data.conversion_constant * np.max(stress) / data.reference.load * data.load)
-    return peak if np.isfinite(peak) else 0.0
+    return peak
 
 
 def _tangential(data: ApparatusData) -> bool:
@@ -199,14 +221,19 @@ def _by_distance(data: ApparatusData) -> bool:
 
 
 def _baseline(data: ApparatusData) -> float:
+    if data.reconvolution.background is not None:
+        return float(np.mean(data.reconvolution.background))
     stated = "baseline" in data.parameters
     return data.parameters["baseline"] if stated else 0.0
 
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     """Return baseline and drift, its change from end to end, at positions x, in V."""
+    along, stated = data.reconvolution.x, data.reconvolution.background
+    if stated is not None:
+        # Elsewhere than at the points: of a raster or several scans a line through all of them.
+        return stated if x is along else np.polynomial.Polynomial.fit(along, stated, 1)(x)
     level = np.full(x.shape, _baseline(data))
-    along = data.reconvolution.x
     if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
         middle = (np.max(along) + np.min(along)) / 2
         level += data.parameters["drift"] * (x - middle) / np.ptp(along)
@@ -224,47 +251,30 @@ def limit_to_scan(axes: Axes, x: FloatArray) -> None:
     axes.set_xlim((low - margin) / MM, (high + margin) / MM)
 
 
-def draw_residuals(axes: Axes, data: ApparatusData) -> None:
+def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     """Draw residuals over each point's standard uncertainty; those beyond the axis at its edge."""
     scan = data.reconvolution
-    errors, scale = scan.u_zz_errors, "$u$"
-    if not np.all(np.isfinite(errors) & (errors > 0)):
-        # Without a stated uncertainty residuals are shown over their own rms.
-        rms = _rms(scan.residual)
-        errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
-    with_g, with_gaussian = scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors
-    limit = _residual_limit(with_g, with_gaussian)
+    with_g, with_gaussian, scale = standardised(scan)
+    series = [("Gaussian", scan.x, with_gaussian, COLOURS["gaussian"], "s", "none")]
+    colours = style.shades(len(loads), 0.25)
+    for i, ((load, part), colour, marker) in enumerate(zip(loads, colours, cycle("o^DvP*"))):
+        name = "_" * (i >= _MOST_PANELS) + (load or "G")
+        place, z = part.reconvolution.x, standardised(part.reconvolution)[0]
+        series.append((name, place, z, colour, marker, colour))
+    limit = residual_limit(with_g, with_gaussian)
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
     axes.axhline(0.0, color="0.4", lw=0.6)
     many = scan.x.size > style.SCATTER_THRESHOLD
     size = 1.2 if many else style.marker_size(scan.x.size)
-    for z, name, marker, face in (
-        (with_gaussian, "gaussian", "s", "none"),
-        (with_g, "deconvolved", "o", COLOURS["deconvolved"]),
-    ):
-        label = f"{'Gaussian' if name == 'gaussian' else 'G'}: rms {_rms(z):.2f}"
-        (points,) = axes.plot(scan.x / MM, z, ls="none", marker=marker, ms=size)
-        points.set(color=COLOURS[name], markerfacecolor=face, label=label)
+    for name, x, z, colour, marker, face in series:
+        (points,) = axes.plot(x / MM, z, ls="none", marker=marker, ms=size)
+        points.set(color=colour, markerfacecolor=face, label=f"{name}: rms {rms_of(z):.2f}")
         points.set(rasterized=many, markeredgewidth=0.3 if many else 0.7)
-        _mark_beyond(axes, scan.x, z, limit, COLOURS[name])
+        _mark_beyond(axes, x, z, limit, colour)
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
     limit_to_scan(axes, scan.x)
     legend_above(axes, points=scan.x.size)
-
-
-def _rms(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
-
-
-def _residual_limit(*residuals: FloatArray) -> float:
-    """Return an axis limit that one outlier cannot stretch."""
-    sizes = np.abs(np.concatenate(residuals))
-    sizes = sizes[np.isfinite(sizes)]
-    if not sizes.size:
-        return 3.5
-    return float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
 
 
 def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour: str) -> None:
@@ -372,36 +382,44 @@ _PANELS_HEIGHT = 8.2
 _LINE_HEIGHT = 0.155
 _LINE_WIDTH = 122
 _MAX_FAILED_LINES = 12
+_MOST_PANELS, _MOST_MAPS, _MAP_HEIGHT = 6, 4, 2.2
 _MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
 def calibration_figure(result: Calibrated) -> Figure:
     """Draw an apparatus function and the scan that it came from, after Fig. 2 of the paper."""
     data = apparatus_of(result)
+    loads = by_load(data)
+    apart = few_loads(loads, _MOST_PANELS)
+    mapped = few_loads(loads, _MOST_MAPS) if data.reconvolution.offset_x is not None else ()
     with style.house_style():
-        lines = _text_lines(data)
-        text_height = _LINE_HEIGHT * (len(lines) + 0.6)
-        figure = style.new_figure(_PANELS_HEIGHT + text_height)
-        outer = figure.add_gridspec(2, 2, height_ratios=[text_height, _PANELS_HEIGHT])
+        lines = _text_lines(data, loads)
+        heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(len(apart) - 3, 0)]
+        heights += [_MAP_HEIGHT * len(mapped)] * bool(mapped)
+        figure = style.new_figure(sum(heights))
+        outer = figure.add_gridspec(len(heights), 2, height_ratios=heights)
         _write_lines(figure, lines)
         figure.add_subplot(outer[0, :]).set_axis_off()
-        left = outer[1, 0].subgridspec(3, 1, height_ratios=[3.0, 1.5, 3.0])
+        scan_heights = [max(1.0, 3.0 / len(apart))] * len(apart)
+        left = outer[1, 0].subgridspec(len(apart) + 2, 1, height_ratios=[*scan_heights, 1.5, 3.0])
         right = outer[1, 1].subgridspec(3, 1)
         scan = figure.add_subplot(left[0], label="scan")
-        residuals = figure.add_subplot(left[1], sharex=scan, label="residuals")
-        scan_log = figure.add_subplot(left[2], sharex=scan, label="scan_log")
+        scans = [scan, *(figure.add_subplot(left[i], sharex=scan) for i in range(1, len(apart)))]
+        residuals = figure.add_subplot(left[-2], sharex=scan, label="residuals")
+        scan_log = figure.add_subplot(left[-1], sharex=scan, label="scan_log")
         radial = figure.add_subplot(right[0], label="radial")
         radial_log = figure.add_subplot(right[1], sharex=radial, label="radial_log")
         transfer = figure.add_subplot(right[2], label="transfer")
-        draw_scan(scan, data)
-        draw_residuals(residuals, data)
+        draw_scans(scans, apart)
+        draw_residuals(residuals, data, loads)
         draw_scan_log(scan_log, data)
         draw_radial(radial, data)
         draw_radial_log(radial_log, data)
         draw_transfer(transfer, data)
-        for axes in (scan, residuals, radial):
+        for axes in (*scans, residuals, radial):
             axes.tick_params(labelbottom=False)
-        style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer))
+        maps = draw_maps(figure, outer[2, :], data, mapped) if mapped else ()
+        style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer, *maps))
         # One pass of the layout, then none, so that rendering twice gives the same picture.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
@@ -418,7 +436,7 @@ def values_text(data: ApparatusData) -> str:
     return ",  ".join(values)
 
 
-def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
+def _text_lines(data: ApparatusData, loads: Loads) -> list[tuple[str, str, str]]:
     """Return the lines above the panels, with the colour and the weight of each."""
     ink = COLOURS["measured"]
     # A long name is cut, not the channel behind it.
@@ -427,8 +445,9 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
     film = data.film
     law = f", {film.law_text}" if film.law else ""
+    load = f"{data.load:.3g} N" if len(loads) == 1 else f"{loads[0][0]} to {loads[-1][0]}"
     setting = (
-        f"{data.indenter.shape} of radius {data.indenter.radius / MM:.3g} mm, {data.load:.3g} N; "
+        f"{data.indenter.shape} of radius {data.indenter.radius / MM:.3g} mm, {load}; "
         f"film {film.thickness / MM:.3g} mm, E = {film.young_modulus / KPA / 1e3:.3g} MPa, "
         f"ν = {film.poisson_ratio:.3g}{law}; ± is the standard uncertainty (k = 1)"
     )

@@ -142,7 +142,7 @@ def dataset(result: Calibrated) -> Dataset:
     import xarray
 
     apparatus = apparatus_of(result)
-    field = {"g": "field", "g_errors": "field_errors"}
+    field = {"g": "field", "g_errors": "field_errors", "g_scatter": "field_scatter"}
     return xarray.Dataset(
         record_arrays(records.RADIAL, apparatus.radial_profile)
         | record_arrays(records.RADIAL_COVARIANCE, apparatus.radial_profile)
