@@ -417,7 +417,7 @@ def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: _L
             _finish(axes, _draw_points(axes, scan, values, cmap=colours, **options), label)
             axes.set_title(load, loc="left", fontsize=8.0, pad=4)
             panels.append(axes)
-        panels[-2].set_ylabel("$y$ from the centre (mm)", labelpad=14)
+        panels[-2].set_ylabel("$y$ from the centre (mm)", labelpad=8)
     kernel = figure.add_subplot(grid[0, 2], label="G map")
     x, y = (np.abs(a) <= _KERNEL_WIDTHS * data.gaussian_sigma for a in (data.field.x, data.field.y))
     plane = data.field.x[x] / MM, data.field.y[y] / MM, data.field.g[np.ix_(y, x)] / PER_MM2
@@ -491,8 +491,10 @@ def calibration_figure(result: Calibrated) -> Figure:
             axes.tick_params(labelbottom=False)
         maps = draw_maps(figure, outer[2, :], data, loads) if mapped else ()
         style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer, *maps))
-        # One pass of the layout, then none, so that rendering twice gives the same picture.
-        figure.draw_without_rendering()
+        # Passes of the layout (a map's shape follows from its place), then none, so that rendering
+        # twice gives the same picture.
+        for _ in range(3 if mapped else 1):
+            figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
 
