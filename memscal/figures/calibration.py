@@ -115,8 +115,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
         single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
-        line_like = single_valued and not _joint(data) and not _aligned(data)
-        line_like &= scan.offset_x is None
+        line_like = single_valued and scan.offset_x is None and not (_joint(data) or _aligned(data))
         (line,) = axes.plot(x / MM, curve / MV, dashes, color=COLOURS[name], label=label, zorder=3)
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
@@ -260,7 +259,9 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: _Loads) -> None:
         name = "_" * (i >= _MOST_PANELS) + (load or "G")
         place, z = part.reconvolution.x, _standardised(part.reconvolution)[0]
         series.append((name, place, z, colour, marker, colour))
-    limit = _residual_limit(with_g, with_gaussian)
+    # One outlier cannot stretch the axis.
+    sizes = np.abs([with_g, with_gaussian])
+    limit = float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
     axes.axhline(0.0, color="0.4", lw=0.6)
     many = scan.x.size > style.SCATTER_THRESHOLD
@@ -285,12 +286,6 @@ def _standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
         rms = float(np.sqrt(np.mean(scan.residual**2)))
         errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
     return scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors, scale
-
-
-def _residual_limit(*residuals: FloatArray) -> float:
-    """Return an axis limit that one outlier cannot stretch."""
-    sizes = np.abs(np.concatenate(residuals))
-    return float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
 
 
 def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour: str) -> None:
@@ -396,7 +391,6 @@ def _largest(values: FloatArray, floor: float = 1e-300) -> float:
 
 _RESIDUALS = (-3.5, 3.5)
 _DOTS = 5e3  # area of all points that lie on no lattice, in square points: half of a map's
-_KERNEL_WIDTHS = 5.0  # to which G is drawn
 
 
 def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: _Loads) -> list[Axes]:
@@ -419,7 +413,7 @@ def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: _L
             panels.append(axes)
         panels[-2].set_ylabel("$y$ from the centre (mm)", labelpad=8)
     kernel = figure.add_subplot(grid[0, 2], label="G map")
-    x, y = (np.abs(a) <= _KERNEL_WIDTHS * data.gaussian_sigma for a in (data.field.x, data.field.y))
+    x, y = (np.abs(a) <= 5 * data.gaussian_sigma for a in (data.field.x, data.field.y))
     plane = data.field.x[x] / MM, data.field.y[y] / MM, data.field.g[np.ix_(y, x)] / PER_MM2
     drawn = kernel.pcolormesh(*plane, cmap="viridis", rasterized=True)
     kernel.contour(*plane, [plane[2].max() / 2], colors=COLOURS["measured"], linewidths=1.0)
@@ -491,8 +485,7 @@ def calibration_figure(result: Calibrated) -> Figure:
             axes.tick_params(labelbottom=False)
         maps = draw_maps(figure, outer[2, :], data, loads) if mapped else ()
         style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer, *maps))
-        # Passes of the layout (a map's shape follows from its place), then none, so that rendering
-        # twice gives the same picture.
+        # Passes of the layout (maps need three), then none: rendering twice gives the same picture.
         for _ in range(3 if mapped else 1):
             figure.draw_without_rendering()
         figure.set_layout_engine("none")
