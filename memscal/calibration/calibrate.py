@@ -158,17 +158,20 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     elif points.scans > 1 and estimate.model.order:
         # The sign of a shear depends on the side.
         place = estimate.offset[estimate.model.axis]
-    order = np.argsort(place, kind="stable")
-
-    predicted = solution.deconvolution.predicted
-    return Reconvolution(
-        x=place[order],
-        u_zz=points.u[order],
-        u_zz_errors=estimate.noise[order],
-        u_zz_predicted=predicted[order],
-        u_zz_gaussian=estimate.gaussian.predicted[order],
-        residual=(points.u - predicted)[order],
-    )
+    order, predicted = np.argsort(place, kind="stable"), solution.deconvolution.predicted
+    columns = {
+        "x": place,
+        "u_zz": points.u,
+        "u_zz_errors": estimate.noise,
+        "u_zz_predicted": predicted,
+        "u_zz_gaussian": estimate.gaussian.predicted,
+        "residual": points.u - predicted,
+    }
+    if points.planar:
+        columns |= dict(zip(("offset_x", "offset_y"), estimate.offset, strict=True))
+    if points.planar or points.scans > 1 or loads_differ(list(points.load)):
+        columns |= {"load": points.load, "background": estimate.background}
+    return Reconvolution(**{name: values[order] for name, values in columns.items()})
 
 
 _OF_POINTS = ("normal_load", "normal_load_errors")

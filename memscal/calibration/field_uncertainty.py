@@ -61,7 +61,7 @@ def field_errors(
     variances = changes(solution, deconvolution, kernels, on_lattice.ravel(), inputs)
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
     planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
-    return np.maximum(planes, 0.0)
+    return np.maximum.accumulate(np.maximum(planes, 0.0))
 
 
 def _kernels(estimate: ProfileEstimate, fields: RasterFields) -> FloatArray:

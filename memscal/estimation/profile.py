@@ -442,14 +442,20 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
     return np.asarray(-residual[:-1] / residual[-1])
 
 
+#: Outliers that are listed one by one.
+_MOST_LISTED = 10
+
+
 def point_messages(estimate: ProfileEstimate) -> list[Message]:
-    """Return what was left out of a scan, and which points are outliers."""
+    """Return what was left out of a scan, and which points are outliers, the farthest first."""
     points = estimate.points
     messages: list[Message] = []
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
         messages.append(Message("missing_points", text))
-    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
+    weight = estimate.outlier_weight
+    outliers = np.argsort(weight, kind="stable")[: (weight < OUTLIER_WEIGHT).sum()]
+    for i in outliers[:_MOST_LISTED]:
         place = f"x = {points.x[i] * 1e3:.4g} mm"
         if points.planar:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
@@ -457,6 +463,9 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
             place += f" of repeat {points.repeat[i] + 1}"
         seen, expected = (points.reading.text(u[i], ".4g") for u in (points.u, estimate.predicted))
         voltages = f"{seen} instead of {expected}"
-        text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
+        text = f"Outlier at {place}: {voltages}; its weight is {weight[i]:.2g}."
+        messages.append(Message("outlier", text))
+    if (more := outliers.size - _MOST_LISTED) > 0:
+        text = f"{more} more outliers depart by less and have reduced weights, too."
         messages.append(Message("outlier", text))
     return messages

@@ -1,22 +1,33 @@
 """Figure of a calibration: the paper's Fig. 2, with residuals, transfer function and checks."""
 
 import textwrap
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import cycle, pairwise
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Rectangle
 
+from memscal.estimation.points import MINIMUM_POSITIONS, loads_differ
 from memscal.figures import style
 from memscal.figures.style import COLOURS, channel_indices, legend_above
-from memscal.model.apparatus import ApparatusData, ApparatusRadial
+from memscal.model.apparatus import ApparatusData, ApparatusRadial, Reconvolution
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES, failed_check_messages
+from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
+from memscal.model.scan import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit
+_Loads: TypeAlias = Sequence[tuple[str, ApparatusData]]  # each load's text and points
 
 
 def draw_scan(axes: Axes, data: ApparatusData) -> None:
@@ -30,7 +41,20 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
     word = "voltage" if data.reading.si == "V" else "reading"
     axes.set_ylabel(f"{word} $U_{{{channel_indices(data)}}}$ ({data.reading.unit})")
     _stress_axis(axes, data, baseline=_baseline(data))
-    legend_above(axes, points=scan.x.size)
+
+
+def draw_scans(panels: Sequence[Axes], loads: _Loads) -> None:
+    """Draw the scan; of several loads each in a panel of its own, with one label in the middle."""
+    for i, (axes, (load, part)) in enumerate(zip(panels, loads, strict=False)):
+        if i == _MOST_PANELS - 1 < len(loads) - 1:
+            load += f"\nand {len(loads) - _MOST_PANELS} more loads"
+        draw_scan(axes, part)
+        axes.text(0.98, 0.92, load, ha="right", va="top", transform=axes.transAxes)
+        for labelled in (axes, *axes.child_axes) if len(panels) > 1 else ():
+            label = labelled.yaxis.label
+            label.set(visible=i == len(panels) // 2, y=0.5 if len(panels) % 2 else 1.0)
+            labelled.set_in_layout(labelled is axes)
+    legend_above(panels[0], points=loads[0][1].reconvolution.x.size)
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
@@ -49,11 +73,11 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
         limits.set(label="less than 2u: upper limit, U + 2u")
         limits.set_rasterized(scan.x.size > style.SCATTER_THRESHOLD)
     _draw_predictions(axes, data, net=True)
-    _draw_reference(axes, data, net=True)
+    peak = _draw_reference(axes, data, net=True)
     axes.set_yscale("log")
     heights = np.concatenate([signal[clear], limit[np.isfinite(limit)]])
     if heights.size:
-        top = max(float(np.max(heights)), _reference_peak(data))
+        top = max(float(np.max(heights)), peak)
         axes.set_ylim(0.5 * float(np.min(heights)) / unit.scale, 2.0 * top / unit.scale)
     _draw_indenter(axes, data)
     limit_to_scan(axes, scan.x)
@@ -95,7 +119,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
         single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
-        line_like = single_valued and not _joint(data) and not _aligned(data)
+        line_like = single_valued and scan.offset_x is None and not (_joint(data) or _aligned(data))
         (line,) = axes.plot(x / MM, curve / data.reading.scale, dashes, label=label, zorder=3)
         line.set_color(COLOURS[name])
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
@@ -124,13 +148,17 @@ def _aligned(data: ApparatusData) -> bool:
     return any(message.kind == REPEAT_CENTRES for message in data.process.messages)
 
 
-def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:
-    """Draw baseline + A sigma_zz for the scan's load about the centre; ``net``: only A sigma_zz."""
+def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> float:
+    """Draw baseline + A sigma_zz about the centre (``net``: only the latter); return its peak."""
     reference, constant = data.reference, data.conversion_constant
     stress = _seen_stress(data)
     if not (np.isfinite(constant) and constant > 0) or stress is None:
-        return
+        return 0.0
+    curved = data.film is not None and data.film.law not in ("", LINEAR)
+    if curved and data.load and loads_differ((data.load, reference.load)):
+        return 0.0  # the stress at another load has another shape
     voltage = constant * stress
+    peak = float(np.max(voltage))
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
@@ -140,14 +168,7 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
     (line,) = axes.plot(x / MM, curve / data.reading.scale, "-.", lw=1.0, zorder=1.5)
     line.set(color=COLOURS["reference"])
     line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
-
-
-def _reference_peak(data: ApparatusData) -> float:
-    stress = _seen_stress(data)
-    if stress is None:
-        return 0.0
-    peak = float(data.conversion_constant * np.max(stress))
-    return peak if np.isfinite(peak) else 0.0
+    return peak
 
 
 def _tangential(data: ApparatusData) -> bool:
@@ -210,14 +231,19 @@ def _by_distance(data: ApparatusData) -> bool:
 
 
 def _baseline(data: ApparatusData) -> float:
+    if data.reconvolution.background is not None:
+        return float(np.mean(data.reconvolution.background))
     stated = "baseline" in data.parameters
     return data.parameters["baseline"] if stated else 0.0
 
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     """Return baseline and drift, its change from end to end, at positions x, in V."""
+    along, stated = data.reconvolution.x, data.reconvolution.background
+    if stated is not None:
+        # Elsewhere than at the points: of a raster or several scans a line through all of them.
+        return stated if x is along else np.polynomial.Polynomial.fit(along, stated, 1)(x)
     level = np.full(x.shape, _baseline(data))
-    along = data.reconvolution.x
     if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
         middle = (np.max(along) + np.min(along)) / 2
         level += data.parameters["drift"] * (x - middle) / np.ptp(along)
@@ -235,47 +261,43 @@ def limit_to_scan(axes: Axes, x: FloatArray) -> None:
     axes.set_xlim((low - margin) / MM, (high + margin) / MM)
 
 
-def draw_residuals(axes: Axes, data: ApparatusData) -> None:
+def draw_residuals(axes: Axes, data: ApparatusData, loads: _Loads) -> None:
     """Draw residuals over each point's standard uncertainty; those beyond the axis at its edge."""
     scan = data.reconvolution
-    errors, scale = scan.u_zz_errors, "$u$"
-    if not np.all(np.isfinite(errors) & (errors > 0)):
-        # Without a stated uncertainty residuals are shown over their own rms.
-        rms = _rms(scan.residual)
-        errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
-    with_g, with_gaussian = scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors
-    limit = _residual_limit(with_g, with_gaussian)
+    with_g, with_gaussian, scale = _standardised(scan)
+    series = [("Gaussian", scan.x, with_gaussian, COLOURS["gaussian"], "s", "none")]
+    colours = style.shades(len(loads), 0.25)
+    for i, ((load, part), colour, marker) in enumerate(zip(loads, colours, cycle("o^DvP*"))):
+        name = "_" * (i >= _MOST_PANELS) + (load or "G")
+        place, z = part.reconvolution.x, _standardised(part.reconvolution)[0]
+        series.append((name, place, z, colour, marker, colour))
+    # One outlier cannot stretch the axis.
+    sizes = np.abs([with_g, with_gaussian])
+    limit = float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
     axes.axhline(0.0, color="0.4", lw=0.6)
     many = scan.x.size > style.SCATTER_THRESHOLD
     size = 1.2 if many else style.marker_size(scan.x.size)
-    for z, name, marker, face in (
-        (with_gaussian, "gaussian", "s", "none"),
-        (with_g, "deconvolved", "o", COLOURS["deconvolved"]),
-    ):
-        label = f"{'Gaussian' if name == 'gaussian' else 'G'}: rms {_rms(z):.2f}"
-        (points,) = axes.plot(scan.x / MM, z, ls="none", marker=marker, ms=size)
-        points.set(color=COLOURS[name], markerfacecolor=face, label=label)
+    for name, x, z, colour, marker, face in series:
+        (points,) = axes.plot(x / MM, z, ls="none", marker=marker, ms=size)
+        rms = np.sqrt(np.mean(z**2))
+        points.set(color=colour, markerfacecolor=face, label=f"{name}: rms {rms:.2f}")
         points.set(rasterized=many, markeredgewidth=0.3 if many else 0.7)
-        _mark_beyond(axes, scan.x, z, limit, COLOURS[name])
+        _mark_beyond(axes, x, z, limit, colour)
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
     limit_to_scan(axes, scan.x)
     legend_above(axes, points=scan.x.size)
 
 
-def _rms(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
-
-
-def _residual_limit(*residuals: FloatArray) -> float:
-    """Return an axis limit that one outlier cannot stretch."""
-    sizes = np.abs(np.concatenate(residuals))
-    sizes = sizes[np.isfinite(sizes)]
-    if not sizes.size:
-        return 3.5
-    return float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
+def _standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
+    """Residuals with G and with the Gaussian over their standard uncertainty, and its symbol."""
+    errors, scale = scan.u_zz_errors, "$u$"
+    if not np.all(np.isfinite(errors) & (errors > 0)):
+        # Without a stated uncertainty residuals are shown over their own rms.
+        rms = float(np.sqrt(np.mean(scan.residual**2)))
+        errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
+    return scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors, scale
 
 
 def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour: str) -> None:
@@ -379,44 +401,128 @@ def _largest(values: FloatArray, floor: float = 1e-300) -> float:
     return max(float(np.max(finite)), floor) if finite.size else floor
 
 
+_RESIDUALS = (-3.5, 3.5)
+_DOTS = 5e3  # area of all points that lie on no lattice, in square points: half of a map's
+
+
+def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: _Loads) -> list[Axes]:
+    """Draw voltage and residual of each load in a row, and G beside the first."""
+    shown, indices, unit = loads[:_MOST_MAPS], channel_indices(data), data.reading
+    grid, panels = place.subgridspec(len(shown), 3), list[Axes]()
+    for row, (load, part) in enumerate(shown):
+        scan, background = part.reconvolution, np.asarray(part.reconvolution.background)
+        # An outlier does not stretch the colours of the other voltages.
+        measured, predicted = (
+            (u - background) / unit.scale for u in (scan.u_zz, scan.u_zz_predicted)
+        )
+        z, _, scale = _standardised(scan)
+        for i, (values, span, colours, label) in enumerate((
+            (measured, predicted, "viridis", f"$U_{{{indices}}}$ less baseline ({unit.unit})"),
+            (z, _RESIDUALS, "RdBu_r", f"residual / {scale}"),
+        )):  # fmt: skip
+            axes = figure.add_subplot(grid[row, i], label=f"{('voltage', 'residual')[i]} map")
+            options = {"vmin": np.min(span), "vmax": np.max(span), "rasterized": True}
+            _finish(axes, _draw_points(axes, scan, values, cmap=colours, **options), label)
+            axes.set_title(load, loc="left", fontsize=8.0, pad=4)
+            panels.append(axes)
+        panels[-2].set_ylabel("$y$ from the centre (mm)", labelpad=8)
+    kernel = figure.add_subplot(grid[0, 2], label="G map")
+    x, y = (np.abs(a) <= 5 * data.gaussian_sigma for a in (data.field.x, data.field.y))
+    plane = data.field.x[x] / MM, data.field.y[y] / MM, data.field.g[np.ix_(y, x)] / PER_MM2
+    drawn = kernel.pcolormesh(*plane, cmap="viridis", rasterized=True)
+    kernel.contour(*plane, [plane[2].max() / 2], colors=COLOURS["measured"], linewidths=1.0)
+    kernel.plot([], [], color=COLOURS["measured"], lw=1.0, label="half of the largest G")
+    legend_above(kernel)
+    _finish(kernel, drawn, f"$G_{{{indices}}}$ (1/mm$^2$)")
+    return [*panels[:2], kernel, *panels[2:]]
+
+
+def _draw_points(axes: Axes, scan: Reconvolution, values: Any, **options: Any) -> ScalarMappable:
+    """Draw values at the points of a raster; on a lattice nodes that are missing are grey."""
+    x, y = np.asarray(scan.offset_x), np.asarray(scan.offset_y)
+    lattice = even_lattice(x, y, x.size)
+    if lattice is None:
+        return axes.scatter(x / MM, y / MM, _DOTS / x.size, values, lw=0, **options)
+    nodes = [(a.start + a.step * np.arange(a.index.max() + 1)) / MM for a in lattice]
+    cells = np.full((nodes[1].size, nodes[0].size), np.nan)
+    cells[lattice[1].index, lattice[0].index] = values
+    axes.set_facecolor("0.75")
+    return axes.pcolormesh(*nodes, cells, **options)
+
+
+def _finish(axes: Axes, drawn: ScalarMappable, label: str) -> None:
+    """Give a map its aspect, axes, and a colour bar that is as high as it is."""
+    axes.set(aspect="equal", xlabel="$x$ from the centre (mm)")
+    axes.locator_params(nbins=4)
+    Colorbar(axes.inset_axes((1.04, 0.0, 0.06, 1.0)), drawn, label=label)
+
+
 _PANELS_HEIGHT = 8.2
 _LINE_HEIGHT = 0.155
 _LINE_WIDTH = 122
 _MAX_FAILED_LINES = 12
+_MOST_PANELS, _MOST_MAPS, _MAP_HEIGHT = 6, 4, 2.2
 _MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
 def calibration_figure(result: Calibrated) -> Figure:
     """Draw an apparatus function and the scan that it came from, after Fig. 2 of the paper."""
     data = apparatus_of(result)
+    loads = _by_load(data)
+    apart, mapped = min(len(loads), _MOST_PANELS), min(len(loads), _MOST_MAPS)
+    mapped *= data.reconvolution.offset_x is not None
     with style.house_style():
-        lines = _text_lines(data)
-        text_height = _LINE_HEIGHT * (len(lines) + 0.6)
-        figure = style.new_figure(_PANELS_HEIGHT + text_height)
-        outer = figure.add_gridspec(2, 2, height_ratios=[text_height, _PANELS_HEIGHT])
+        lines = _text_lines(data, loads)
+        heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(apart - 3, 0)]
+        heights += [_MAP_HEIGHT * mapped] * bool(mapped)
+        figure = style.new_figure(sum(heights))
+        outer = figure.add_gridspec(len(heights), 2, height_ratios=heights)
         _write_lines(figure, lines)
         figure.add_subplot(outer[0, :]).set_axis_off()
-        left = outer[1, 0].subgridspec(3, 1, height_ratios=[3.0, 1.5, 3.0])
+        scan_heights = [max(1.0, 3.0 / apart)] * apart
+        left = outer[1, 0].subgridspec(apart + 2, 1, height_ratios=[*scan_heights, 1.5, 3.0])
         right = outer[1, 1].subgridspec(3, 1)
         scan = figure.add_subplot(left[0], label="scan")
-        residuals = figure.add_subplot(left[1], sharex=scan, label="residuals")
-        scan_log = figure.add_subplot(left[2], sharex=scan, label="scan_log")
+        scans = [scan, *(figure.add_subplot(left[i], sharex=scan) for i in range(1, apart))]
+        residuals = figure.add_subplot(left[-2], sharex=scan, label="residuals")
+        scan_log = figure.add_subplot(left[-1], sharex=scan, label="scan_log")
         radial = figure.add_subplot(right[0], label="radial")
         radial_log = figure.add_subplot(right[1], sharex=radial, label="radial_log")
         transfer = figure.add_subplot(right[2], label="transfer")
-        draw_scan(scan, data)
-        draw_residuals(residuals, data)
+        draw_scans(scans, loads)
+        draw_residuals(residuals, data, loads)
         draw_scan_log(scan_log, data)
         draw_radial(radial, data)
         draw_radial_log(radial_log, data)
         draw_transfer(transfer, data)
-        for axes in (scan, residuals, radial):
+        for axes in (*scans, residuals, radial):
             axes.tick_params(labelbottom=False)
-        style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer))
-        # One pass of the layout, then none, so that rendering twice gives the same picture.
-        figure.draw_without_rendering()
+        maps = draw_maps(figure, outer[2, :], data, loads) if mapped else ()
+        style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer, *maps))
+        # Passes of the layout (maps need three), then none: rendering twice gives the same picture.
+        for _ in range(3 if mapped else 1):
+            figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
+
+
+def _by_load(data: ApparatusData) -> _Loads:
+    """Return the points of each load apart, from the smallest up; of a single one without text."""
+    scan, parts = data.reconvolution, []
+    if scan.load is None:
+        return [("", data)]
+    loads, inverse = np.unique(scan.load, return_inverse=True)
+    # A load that is measured with noise at each point is one load: there is no gap in it.
+    group = np.cumsum([0, *map(loads_differ, pairwise(loads))])[inverse]
+    counts = np.bincount(group)
+    if counts.size == 1 or counts.min() < MINIMUM_POSITIONS:
+        return [("", data)]
+    for inside in group == np.arange(counts.size)[:, None]:
+        columns = {name: v[inside] for name, v in vars(scan).items() if v is not None}
+        load = float(scan.load[inside].mean())
+        part = replace(data, load=load, reconvolution=Reconvolution(**columns))
+        parts.append((f"{load:.3g} N", part))
+    return parts
 
 
 def values_text(data: ApparatusData) -> str:
@@ -429,7 +535,7 @@ def values_text(data: ApparatusData) -> str:
     return ",  ".join(values)
 
 
-def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
+def _text_lines(data: ApparatusData, loads: _Loads) -> list[tuple[str, str, str]]:
     """Return the lines above the panels, with the colour and the weight of each."""
     ink = COLOURS["measured"]
     # A long name is cut, not the channel behind it.
@@ -438,6 +544,8 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
     film, rod = data.film, data.indenter
     load = f", {data.load:.3g} N; " if data.load else "; "
+    if len(loads) > 1:
+        load = f", {loads[0][0]} to {loads[-1][0]}; "
     setting = f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}" if rod else ""
     if film is not None:
         setting += f"film {film.thickness / MM:.3g} mm, "

@@ -131,7 +131,7 @@ def _provenance(data: ApparatusData) -> str:
 def _figure(data: ApparatusData) -> str:
     svg = base64.b64encode(render_figure(calibration_figure(data), "svg")).decode("ascii")
     alt = (
-        f"Six panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
+        f"Panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
         f"the apparatus function with its band, linear and logarithmic; the transfer function "
         f"resolved up to {data.resolved_wavenumber / PER_MM:.3g} rad/mm. "
         f"{values_text(data)}. {_verdict_text(data)}"
@@ -139,7 +139,8 @@ def _figure(data: ApparatusData) -> str:
     caption = (
         "a, c: scan, reconvolutions with the deconvolved G and with the Gaussian, and the "
         "reference. b: residuals in standard uncertainties. d, e: G with its band (k = 2) and "
-        "the Gaussian. f: transfer function; hatched, what the scan does not resolve."
+        "the Gaussian. f: transfer function; hatched, what the scan does not resolve. Of a scan "
+        "over the plane, from g: voltage, residuals and G; at several loads a row for each."
     )
     return (
         f'<figure>\n<img alt="{escape(alt)}" src="data:image/svg+xml;base64,{svg}">\n'

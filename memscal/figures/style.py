@@ -4,6 +4,7 @@ import io
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import matplotlib as mpl
@@ -84,7 +85,7 @@ def panels_of(
 def panel_letters(panels: Iterable[Axes]) -> None:
     """Put each panel's letter at the upper left, outside the frame and clear of all data."""
     place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
-    for axes, letter in zip(panels, "abcdef", strict=False):
+    for axes, letter in zip(panels, ascii_lowercase, strict=False):
         label = axes.annotate(letter, (0.0, 1.0), (-30, 4), **place)
         label.set(fontweight="bold", fontsize=10, in_layout=False)
 

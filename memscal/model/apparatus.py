@@ -22,7 +22,8 @@ from memscal.model.stress import StressProfile
 class ApparatusField(FrozenArrays):
     """The apparatus function on a Cartesian grid, with unit integral over it.
 
-    ``x`` (n,) and ``y`` (m,) in m; ``g`` and ``g_errors`` (m, n) in 1/m^2.
+    ``x`` (n,) and ``y`` (m,) in m; ``g`` and ``g_errors`` (m, n) in 1/m^2.  ``g_scatter`` (m, n)
+    is the part of ``g_errors`` that scatters from scan to scan, ``None`` where it is not known.
     """
 
     x: FloatArray
@@ -71,7 +72,9 @@ class Reconvolution(FrozenArrays):
 
     In a raster ``x`` is the distance from the sensor's centre.  ``u_zz_predicted`` uses the
     deconvolved G, ``u_zz_gaussian`` the Gaussian fitted in data space; ``residual`` is measured
-    minus predicted.
+    minus predicted.  ``offset_x`` and ``offset_y`` (m) of a raster are the positions from the
+    sensor's centre; of rasters and of several loads or scans, ``load`` (N) and ``background``
+    (baseline and drift, V) are those of each point, else ``None``.
     """
 
     x: FloatArray
@@ -80,6 +83,10 @@ class Reconvolution(FrozenArrays):
     u_zz_predicted: FloatArray
     u_zz_gaussian: FloatArray
     residual: FloatArray
+    offset_x: FloatArray | None = None
+    offset_y: FloatArray | None = None
+    load: FloatArray | None = None
+    background: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,6 +128,7 @@ FIELD = record(
     Quantity("y", _L, "position along y", "y", ("y",), required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
     Quantity("g_errors", _PER_AREA, _OF_G, axes=_YX, required=True),
+    Quantity("g_scatter", _PER_AREA, "part of g_errors that scatters between scans", axes=_YX),
     signal="g",
 )
 RADIAL = record(
@@ -166,6 +167,10 @@ RECONVOLUTION = record(
     Quantity("u_zz_predicted", _U, "predicted with the deconvolved G", axes=_X, required=True),
     Quantity("u_zz_gaussian", _U, "predicted with the Gaussian", axes=_X, required=True),
     Quantity("residual", _U, "measured minus predicted", axes=_X, required=True),
+    Quantity("offset_x", _L, "position from the centre along x", axes=_X),
+    Quantity("offset_y", _L, "position from the centre along y", axes=_X),
+    Quantity("load", "force", "load at each point", "P", _X, stored="normal_load"),
+    Quantity("background", _U, "baseline and drift", axes=_X),
     signal="u_zz",
 )
 

@@ -143,7 +143,7 @@ def dataset(result: Calibrated) -> Dataset:
     import xarray
 
     apparatus = apparatus_of(result)
-    field = {"g": "field", "g_errors": "field_errors"}
+    field = {"g": "field", "g_errors": "field_errors", "g_scatter": "field_scatter"}
     of_scan = records.RECONVOLUTION.read_in(apparatus.reading)
     return xarray.Dataset(
         record_arrays(records.RADIAL, apparatus.radial_profile)

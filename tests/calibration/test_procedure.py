@@ -127,6 +127,20 @@ def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
     assert not np.allclose(g, g[:, ::-1], atol=1e-6 * g.max())
 
 
+def test_a_raster_s_points_are_kept_with_place_and_baseline() -> None:
+    scan = simulated(raster=True, points=17, noise=0.005)
+    apparatus = memscal.calibrate(scan).apparatus
+    shown, parameters = apparatus.reconvolution, apparatus.parameters
+    np.testing.assert_allclose(np.hypot(shown.offset_x, shown.offset_y), shown.x)
+    rows = np.unique(np.round(shown.offset_y + parameters["centre_y"], 9))
+    np.testing.assert_allclose(rows, np.unique(scan.y), atol=1e-9)
+    assert shown.background.mean() == pytest.approx(parameters["baseline"])
+    drift = abs(parameters["drift"]) + abs(parameters["drift_y"])
+    assert np.ptp(shown.background) == pytest.approx(drift)
+    assert set(shown.load) == {scan.load}
+    assert 0 < np.linalg.norm(apparatus.field.g_scatter) < np.linalg.norm(apparatus.field.g_errors)
+
+
 def test_a_raster_off_its_lattice_is_refused() -> None:
     scan = simulated(raster=True, points=17)
     x = scan.x.copy()

@@ -1,5 +1,6 @@
 """The estimated profile: noise, outliers, departures from a Gaussian, and refusals."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.stats import chi2
 import memscal
 from memscal.errors import FitError
 from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
+from memscal.estimation.profile import point_messages
 
 
 def test_without_noise_the_profile_is_the_scan() -> None:
@@ -51,6 +53,18 @@ def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> No
     assert np.sum(spoilt.outlier_weight < 0.5) <= 1 + np.sum(clean.outlier_weight < 0.5)
     shift = abs(spoilt.conversion_constant - clean.conversion_constant)
     assert shift < np.sqrt(spoilt.basis.integrals @ spoilt.covariance @ spoilt.basis.integrals)
+
+
+def test_ten_outliers_are_listed_the_largest_first_and_the_others_counted() -> None:
+    scan = simulated(noise=0.002, repeats=9)
+    u, sizes = scan.u_zz.copy(), np.linspace(0.4, 1.6, 13)
+    u[:, ::16].flat[: sizes.size] -= sizes * u.max()
+    listed = [m.text for m in point_messages(estimated(replace(scan, u_zz=u)))]
+    assert len(listed) == 11
+    voltages = [re.findall(r"(-?[\d.]+) mV", text) for text in listed[:10]]
+    departures = [float(expected) - float(measured) for measured, expected in voltages]
+    assert departures == sorted(departures, reverse=True)
+    assert listed[10].startswith("3 more outliers")
 
 
 def test_repeats_narrow_the_uncertainty_as_their_square_root() -> None:

@@ -46,9 +46,13 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
     clean, single = voltage(r, _PARTS), voltage(r, ((1.0, _SIGMA),))
     spread = noise * float(np.max(clean))
     u = clean + rng.normal(0.0, spread, r.size)
+    plane: dict[str, Any] = {}
+    if kind == "radii":
+        plane = {"offset_x": xx.ravel() - _CENTRE, "offset_y": yy.ravel()}
+        plane |= {"load": np.full(r.size, _LOAD), "background": np.full(r.size, _BASELINE)}
     return Reconvolution(
         x=x, u_zz=u, u_zz_errors=np.full(r.size, spread), u_zz_predicted=clean,
-        u_zz_gaussian=single, residual=u - clean,
+        u_zz_gaussian=single, residual=u - clean, **plane,
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.scans import shear_scan
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.patches import Rectangle
 
 import memscal
@@ -33,6 +33,11 @@ def line(axes, label):
 def band(axes):
     (found,) = [each for each in axes.collections if isinstance(each, PolyCollection)]
     return found.get_paths()[0].vertices
+
+
+def selected(scan, chosen):
+    """The points with these numbers."""
+    return replace(scan, **{n: v[chosen] for n, v in vars(scan).items() if v is not None})
 
 
 def texts(figure):
@@ -71,7 +76,7 @@ def test_the_scan_panel_holds_the_points_and_both_reconvolutions(make_apparatus,
 @pytest.mark.parametrize("order", [np.arange(33)[::-1] * 7 % 33, np.tile(np.arange(33), 3)])
 def test_points_out_of_order_and_repeats_of_a_position_share_one_line(make_apparatus, order):
     data = make_apparatus(points=33)
-    scan = replace(data.reconvolution, **{n: v[order] for n, v in vars(data.reconvolution).items()})
+    scan = selected(data.reconvolution, order)
     figure = calibration_figure(replace(data, reconvolution=scan))
     joined = curve(panels(figure)["scan"], "reconvolved, G")
     assert (joined.get_linestyle(), joined.get_xdata().size) == ("-", 33)
@@ -250,8 +255,87 @@ def test_a_raster_is_drawn_against_the_distance_from_its_centre(drawn):
     assert "distance" in axes["scan_log"].get_xlabel()
     x, height = line(axes["scan"], "reference")
     assert x[np.argmax(height)] == 0.0
-    xs, _ = line(axes["scan"], "reconvolved, G")
-    assert np.all(np.diff(xs) >= 0)
+    # No line joins points at all angles about a sensor that need not be round.
+    assert curve(axes["scan"], "reconvolved, G").get_linestyle() == "None"
+
+
+def cells(axes):
+    """Centres and values of the coloured cells of a map, missing ones masked."""
+    (mesh,) = [each for each in axes.collections if isinstance(each, QuadMesh)]
+    corners = mesh.get_coordinates()
+    return (corners[:-1, :-1] + corners[1:, 1:]) / 2, mesh.get_array()
+
+
+def test_a_raster_has_maps_of_voltage_residual_and_g(make_apparatus):
+    data = make_apparatus("radii", 25)
+    scan = selected(data.reconvolution, np.random.default_rng(1).permutation(625)[:600])
+    axes = panels(calibration_figure(replace(data, reconvolution=scan)))
+    offsets = np.stack([scan.offset_x, scan.offset_y], axis=1)
+    shown = {
+        "voltage map": (scan.u_zz - data.parameters["baseline"]) * 1e3,
+        "residual map": scan.residual / scan.u_zz_errors,
+    }
+    for name, values in shown.items():
+        place, drawn = cells(axes[name])
+        assert np.ma.count_masked(drawn) == 25
+        distance = np.linalg.norm(place.reshape(-1, 1, 2) - 1e3 * offsets, axis=2)
+        assert distance.min(axis=0).max() < 1e-9
+        np.testing.assert_allclose(drawn.ravel()[distance.argmin(axis=0)], values, atol=1e-12)
+        assert axes[name].get_aspect() == 1
+        assert "mm" in axes[name].get_xlabel()
+    place, drawn = cells(axes["G map"])
+    assert drawn.max() * 1e6 == pytest.approx(data.field.g.max())
+    units = {"voltage map": "(mV)", "residual map": "/ $u$", "G map": "(1/mm$^2$)"}
+    for name, unit in units.items():
+        (bar,) = axes[name].child_axes
+        assert unit in bar.get_ylabel()
+
+
+def test_points_on_no_lattice_are_dots_at_their_places(make_apparatus):
+    data = make_apparatus("radii", 25)
+    scan = data.reconvolution
+    shifted = scan.offset_x + np.random.default_rng(1).uniform(-3e-4, 3e-4, scan.x.size)
+    data = replace(data, reconvolution=replace(scan, offset_x=shifted))
+    (dots,) = panels(calibration_figure(data))["voltage map"].collections
+    wanted = np.stack([shifted, scan.offset_y], axis=1) * 1e3
+    np.testing.assert_allclose(np.asarray(dots.get_offsets()), wanted)
+
+
+def at_loads(data, *loads):
+    """The points at each of several loads (N), with voltages in proportion."""
+    scan, n = data.reconvolution, data.reconvolution.x.size
+    load = np.repeat(loads, n) * (1 + 5e-3 * np.tile(np.linspace(-1, 1, n), len(loads)))
+    scan = selected(scan, np.tile(np.arange(n), len(loads)))
+    named = {n: getattr(scan, n) * load for n in ("u_zz", "u_zz_predicted", "u_zz_gaussian")}
+    scan = replace(scan, **named, load=load, background=np.zeros(load.size))
+    return replace(data, reconvolution=scan)
+
+
+def test_each_of_several_loads_has_a_panel_and_a_colour(make_apparatus):
+    data = at_loads(make_apparatus(points=33), 0.5, 1.0, 2.0)
+    figure = calibration_figure(data)
+    named = [a for a in figure.axes if any(t.get_text().endswith(" N") for t in a.texts)]
+    assert [a.texts[0].get_text() for a in named] == ["0.5 N", "1 N", "2 N"]
+    for i, axes in enumerate(named):
+        drawn = axes.containers[0].lines[0].get_ydata()
+        np.testing.assert_allclose(drawn, data.reconvolution.u_zz[33 * i : 33 * i + 33] * 1e3)
+    residuals = panels(figure)["residuals"]
+    marks = [curve(residuals, f"{load} N: rms") for load in ("0.5", "1", "2")]
+    assert len({(each.get_color(), each.get_marker()) for each in marks}) == 3
+    assert "0.5 N to 2 N" in texts(figure)
+
+
+def test_of_many_loads_the_first_are_drawn_and_the_others_counted(make_apparatus):
+    figure = calibration_figure(at_loads(make_apparatus(points=9), *np.arange(1.0, 9.0)))
+    shown = [t.get_text() for axes in figure.axes for t in axes.texts if " N" in t.get_text()]
+    assert len(shown) == 6
+    assert shown[-1] == "6 N\nand 2 more loads"
+
+
+def test_a_raster_at_two_loads_has_two_rows_of_maps(make_apparatus):
+    axes = calibration_figure(at_loads(make_apparatus("radii", 9), 0.5, 1.0)).axes
+    maps = [each.get_title("left") for each in axes if each.get_label() == "voltage map"]
+    assert maps == ["0.5 N", "1 N"]
 
 
 def test_voltages_that_share_a_position_are_not_joined_by_a_line(drawn):

@@ -98,11 +98,12 @@ def make_artifact(**changes: Any) -> ApparatusData:
     scan = make_scan()
     voltage = np.nan_to_num(scan.u_zz)
     data = ApparatusData(
-        field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g),
+        field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g, g_scatter=0.005 * g),
         radial_profile=ApparatusRadial(r, radial, errors, radial, np.diag(errors**2)),
         transfer=memscal.TransferFunction(k, modulus, 0.01 * modulus, window, 3.7e3),
         reconvolution=memscal.Reconvolution(
-            scan.x, scan.u_zz, np.full(33, 1e-5), voltage, 1.001 * voltage, scan.u_zz - voltage
+            *(scan.x, scan.u_zz, np.full(33, 1e-5), voltage, 1.001 * voltage),
+            *(scan.u_zz - voltage, scan.x - 1e-5, 0.1 * scan.x, np.ones(33), 0.01 * voltage),
         ),
         parameters=ParameterSet(tuple(values), np.array(list(values.values())), covariance),
         checks=(
