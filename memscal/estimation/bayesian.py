@@ -491,9 +491,9 @@ def weigh_departures(
     least_noise: float = 0.0,
 ) -> WeighedFit:
     """Average departures from a Gaussian fit over the hypotheses."""
-    # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.  Of a
-    # point of weight one, ``expected_noise`` is that of voltages that have none, ``least_noise`` the
-    # least that there is, as stated.
+    # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.
+    # Of a point of weight one, ``expected_noise`` is that of voltages that have none (of a plan),
+    # ``least_noise`` the least that there is, as stated.
     standardised, flat = model.points.standardised, basis.flat
     unexplained, signals = model.points.u - fit.predicted, basis.signals(model, fit)
     columns, data = standardised(signals, weights), standardised(unexplained, weights)
