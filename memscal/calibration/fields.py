@@ -168,7 +168,8 @@ class RasterFields:
                 "lattice; or scan evenly.",
             )
         if lattice is None:
-            steps, nowhere = points.places[0].steps, np.zeros(0, dtype=np.intp)
+            steps = next(places.steps for places in points.places if all(places.steps))
+            nowhere = np.zeros(0, dtype=np.intp)
             lattice = (
                 EvenAxis(float(points.x.min()), steps[0], nowhere),
                 EvenAxis(float(points.y.min()), steps[1], nowhere),
