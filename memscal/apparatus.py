@@ -223,7 +223,7 @@ class ApparatusFunction(Result, ApparatusData):
             reach = int(max(np.abs(getattr(g, name)).max() / step, 1))
             offsets.append(step * np.arange(-reach, reach + 1))
         edge = max(float(np.abs(stress[[0, -1]]).max()), float(np.abs(stress[:, [0, -1]]).max()))
-        self._require_decayed(edge / float(np.abs(stress).max()), "the edge of the field")
+        self._require_decayed(edge, float(np.abs(stress).max()), "the edge of the field")
         outside = [(abs(o) > abs(a).max()) for o, a in zip(offsets, (g.x, g.y), strict=True)]
         kernel = RectBivariateSpline(g.y, g.x, g.g)(offsets[1], offsets[0])
         kernel[outside[1]], kernel[:, outside[0]] = 0.0, 0.0
@@ -242,11 +242,11 @@ class ApparatusFunction(Result, ApparatusData):
                 cure="Give the stress on a finer grid.",
             )
 
-    def _require_decayed(self, left: float, end: str) -> None:
-        """Refuse a stress of which a share is left at its end."""
-        if left > _DECAYED:
+    def _require_decayed(self, left: float, peak: float, end: str) -> None:
+        """Refuse a stress of which a share of its peak is left at its end."""
+        if left > _DECAYED * peak:
             raise InputError(
-                f"{left:.1%} of the largest stress is left at {end}.",
+                f"{left / peak:.1%} of the largest stress is left at {end}.",
                 why="A convolution needs the stress out to where it has decayed.",
                 cure="Extend the table.",
             )
@@ -280,9 +280,8 @@ class ApparatusFunction(Result, ApparatusData):
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
         coarse = float(np.diff(radii)[strong].max(initial=0.0))
         self._require_fine(coarse)
-        self._require_decayed(
-            float(abs(stress[-1])) / peak, f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
-        )
+        end = f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
+        self._require_decayed(float(abs(stress[-1])), peak, end)
         return radii, stress
 
 

@@ -18,7 +18,7 @@ import memscal
 from memscal import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import InputError
-from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
+from memscal.model.apparatus import ApparatusField, ApparatusRadial, ParameterSet, TransferFunction
 from memscal.model.arrays import FloatArray
 
 SUPPORT = 6e-3
@@ -85,6 +85,43 @@ def test_the_convolution_is_that_of_the_lifted_fields() -> None:
     found = with_kernel(kernel).convolve(RADII, stress(RADII))
     # Every fifth of the radii lies on the positive half axis of the plane.
     np.testing.assert_allclose(found[:201:5], direct[80, 80:121], atol=1e-6 * found.max())
+
+
+def elliptic(x: FloatArray, y: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Gaussian of unit integral at positions (y, x)."""
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    form = np.einsum("...i,ij,...j", places, np.linalg.inv(covariance), places)
+    return np.exp(-form / 2) / (2 * np.pi * np.sqrt(np.linalg.det(covariance)))
+
+
+def test_a_field_is_convolved_with_g_over_the_plane() -> None:
+    sensor, force = np.array([[0.5, 0.2], [0.2, 0.3]]) * 1e-6, np.array([[1.0, -0.6], [-0.6, 2.0]])
+    axis = np.linspace(-4e-3, 4e-3, 161)
+    field = ApparatusField(axis, axis, elliptic(axis, axis, sensor), np.zeros((161, 161)))
+    data = make_artifact(field=field)
+    apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
+    x, y = np.linspace(-8e-3, 8e-3, 101), np.linspace(-9e-3, 9e-3, 91)
+    stress = 3.0 * elliptic(x, y, force * 1e-6)
+    exact = 3.0 * elliptic(x, y, sensor + force * 1e-6)
+    blurred = apparatus.convolve(x, stress, y=y)
+    np.testing.assert_allclose(blurred, exact, atol=1e-5 * exact.max())
+    volts = apparatus.predict(x, stress, y=y)
+    np.testing.assert_allclose(volts, apparatus.conversion_constant * blurred)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "shape", "problem"),
+    [
+        (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 80), (81, 81), "80 positions"),
+        (np.linspace(-8, 8, 81), np.linspace(-8e-3, 8e-3, 81), (81, 81), "200 mm"),
+        (np.geomspace(1e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81, 81), "not even"),
+        (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81, 81), "the edge"),
+        (np.linspace(-8e-3, 8e-3, 81), np.linspace(-8e-3, 8e-3, 81), (81,), "no field"),
+    ],
+)
+def test_a_field_that_cannot_be_convolved_is_refused(apparatus, x, y, shape, problem) -> None:
+    with pytest.raises(InputError, match=problem):
+        apparatus.predict(x, np.ones(shape), y=y)
 
 
 def test_the_force_is_kept_up_to_the_integral_of_the_apparatus_function() -> None:
