@@ -28,12 +28,11 @@ from scipy.fft import fftshift, ifftshift, irfft2, rfft2
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix, square_root
-from memscal.estimation.forward import elliptic_departure
 from memscal.estimation.profile import ProfileEstimate
 from memscal.model.arrays import FloatArray
 
-#: Relative step of the derivatives of an ellipse; windows below this have closed.
-_STEP, _CLOSED = 1e-4, 1e-9
+#: Windows below this have closed.
+_CLOSED = 1e-9
 
 
 def field_errors(
@@ -68,25 +67,10 @@ def _kernels(estimate: ProfileEstimate, fields: RasterFields) -> FloatArray:
     """Kernels of all parameters about the centre on the lattice, (nodes, p)."""
     from scipy.interpolate import CubicSpline
 
-    grid, basis, fit = fields.central, estimate.basis, estimate.gaussian
+    grid = fields.central
     table = np.arange(0.0, float(grid.radius.max()) + 4 * fields.step, fields.step)
-    columns = CubicSpline(table, basis.radial(table))(grid.radius.ravel())
-    if estimate.points.ellipse:
-        e, end = estimate.ellipticity, fit.jacobian.shape[1]
-
-        def oval(sigma: float, *ellipticity: float) -> FloatArray:
-            return elliptic_departure(*grid.axes, sigma, np.array(ellipticity)).ravel()
-
-        round_ = oval(fit.sigma, *e)
-        columns[:, 0] += round_
-        a, width = fit.conversion_constant, (1 + _STEP) * fit.sigma
-        columns[:, 1] += a * (oval(width, *e) - round_) / (_STEP * fit.sigma)
-        columns[:, end - 2] += a * (oval(fit.sigma, e[0] + _STEP, e[1]) - round_) / _STEP
-        columns[:, end - 1] += a * (oval(fit.sigma, e[0], e[1] + _STEP) - round_) / _STEP
-    if basis.angular:
-        x, y = (axis.ravel() for axis in np.meshgrid(*grid.axes))
-        columns[:, basis.flat - basis.angular.count : basis.flat] = basis.angular.at(x, y)
-    return columns
+    radial = CubicSpline(table, estimate.basis.radial(table))(grid.radius.ravel())
+    return np.asarray(radial + estimate.oval_columns(*grid.axes))
 
 
 def _of_posterior(

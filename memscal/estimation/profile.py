@@ -25,6 +25,8 @@ NUMERICAL_FLOOR = 1e-6
 #: A conversion constant must exceed this many of its standard uncertainties.
 LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
+#: Relative step of the derivatives of an ellipse.
+_STEP = 1e-4
 
 
 class CentreError(FitError):
@@ -132,22 +134,32 @@ class ProfileEstimate:
         """The first scan's baseline and its change over half the range along x (and y), in V."""
         return self.drifts[: 1 + int(self.points.free[0].sum())]
 
-    @property
-    def ellipticity(self) -> FloatArray:
-        """Ellipticity along x against y and along the diagonals, shape (2,)."""
-        end = self.gaussian.jacobian.shape[1]
-        change = self.weighed.mean[end - self.points.ellipse : end]
-        return self.gaussian.ellipticity + np.append(change, np.zeros(2 - change.size))
-
     def oval_kernel(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
-        fit, around = self.gaussian, self.basis.angular
-        kernel = fit.conversion_constant * elliptic_departure(x, y, fit.sigma, self.ellipticity)
+        fit = self.gaussian
+        kernel = fit.conversion_constant * elliptic_departure(x, y, fit.sigma, fit.ellipticity)
+        return np.asarray(
+            kernel + (self.oval_columns(x, y) @ self.weighed.mean).reshape(kernel.shape)
+        )
+
+    def oval_columns(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """What of the posterior's columns is not round, on a grid: shape (y x, p)."""
+        fit, around, flat = self.gaussian, self.basis.angular, self.basis.flat
+        columns = np.zeros((y.size * x.size, self.basis.integrals.size))
+        if self.points.ellipse:
+            place = np.append(fit.sigma, fit.ellipticity)
+            steps = _STEP * np.diag([fit.sigma, 1.0, 1.0])
+            oval, *moved = (
+                elliptic_departure(x, y, p[0], p[1:]).ravel() for p in (place, *(place + steps))
+            )
+            end = fit.jacobian.shape[1]
+            columns[:, 0] = oval
+            for column, other, step in zip((1, end - 2, end - 1), moved, steps, strict=True):
+                columns[:, column] = fit.conversion_constant * (other - oval) / step.sum()
         if around:
-            amplitudes = self.weighed.mean[self.basis.flat - around.count : self.basis.flat]
-            plane = np.meshgrid(x, y)
-            kernel += (around.at(*(p.ravel() for p in plane)) @ amplitudes).reshape(kernel.shape)
-        return kernel
+            plane = (axis.ravel() for axis in np.meshgrid(x, y))
+            columns[:, flat - around.count : flat] = around.at(*plane)
+        return columns
 
     @property
     def oval(self) -> FloatArray:
