@@ -4,11 +4,9 @@ Each draw is a scan with new noise and other true inputs; it states the nominal 
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Integral
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -18,6 +16,7 @@ from memscal.calibration import uncertainty
 from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import BUDGETED, InputEffect
+from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
@@ -26,10 +25,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.result import Result
 from memscal.model.scan import Scan
-from memscal.parallel import require_workers, single_threaded, worker_pool
-
-#: Draws that a process takes at a time.
-_LARGEST_BLOCK = 8
+from memscal.parallel import in_processes, require_workers, single_threaded
 
 
 @dataclass(frozen=True)
@@ -62,30 +58,26 @@ class DrawnScans:
     def all_results(
         self, draws: int, workers: int, progress: Callable[[int, int], None] | None
     ) -> tuple[list[FloatArray], list[str]]:
-        """Calibrate all draws, in their order; see :meth:`results`."""
-        block = max(1, min(_LARGEST_BLOCK, draws // (4 * workers)))
-        starts = range(0, draws, block)
-        ends = [min(start + block, draws) for start in starts]
-        rows: list[FloatArray] = []
-        failures: list[str] = []
-        with nullcontext() if workers == 1 else worker_pool(min(workers, len(ends))) as pool:
-            blocks = (map if pool is None else pool.map)(self.results, starts, ends)
-            for end, (good, bad) in zip(ends, blocks, strict=True):
-                rows += good
-                failures += bad
-                if progress is not None:
-                    progress(end, draws)
+        """Calibrate all draws, in their order: their :meth:`result`, and why some failed."""
+        rows, failures = [], []
+        for done, result in enumerate(in_processes(self.result, range(draws), workers), start=1):
+            if isinstance(result, str):
+                failures.append(result)
+            else:
+                rows.append(result)
+            if progress is not None:
+                progress(done, draws)
         return rows, failures
 
-    def results(self, first: int, last: int) -> tuple[list[FloatArray], list[str]]:
-        """Parameters and G of draws ``first`` to ``last`` - 1, in rows, and why some failed."""
-        rows, failures = [], []
-        for index in range(first, last):
-            try:
-                rows.append(self._calibrated(self.draw(index)) + self._shift_by_law(index))
-            except MemscalError as failure:
-                failures.append(failure.problem)
-        return rows, failures
+    def result(self, index: int) -> FloatArray | str:
+        """Calibrate a draw by the calibration's own steps: parameters and G, or why it failed."""
+        first = self.solution
+        stresses, method, channel = first.stresses, first.method, first.estimate.points.channel
+        try:
+            solution = solve(self.draw(index), stresses, method, channel, both=False)
+            return self._results_of(solution) + self._shift_by_law(index)
+        except MemscalError as failure:
+            return failure.problem
 
     def draw(self, index: int) -> list[Scan]:
         """Return the scans of one draw."""
@@ -98,10 +90,14 @@ class DrawnScans:
         residual = points.u - uncertainty.drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise
-        return [
-            _with_voltages(scan, points.channel, voltages[points.scan == i])
-            for i, scan in enumerate(self.solution.scans)
-        ]
+        channel, scans = points.channel, []
+        for i, scan in enumerate(self.solution.scans):
+            u = np.full(scan.u_zz.shape, np.nan)
+            u[measured_mask(scan, channel)] = voltages[points.scan == i]
+            channels = {**scan.channels, f"u_{channel}": u}
+            zz = channel == "zz"
+            scans.append(replace(scan, u_zz=u) if zz else replace(scan, channels=channels))
+        return scans
 
     def _random(self, index: int) -> tuple[np.random.Generator, dict[str, FloatArray]]:
         """Return the generator of a draw, and its inputs' errors over their uncertainties."""
@@ -180,35 +176,19 @@ class DrawnScans:
             for i in item.scans:
                 owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
                 true[i] = replace(true[i], **{item.component: owner})
-        rods = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
-        laws = [law_at_once(scan) for scan in self.solution.scans]
-        return tuple(
-            replace(
-                ref, values=(rod_spectrum(scan, ref, law) - nominal) * relative(ref.values, nominal)
-            )
-            for (scan, ref, nominal), law in zip(rods, laws, strict=True)
-        )
-
-    def _calibrated(self, scans: list[Scan]) -> FloatArray:
-        """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
-        first = self.solution
-        channel = first.estimate.points.channel
-        return self._results_of(solve(scans, first.stresses, first.method, channel, both=False))
+        references = self.solution.estimate.model.references
+        laws, changes = [law_at_once(scan) for scan in self.solution.scans], []
+        for scan, ref, nominal, law in zip(true, references, self._nominal, laws, strict=True):
+            change = rod_spectrum(scan, ref, law) - nominal
+            changes.append(replace(ref, values=change * relative(ref.values, nominal)))
+        return tuple(changes)
 
     def _results_of(self, solution: Solution) -> FloatArray:
+        """Parameters, and G read off at the radii of the calibration."""
         radii = self.solution.deconvolution.g.r
         numbers, g = uncertainty.read_off(solution.deconvolution, radii)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
-
-
-def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
-    """Return the scan with other voltages of a channel at its measured points, shape (n,)."""
-    u = np.full(scan.u_zz.shape, np.nan)
-    u[measured_mask(scan, channel)] = voltages
-    if channel == "zz":
-        return replace(scan, u_zz=u)
-    return replace(scan, channels={**scan.channels, f"u_{channel}": u})
 
 
 _COVERAGE = 0.95
@@ -357,11 +337,8 @@ def monte_carlo(
     >>> 0.4 < drawn["gaussian_sigma"].ratio < 1.6
     True
     """
-    numbers: list[tuple[str, Any, int]] = [("draws", draws, 2), ("seed", seed, 0)]
-    for name, value, least in numbers:
-        if not isinstance(value, Integral) or int(value) < least:
-            problem = f"{name} is {value!r}, but it is a whole number from {least} on."
-            raise InputError(problem, cure=f"Give {name}={least} or more.")
+    require_count("monte_carlo", "draws", draws, 2)
+    require_count("monte_carlo", "seed", seed, 0)
     require_workers(workers)
     solution, effects = calibration.solution, calibration.effects
     model = DrawnScans(solution, effects, calibration.correlations, seed)
