@@ -37,17 +37,6 @@ _KINDS = {
 }
 
 
-def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
-    if estimate.points.u_errors is None:
-        return []
-    meaning = (
-        f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. A "
-        "failure means that something besides electronic noise scatters the scan, such as position "
-        "or load; the uncertainties have been raised accordingly."
-    )
-    return [check("noise_as_stated", estimate.weighed.noise, quality.NOISE_LIMIT, meaning)]
-
-
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
     """Compare what no G explains with the stated noise, or with the scatter of repeats."""
     degrees = residuals.degrees
@@ -96,14 +85,14 @@ def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
 
 
 def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
-    departure = assumptions.departure_test(estimate)
+    log_factor, kind, share = assumptions.departure_test(estimate)
     meaning = (
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
         "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
         "means that G is not Gaussian: use the deconvolved G. The most probable departure is "
-        f"{_KINDS[departure.kind]} ({departure.share:.0%} of them)."
+        f"{_KINDS[kind]} ({share:.0%} of them)."
     )
-    return check("gaussian_evidence", departure.log_bayes_factor, _LOG_BAYES_LIMIT, meaning)
+    return check("gaussian_evidence", log_factor, _LOG_BAYES_LIMIT, meaning)
 
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
@@ -254,6 +243,7 @@ _MOST_NAMED = 12
 def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
     estimate, residuals = solution.estimate, unexplained.residuals_of(solution.estimate)
+    noise = quality.noise_check(estimate.weighed.noise, estimate.points.channel)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
@@ -262,7 +252,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_shape(solution, results.parameters),
         *_set_up(solution),
         _indentation(solution, results),
-        *_noise(estimate),
+        *([] if estimate.points.u_errors is None else [noise]),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
         _symmetry(estimate),
