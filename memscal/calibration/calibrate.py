@@ -13,7 +13,7 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
-from memscal.calibration.drawn_scatter import drawn_scatter, is_linear
+from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.field_uncertainty import field_errors
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
@@ -162,6 +162,9 @@ def _reconvolution(solution: Solution) -> Reconvolution:
         residual=(points.u - predicted)[order],
     )
 
+
+#: Methods whose derivatives are complete.
+_LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
 Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 """A base stress, the path of a file that holds one, or nothing: the rod is solved."""
@@ -460,7 +463,7 @@ def uncertainties(
     """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
     # A linear method's derivatives are complete; of another, the scatter of draws is taken.
-    linear = deconvolution is not solution.deconvolution or is_linear(solution.method)
+    linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
     drawn = None if linear else drawn_scatter(solution)
     results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
     plane = field_errors(solution, deconvolution, effects, correlations)

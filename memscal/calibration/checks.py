@@ -37,6 +37,11 @@ _KINDS = {
 }
 
 
+def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
+    noise = quality.noise_check(estimate.weighed.noise, estimate.points.channel)
+    return [] if estimate.points.u_errors is None else [noise]
+
+
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
     """Compare what no G explains with the stated noise, or with the scatter of repeats."""
     degrees = residuals.degrees
@@ -243,7 +248,6 @@ _MOST_NAMED = 12
 def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
     estimate, residuals = solution.estimate, unexplained.residuals_of(solution.estimate)
-    noise = quality.noise_check(estimate.weighed.noise, estimate.points.channel)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
@@ -252,7 +256,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_shape(solution, results.parameters),
         *_set_up(solution),
         _indentation(solution, results),
-        *([] if estimate.points.u_errors is None else [noise]),
+        *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
         _symmetry(estimate),

@@ -35,8 +35,10 @@ def is_linear(method: Method) -> bool:
     return isinstance(method, _LINEAR)
 
 
-def drawn_scatter(solution: Solution) -> DrawnScatter:
-    """Repeat the division on drawn voltages, for a method that is not linear."""
+def drawn_scatter(solution: Solution) -> DrawnScatter | None:
+    """Repeat the division on drawn voltages; ``None`` for a linear method, which needs none."""
+    if is_linear(solution.method):
+        return None
     count = draw_count(solution)
     rng = np.random.default_rng([0, count])
     errors, results, failure = [], [], ""

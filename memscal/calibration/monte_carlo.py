@@ -70,12 +70,9 @@ class DrawnScans:
         return rows, failures
 
     def result(self, index: int) -> FloatArray | str:
-        """Calibrate a draw by the calibration's own steps: parameters and G, or why it failed."""
-        first = self.solution
-        stresses, method, channel = first.stresses, first.method, first.estimate.points.channel
+        """Parameters and G of a draw, in one row, or why it failed."""
         try:
-            solution = solve(self.draw(index), stresses, method, channel, both=False)
-            return self._results_of(solution) + self._shift_by_law(index)
+            return self._calibrated(self.draw(index)) + self._shift_by_law(index)
         except MemscalError as failure:
             return failure.problem
 
@@ -90,14 +87,10 @@ class DrawnScans:
         residual = points.u - uncertainty.drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise
-        channel, scans = points.channel, []
-        for i, scan in enumerate(self.solution.scans):
-            u = np.full(scan.u_zz.shape, np.nan)
-            u[measured_mask(scan, channel)] = voltages[points.scan == i]
-            channels = {**scan.channels, f"u_{channel}": u}
-            zz = channel == "zz"
-            scans.append(replace(scan, u_zz=u) if zz else replace(scan, channels=channels))
-        return scans
+        return [
+            _with_voltages(scan, points.channel, voltages[points.scan == i])
+            for i, scan in enumerate(self.solution.scans)
+        ]
 
     def _random(self, index: int) -> tuple[np.random.Generator, dict[str, FloatArray]]:
         """Return the generator of a draw, and its inputs' errors over their uncertainties."""
@@ -176,19 +169,35 @@ class DrawnScans:
             for i in item.scans:
                 owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
                 true[i] = replace(true[i], **{item.component: owner})
-        references = self.solution.estimate.model.references
-        laws, changes = [law_at_once(scan) for scan in self.solution.scans], []
-        for scan, ref, nominal, law in zip(true, references, self._nominal, laws, strict=True):
-            change = rod_spectrum(scan, ref, law) - nominal
-            changes.append(replace(ref, values=change * relative(ref.values, nominal)))
-        return tuple(changes)
+        rods = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
+        laws = [law_at_once(scan) for scan in self.solution.scans]
+        return tuple(
+            replace(
+                ref, values=(rod_spectrum(scan, ref, law) - nominal) * relative(ref.values, nominal)
+            )
+            for (scan, ref, nominal), law in zip(rods, laws, strict=True)
+        )
+
+    def _calibrated(self, scans: list[Scan]) -> FloatArray:
+        """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
+        first = self.solution
+        channel = first.estimate.points.channel
+        return self._results_of(solve(scans, first.stresses, first.method, channel, both=False))
 
     def _results_of(self, solution: Solution) -> FloatArray:
-        """Parameters, and G read off at the radii of the calibration."""
         radii = self.solution.deconvolution.g.r
         numbers, g = uncertainty.read_off(solution.deconvolution, radii)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
+
+
+def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
+    """Return the scan with other voltages of a channel at its measured points, shape (n,)."""
+    u = np.full(scan.u_zz.shape, np.nan)
+    u[measured_mask(scan, channel)] = voltages
+    if channel == "zz":
+        return replace(scan, u_zz=u)
+    return replace(scan, channels={**scan.channels, f"u_{channel}": u})
 
 
 _COVERAGE = 0.95
