@@ -59,25 +59,20 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
     predicted = {int(i): _predict(model, columns, fold == i) for i in np.unique(fold)}
     outcomes = {i: outcome for i, outcome in predicted.items() if outcome is not None}
-    if len(outcomes) < 2:
+    if (folds := len(outcomes)) < 2:
         return None
-    p_values = {
-        i: float(chdtrc(degrees, degrees * x) if rest is None else fdtrc(degrees, rest, x))
-        for i, (x, degrees, rest) in outcomes.items()
-    }
-    worst = min(p_values, key=lambda i: p_values[i])
+    worst = min(outcomes, key=lambda i: outcomes[i][0])
+    p_value, value, degrees, rest = outcomes[worst]
     # The worst of several is worse than one: Bonferroni's correction, for any dependence.
-    folds = len(outcomes)
-    p_value, share = min(folds * p_values[worst], 1.0), FALSE_ALARM / folds
-    value, degrees, rest = outcomes[worst]
+    p_value, share = min(folds * p_value, 1.0), FALSE_ALARM / folds
     limit = chdtri(degrees, share) / degrees if rest is None else fdtri(degrees, rest, 1 - share)
     return HeldOut(value, float(limit), p_value, worst, folds, alone=count <= _MOST_FOLDS)
 
 
 def _predict(
     model: FreeModel, nuisances: FloatArray, out: NDArray[np.bool_]
-) -> tuple[float, int, int | None] | None:
-    """Chi-square per degree, its degrees, and those of the others if no noise is stated."""
+) -> tuple[float, float, int, int | None] | None:
+    """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
     others, others_degrees = _residual(model.design[~out], model.data[~out])
     both, both_degrees = _residual(np.hstack([model.design, nuisances * out[:, None]]), model.data)
     degrees = both_degrees - others_degrees
@@ -85,8 +80,9 @@ def _predict(
         return None
     value = max(both - others, 0.0) / degrees
     if model.stated:
-        return value, degrees, None
-    return value / max(others / others_degrees, np.finfo(float).tiny), degrees, others_degrees
+        return float(chdtrc(degrees, degrees * value)), value, degrees, None
+    value /= max(others / others_degrees, np.finfo(float).tiny)
+    return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
 
 
 def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:

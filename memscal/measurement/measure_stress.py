@@ -81,16 +81,16 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
-    off = profile.force / profile.load - 1
     allowed = float(np.linalg.norm([*_relative(profile).values(), restore.NEGLIGIBLE_FORCE]))
+    off = abs(profile.force / profile.load - 1) / allowed
     return check(
         "applied_force",
-        abs(off) / allowed,
+        off,
         restore.FORCE_LIMIT,
         f"Difference of the profile's total force, {profile.force:.4g} N, from the applied load of "
         f"{profile.load:.4g} N, over its standard uncertainty of {allowed * profile.load:.2g} N. "
         + _FORCE,
-        _two_sided(off / allowed),
+        float(erfc(off / math.sqrt(2))),
     )
 
 
@@ -98,19 +98,16 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
     """Return the check of the force of all profiles together."""
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
+    off = abs(mean - 1) / allowed
     return check(
         "applied_force_all",
-        abs(mean - 1) / allowed,
+        off,
         _MEAN_LIMIT,
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
         f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
         "difference from one is counted. " + _FORCE + _BLIND,
-        _two_sided((mean - 1) / allowed),
+        float(erfc(off / math.sqrt(2))),
     )
-
-
-def _two_sided(z: float) -> float:
-    return float(erfc(abs(z) / math.sqrt(2)))
 
 
 #: Messages of a restoration that the measured stress gives itself.
