@@ -293,11 +293,16 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     if start is None:
         start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
 
+    def misfit(scaled: FloatArray) -> FloatArray:
+        return root * (unit_gaussian(r, scaled[0] * start) - radial) * start**2
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
+
     def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
         # A step may lead beyond the narrowest width, where the search with a bound takes over.
-        width = max(scaled[0], narrowest / start) * start
-        misfit = root * (unit_gaussian(r, width) - radial) * start**2
-        return misfit, (root * unit_gaussian_slope(r, width) * start**3)[:, None]
+        inside = np.maximum(scaled, narrowest / start)
+        return misfit(inside), slope(inside)
 
     begin = np.array([max(start, 2 * narrowest) / start])
     width = gauss_newton(linearise, begin, tolerance=1e-10)
@@ -305,10 +310,8 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         return float(width[0] * start)
     from scipy.optimize import least_squares
 
-    bounded = least_squares(
-        lambda scaled: linearise(scaled)[0], begin, lambda scaled: linearise(scaled)[1],
-        (narrowest / start, np.inf), xtol=1e-12, ftol=1e-14, gtol=1e-14,
-    )  # fmt: skip
+    bounds = (narrowest / start, np.inf)
+    bounded = least_squares(misfit, begin, slope, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
     return float(bounded.x[0] * start)
 
 
