@@ -55,20 +55,6 @@ class DrawnScans:
     correlations: Mapping[tuple[str, str], float]
     seed: int
 
-    def all_results(
-        self, draws: int, workers: int, progress: Callable[[int, int], None] | None
-    ) -> tuple[list[FloatArray], list[str]]:
-        """Calibrate all draws, in their order: their :meth:`result`, and why some failed."""
-        rows, failures = [], []
-        for done, result in enumerate(in_processes(self.result, range(draws), workers), start=1):
-            if isinstance(result, str):
-                failures.append(result)
-            else:
-                rows.append(result)
-            if progress is not None:
-                progress(done, draws)
-        return rows, failures
-
     def result(self, index: int) -> FloatArray | str:
         """Parameters and G of a draw, in one row, or why it failed."""
         try:
@@ -351,7 +337,12 @@ def monte_carlo(
     require_workers(workers)
     solution, effects = calibration.solution, calibration.effects
     model = DrawnScans(solution, effects, calibration.correlations, seed)
-    rows, failures = model.all_results(draws, workers, progress)
+    rows: list[FloatArray] = []
+    failures: list[str] = []
+    for done, result in enumerate(in_processes(model.result, range(draws), workers), start=1):
+        (failures if isinstance(result, str) else rows).append(result)
+        if progress is not None:
+            progress(done, draws)
     if len(rows) < 2:
         raise FitError(
             f"{len(failures)} of {draws} draws could not be calibrated.",
@@ -359,19 +350,19 @@ def monte_carlo(
             cure="The scan is close to failing, too; measure with less noise.",
         )
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
-    expected, result = uncertainty.expected_values(solution), solution.deconvolution
+    expected, deconvolution = uncertainty.expected_values(solution), solution.deconvolution
     comparisons = tuple(
         _compared(calibration, name, expected[name], column, model.solved)
         for name, column in zip(BUDGETED, samples.T, strict=True)
     )
-    first_order = uncertainties(solution, result, effects, calibration.correlations)
+    first_order = uncertainties(solution, deconvolution, effects, calibration.correlations)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         sources=("noise", *effects),
         samples=samples,
         comparisons=comparisons,
-        r=result.g.r,
+        r=deconvolution.g.r,
         g_mean=g.mean(axis=0),
         g_uncertainty=g.std(axis=0, ddof=1),
         g_symmetric=np.quantile(g, _TAILS, axis=0),
@@ -393,7 +384,11 @@ def _compared(
     mean, spread = float(column.mean()), float(column.std(ddof=1))
     # Of the inputs and noise; a correlation's contribution has a sign.
     parts = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
-    error, u = spread * _sampling_error(column), float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
+    u = float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
+    # The standard uncertainty of the standard deviation, by the kurtosis of the draws.
+    square = (column - mean) ** 2
+    kurtosis = float(np.mean(square**2) / np.mean(square) ** 2) if spread > 0 else 1.0
+    error = spread * float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * column.size)))
     # Beyond what the number of draws allows: two standard errors.
     same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
@@ -438,14 +433,6 @@ def shortest_interval(draws: FloatArray) -> FloatArray:
     first = np.argmin(ordered[held:] - ordered[:-held], axis=0)[None]
     lower = np.take_along_axis(ordered, first, axis=0)
     return np.concatenate([lower, np.take_along_axis(ordered, first + held, axis=0)])
-
-
-def _sampling_error(draws: FloatArray) -> float:
-    """Relative standard uncertainty of the draws' standard deviation, by their kurtosis."""
-    centred = draws - draws.mean()
-    variance = float(np.mean(centred**2))
-    kurtosis = float(np.mean(centred**4)) / variance**2 if variance > 0 else 1.0
-    return float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * draws.size)))
 
 
 def _messages(

@@ -96,7 +96,9 @@ class PressureShape:
         m = self.exponent
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
         rise = k * first - ratio * width**2 * k**3 * self._order(2, k, width)
-        share = 0.5 * self._share(k)
+        x, nu = k * self.film.thickness, self.film.poisson_ratio
+        pull = base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu)
+        share = 0.5 * self.shear * pull
         return plain - share * k * width * first, slope - share * rise
 
     def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
@@ -105,10 +107,6 @@ class PressureShape:
             return gaussian_transfer(k, width)
         square = 2 * (self.exponent + 2) * width**2
         return np.asarray(hyp0f1(self.exponent + further + 2, -square * k**2 / 4))
-
-    def _share(self, k: FloatArray) -> FloatArray:
-        x, nu = k * self.film.thickness, self.film.poisson_ratio
-        return self.shear * (base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
