@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from numbers import Integral
@@ -94,3 +94,18 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         _SET_BY_POOL.difference_update(unset)
         for name in unset:
             os.environ.pop(name, None)
+
+
+#: Items that a process takes at a time.
+_LARGEST_CHUNK = 16
+
+
+def in_processes(function: Callable[..., Any], items: Sequence[Any], workers: int) -> Iterator[Any]:
+    """Yield what a function returns for each item, in their order; one worker is this process."""
+    workers = min(workers, len(items))
+    if workers < 2:
+        yield from map(function, items)
+        return
+    chunk = max(1, min(_LARGEST_CHUNK, len(items) // (4 * workers)))
+    with worker_pool(workers) as pool:
+        yield from pool.map(function, items, chunksize=chunk)

@@ -38,14 +38,8 @@ _KINDS = {
 
 
 def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
-    if estimate.points.u_errors is None:
-        return []
-    meaning = (
-        f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. A "
-        "failure means that something besides electronic noise scatters the scan, such as position "
-        "or load; the uncertainties have been raised accordingly."
-    )
-    return [check("noise_as_stated", estimate.weighed.noise, quality.NOISE_LIMIT, meaning)]
+    noise = quality.noise_check(estimate.weighed.noise, estimate.points.channel)
+    return [] if estimate.points.u_errors is None else [noise]
 
 
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
@@ -96,14 +90,14 @@ def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
 
 
 def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
-    departure = assumptions.departure_test(estimate)
+    log_factor, kind, share = assumptions.departure_test(estimate)
     meaning = (
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
         "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
         "means that G is not Gaussian: use the deconvolved G. The most probable departure is "
-        f"{_KINDS[departure.kind]} ({departure.share:.0%} of them)."
+        f"{_KINDS[kind]} ({share:.0%} of them)."
     )
-    return check("gaussian_evidence", departure.log_bayes_factor, _LOG_BAYES_LIMIT, meaning)
+    return check("gaussian_evidence", log_factor, _LOG_BAYES_LIMIT, meaning)
 
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:

@@ -7,7 +7,6 @@ numbers of its own.  Profile, centre, baseline and width follow the voltages to 
 do for every method; band, grid and fields are made anew; the weights of the points are kept.
 """
 
-from collections.abc import Iterator
 from dataclasses import is_dataclass, replace
 from typing import Any
 
@@ -35,22 +34,28 @@ def is_linear(method: Method) -> bool:
     return isinstance(method, _LINEAR)
 
 
-def drawn_scatter(
-    solution: Solution, draws: int | None = None, seed: int = 0
-) -> DrawnScatter | None:
+def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     """Repeat the division on drawn voltages; ``None`` for a linear method, which needs none."""
     if is_linear(solution.method):
         return None
-    count = draw_count(solution) if draws is None else draws
-    rng = np.random.default_rng([seed, count])
+    count = draw_count(solution)
+    rng = np.random.default_rng([0, count])
     errors, results, failure = [], [], ""
     method: Any = solution.method
     seeded = is_dataclass(method) and hasattr(method, "seed")
-    for error, estimate in _drawn_estimates(solution.estimate, rng, count):
-        new_seed = int(rng.integers(2**32))
+    estimate, weighed = solution.estimate, solution.estimate.weighed
+    model, predicted, root = estimate.model, estimate.predicted, estimate.noise_root
+    design = estimate.basis.signals(model, estimate.gaussian)
+    for _ in range(count):
+        # Noise of the voltages (n,), in V, with which the estimate moves to first order.
+        error = root @ rng.standard_normal(predicted.size)
+        new_seed, change = int(rng.integers(2**32)), weighed.gain @ error
+        drawn_model = replace(model, points=replace(model.points, u=predicted + error))
+        drawn = replace(weighed, mean=weighed.mean + change, residual=error - design @ change)
+        moved = replace(estimate, model=drawn_model, weighed=drawn)
         try:
             other = replace(method, seed=new_seed) if seeded else method
-            results.append(_divided(solution, estimate, error, other))
+            results.append(_divided(solution, moved, error, other))
             errors.append(error)
         except FitError as problem:
             failure = problem.problem
@@ -77,22 +82,6 @@ def _columns(rows: Any) -> FloatArray:
     """Draws (m, ...) less their mean over sqrt(m - 1), the draw as the last axis."""
     values = np.array(rows)
     return np.asarray(np.moveaxis(values - values.mean(axis=0), 0, -1) / np.sqrt(len(values) - 1))
-
-
-def _drawn_estimates(
-    estimate: ProfileEstimate, rng: np.random.Generator, count: int
-) -> Iterator[tuple[FloatArray, ProfileEstimate]]:
-    """Draw noise of the voltages (n,), in V; move estimate and width with it to first order."""
-    model, fit, basis = estimate.model, estimate.gaussian, estimate.basis
-    design = basis.signals(model, fit)
-    predicted, root, weighed = estimate.predicted, estimate.noise_root, estimate.weighed
-    for _ in range(count):
-        error = root @ rng.standard_normal(predicted.size)
-        change = weighed.gain @ error
-        drawn_model = replace(model, points=replace(model.points, u=predicted + error))
-        mean, residual = weighed.mean + change, error - design @ change
-        drawn = replace(weighed, mean=mean, residual=residual)
-        yield error, replace(estimate, model=drawn_model, weighed=drawn)
 
 
 def _divided(

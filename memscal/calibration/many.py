@@ -14,10 +14,7 @@ from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.result import Result
 from memscal.model.scan import Scan
-from memscal.parallel import require_workers, worker_pool
-
-#: Scans that a process takes at a time.
-_LARGEST_CHUNK = 16
+from memscal.parallel import in_processes, require_workers
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -115,12 +112,7 @@ def calibrate_many(
     of_method = {name: value for name, value in options.items() if name not in others}
     chosen_method(method, of_method, seed=seed)
     task = partial(_calibrated, options=options)
-    items = list(enumerate(scans))
-    if workers == 1 or len(items) < 2:
-        return list(map(task, items))
-    chunk = max(1, min(_LARGEST_CHUNK, len(items) // (4 * workers)))
-    with worker_pool(min(workers, len(items))) as pool:
-        return list(pool.map(task, items, chunksize=chunk))
+    return list(in_processes(task, list(enumerate(scans)), workers))
 
 
 def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:

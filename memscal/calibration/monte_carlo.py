@@ -4,11 +4,9 @@ Each draw is a scan with new noise and other true inputs; it states the nominal 
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Integral
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -18,6 +16,7 @@ from memscal.calibration import uncertainty
 from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import BUDGETED, InputEffect
+from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
@@ -27,10 +26,7 @@ from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.scan import Scan
-from memscal.parallel import require_workers, single_threaded, worker_pool
-
-#: Draws that a process takes at a time.
-_LARGEST_BLOCK = 8
+from memscal.parallel import in_processes, require_workers, single_threaded
 
 
 @dataclass(frozen=True)
@@ -60,33 +56,12 @@ class DrawnScans:
     correlations: Mapping[tuple[str, str], float]
     seed: int
 
-    def all_results(
-        self, draws: int, workers: int, progress: Callable[[int, int], None] | None
-    ) -> tuple[list[FloatArray], list[str]]:
-        """Calibrate all draws, in their order; see :meth:`results`."""
-        block = max(1, min(_LARGEST_BLOCK, draws // (4 * workers)))
-        starts = range(0, draws, block)
-        ends = [min(start + block, draws) for start in starts]
-        rows: list[FloatArray] = []
-        failures: list[str] = []
-        with nullcontext() if workers == 1 else worker_pool(min(workers, len(ends))) as pool:
-            blocks = (map if pool is None else pool.map)(self.results, starts, ends)
-            for end, (good, bad) in zip(ends, blocks, strict=True):
-                rows += good
-                failures += bad
-                if progress is not None:
-                    progress(end, draws)
-        return rows, failures
-
-    def results(self, first: int, last: int) -> tuple[list[FloatArray], list[str]]:
-        """Parameters and G of draws ``first`` to ``last`` - 1, in rows, and why some failed."""
-        rows, failures = [], []
-        for index in range(first, last):
-            try:
-                rows.append(self._calibrated(self.draw(index)) + self._shift_by_law(index))
-            except MemscalError as failure:
-                failures.append(failure.problem)
-        return rows, failures
+    def result(self, index: int) -> FloatArray | str:
+        """Parameters and G of a draw, in one row, or why it failed."""
+        try:
+            return self._calibrated(self.draw(index)) + self._shift_by_law(index)
+        except MemscalError as failure:
+            return failure.problem
 
     def draw(self, index: int) -> list[Scan]:
         """Return the scans of one draw."""
@@ -363,15 +338,17 @@ def monte_carlo(
     >>> 0.4 < drawn["gaussian_sigma"].ratio < 1.6
     True
     """
-    numbers: list[tuple[str, Any, int]] = [("draws", draws, 2), ("seed", seed, 0)]
-    for name, value, least in numbers:
-        if not isinstance(value, Integral) or int(value) < least:
-            problem = f"{name} is {value!r}, but it is a whole number from {least} on."
-            raise InputError(problem, cure=f"Give {name}={least} or more.")
+    require_count("monte_carlo", "draws", draws, 2)
+    require_count("monte_carlo", "seed", seed, 0)
     require_workers(workers)
     solution, effects = calibration.solution, calibration.effects
     model = DrawnScans(solution, effects, calibration.correlations, seed)
-    rows, failures = model.all_results(draws, workers, progress)
+    rows: list[FloatArray] = []
+    failures: list[str] = []
+    for done, result in enumerate(in_processes(model.result, range(draws), workers), start=1):
+        (failures if isinstance(result, str) else rows).append(result)
+        if progress is not None:
+            progress(done, draws)
     if len(rows) < 2:
         raise FitError(
             f"{len(failures)} of {draws} draws could not be calibrated.",
@@ -379,19 +356,19 @@ def monte_carlo(
             cure="The scan is close to failing, too; measure with less noise.",
         )
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
-    expected, result = uncertainty.expected_values(solution), solution.deconvolution
+    expected, deconvolution = uncertainty.expected_values(solution), solution.deconvolution
     comparisons = tuple(
         _compared(calibration, name, expected[name], column, model.solved)
         for name, column in zip(BUDGETED, samples.T, strict=True)
     )
-    first_order = uncertainties(solution, result, effects, calibration.correlations)
+    first_order = uncertainties(solution, deconvolution, effects, calibration.correlations)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         sources=("noise", *effects),
         samples=samples,
         comparisons=comparisons,
-        r=result.g.r,
+        r=deconvolution.g.r,
         g_mean=g.mean(axis=0),
         g_uncertainty=g.std(axis=0, ddof=1),
         g_symmetric=np.quantile(g, _TAILS, axis=0),
@@ -414,7 +391,11 @@ def _compared(
     mean, spread = float(column.mean()), float(column.std(ddof=1))
     # Of the inputs and noise; a correlation's contribution has a sign.
     parts = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
-    error, u = spread * _sampling_error(column), float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
+    u = float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
+    # The standard uncertainty of the standard deviation, by the kurtosis of the draws.
+    square = (column - mean) ** 2
+    kurtosis = float(np.mean(square**2) / np.mean(square) ** 2) if spread > 0 else 1.0
+    error = spread * float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * column.size)))
     # Beyond what the number of draws allows: two standard errors.
     same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
@@ -459,14 +440,6 @@ def shortest_interval(draws: FloatArray) -> FloatArray:
     first = np.argmin(ordered[held:] - ordered[:-held], axis=0)[None]
     lower = np.take_along_axis(ordered, first, axis=0)
     return np.concatenate([lower, np.take_along_axis(ordered, first + held, axis=0)])
-
-
-def _sampling_error(draws: FloatArray) -> float:
-    """Relative standard uncertainty of the draws' standard deviation, by their kurtosis."""
-    centred = draws - draws.mean()
-    variance = float(np.mean(centred**2))
-    kurtosis = float(np.mean(centred**4)) / variance**2 if variance > 0 else 1.0
-    return float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * draws.size)))
 
 
 def _messages(

@@ -84,15 +84,6 @@ Method: TypeAlias = Regulariser | Bayesian
 """A way from a scan to A and G: by a division, or by Bayesian model averaging."""
 
 
-def require_amplitude(method: str, amplitude: Any) -> None:
-    """Refuse a noise amplitude that is no positive number."""
-    if not isinstance(amplitude, Real) or not 0 < float(amplitude) < math.inf:
-        raise InputError(
-            f"The amplitude of method {method} is {amplitude}, but it must be a positive number.",
-            cure="It is a factor on the rule's own choice: 1 keeps that, 2 doubles the noise.",
-        )
-
-
 def require_count(method: str, name: str, value: Any, least: int) -> None:
     """Refuse an option that is no whole number from ``least`` on."""
     if not isinstance(value, Integral) or int(value) < least:
@@ -122,8 +113,27 @@ def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
     return Division(field, np.clip(window, 0.0, 1.0))
 
 
+class _Own:
+    """Base of memscal's regularisers: refuses values of their options that mean nothing."""
+
+    name: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        options = vars(self)
+        amplitude = options.get("amplitude", 1.0)
+        if not isinstance(amplitude, Real) or not 0 < float(amplitude) < math.inf:
+            raise InputError(
+                f"The amplitude of method {self.name} is {amplitude}, but it must be a positive "
+                "number.",
+                cure="It is a factor on the rule's own choice: 1 keeps that, 2 doubles the noise.",
+            )
+        for option, least in (("seed", 0), ("iterations", 1)):
+            if option in options:
+                require_count(self.name, option, options[option], least)
+
+
 @dataclass(frozen=True, kw_only=True)
-class WhiteNoise:
+class WhiteNoise(_Own):
     """Expectation of the paper's method over all draws of its complex noise, of variance s^2."""
 
     # White noise n leaves the numerator's mean; E[1/(z + n)] = (1 - exp(-|z|^2/s^2))/z.
@@ -136,9 +146,6 @@ class WhiteNoise:
         "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
     )
 
-    def __post_init__(self) -> None:
-        require_amplitude(self.name, self.amplitude)
-
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the expected window."""
         s = self.amplitude * NOISE_RATIO * problem.weakest_reference
@@ -147,7 +154,7 @@ class WhiteNoise:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WhiteNoiseDraw:
+class WhiteNoiseDraw(_Own):
     """One seeded draw of the paper's method: its quotient has no finite variance."""
 
     amplitude: float = 1.0  # of the noise, as in WhiteNoise
@@ -155,10 +162,6 @@ class WhiteNoiseDraw:
     name: ClassVar[str] = "white-noise-draw"
     assumes: ClassVar[str] = WhiteNoise.assumes
     fails: ClassVar[str] = "Draws are heavy-tailed: some carry ripples that others do not."
-
-    def __post_init__(self) -> None:
-        require_amplitude(self.name, self.amplitude)
-        require_count(self.name, "seed", self.seed, 0)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide one draw; the window is that of its expectation."""
@@ -176,7 +179,7 @@ class WhiteNoiseDraw:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tikhonov:
+class Tikhonov(_Own):
     r"""Minimiser of :math:`|\hat\sigma \hat g - \hat u|^2 + \alpha |\hat g|^2`."""
 
     # Its window closes more slowly than the white noise's, at the same wavenumber: sqrt(alpha) is
@@ -185,9 +188,6 @@ class Tikhonov:
     name: ClassVar[str] = "tikhonov"
     assumes: ClassVar[str] = "G has little power; all wavenumbers are equally likely to carry it."
     fails: ClassVar[str] = "Every component is a little too small, the peak of G with them."
-
-    def __post_init__(self) -> None:
-        require_amplitude(self.name, self.amplitude)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the Tikhonov window."""
@@ -200,25 +200,17 @@ class Tikhonov:
 _DARK = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class _Images:
-    """Both fields as images of order one, the point spread function of sum one."""
-
-    image: FloatArray
-    point_spread: FloatArray
-    scale: float
-
-    @classmethod
-    def of(cls, problem: DivisionProblem) -> _Images:
-        grid = problem.grid
-        image, spread = grid.to_image(problem.voltage), grid.to_image(problem.reference)
-        peak, total = float(np.abs(image).max()), float(spread.sum())
-        # u = sum(g * spread) * cell area, with image / peak and spread / total.
-        return cls(image / peak, spread / total, peak / (total * grid.cell_area))
+def _images(problem: DivisionProblem) -> tuple[FloatArray, FloatArray, float]:
+    """Image of order one, point spread function of sum one, and the scale of their quotient."""
+    grid = problem.grid
+    image, spread = grid.to_image(problem.voltage), grid.to_image(problem.reference)
+    peak, total = float(np.abs(image).max()), float(spread.sum())
+    # u = sum(g * spread) * cell area, with image / peak and spread / total.
+    return image / peak, spread / total, peak / (total * grid.cell_area)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wiener:
+class Wiener(_Own):
     """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
 
     amplitude: float = 1.0  # root of the penalty over a tenth of the weakest relevant component
@@ -228,29 +220,25 @@ class Wiener:
         "A lifted line scan has ring-shaped noise, not white: the penalty is a guess."
     )
 
-    def __post_init__(self) -> None:
-        require_amplitude(self.name, self.amplitude)
-
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's Wiener-Hunt filter."""
         from skimage.restoration import wiener
         from skimage.restoration.uft import laplacian
 
-        images = _Images.of(problem)
-        penalty = np.abs(laplacian(2, images.image.shape)[0])
-        spectrum = np.abs(np.fft.rfft2(np.fft.ifftshift(images.point_spread)))
+        blurred, spread, scale = _images(problem)
+        penalty = np.abs(laplacian(2, blurred.shape)[0])
+        spectrum = np.abs(np.fft.rfft2(np.fft.ifftshift(spread)))
         weakest = problem.weakest_reference / (
             problem.grid.cell_area * problem.grid.to_image(problem.reference).sum()
         )
         # Along one axis: the first component weaker than the weakest relevant one, or the last.
         index = int(np.argmax(spectrum[0] < weakest)) or spectrum.shape[1] - 1
         balance = (self.amplitude * NOISE_RATIO * weakest / penalty[0, index]) ** 2
-        restored = wiener(images.image, images.point_spread, balance, clip=False)
-        return image_division(problem, restored * images.scale)
+        return image_division(problem, wiener(blurred, spread, balance, clip=False) * scale)
 
 
 @dataclass(frozen=True, kw_only=True)
-class UnsupervisedWiener:
+class UnsupervisedWiener(_Own):
     """Wiener-Hunt restoration whose two precisions are sampled with the image."""
 
     seed: int = 0  # seed of the Gibbs sampler
@@ -260,21 +248,17 @@ class UnsupervisedWiener:
         "The noise of a lifted line scan is not white: almost no regularisation may be chosen."
     )
 
-    def __post_init__(self) -> None:
-        require_count(self.name, "seed", self.seed, 0)
-
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's unsupervised Wiener-Hunt restoration."""
         from skimage.restoration import unsupervised_wiener
 
-        images = _Images.of(problem)
-        blurred, spread = images.image, images.point_spread
+        blurred, spread, scale = _images(problem)
         restored, _ = unsupervised_wiener(blurred, spread, clip=False, rng=self.seed)
-        return image_division(problem, restored * images.scale)
+        return image_division(problem, restored * scale)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RichardsonLucy:
+class RichardsonLucy(_Own):
     """Richardson-Lucy restoration: multiplicative steps that keep G positive."""
 
     iterations: int = 50  # number of steps; more of them resolve finer detail, then noise
@@ -283,9 +267,6 @@ class RichardsonLucy:
     fails: ClassVar[str] = (
         "Stopping is the regularisation: too early is too wide, too late is ripples."
     )
-
-    def __post_init__(self) -> None:
-        require_count(self.name, "iterations", self.iterations, 1)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by steps on the grid's own transforms: 20 times faster than scikit-image's."""

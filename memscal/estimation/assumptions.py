@@ -27,13 +27,10 @@ _MOST_FOLDS = 10
 _SAME_LOAD = 0.05
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """The worst predicted of several groups of points."""
+@dataclass(frozen=True)
+class HeldOut(TestOutcome):
+    """The worst predicted of several groups: chi-square per degree, or F if no noise is stated."""
 
-    value: float  # chi-square per degree of freedom; over the others' if no noise is stated (F)
-    limit: float  # what the worst of all groups exceeds by chance once in a thousand
-    p_value: float  # chance of a group so badly predicted among all, or less
     worst: int  # its number among the groups, from zero
     folds: int  # how many groups were held out
     alone: bool  # whether each group was held out by itself: of more than ten, several are at once
@@ -62,25 +59,20 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
     predicted = {int(i): _predict(model, columns, fold == i) for i in np.unique(fold)}
     outcomes = {i: outcome for i, outcome in predicted.items() if outcome is not None}
-    if len(outcomes) < 2:
+    if (folds := len(outcomes)) < 2:
         return None
-    p_values = {
-        i: float(chdtrc(degrees, degrees * x) if rest is None else fdtrc(degrees, rest, x))
-        for i, (x, degrees, rest) in outcomes.items()
-    }
-    worst = min(p_values, key=lambda i: p_values[i])
+    worst = min(outcomes, key=lambda i: outcomes[i][0])
+    p_value, value, degrees, rest = outcomes[worst]
     # The worst of several is worse than one: Bonferroni's correction, for any dependence.
-    folds = len(outcomes)
-    p_value, share = min(folds * p_values[worst], 1.0), FALSE_ALARM / folds
-    value, degrees, rest = outcomes[worst]
+    p_value, share = min(folds * p_value, 1.0), FALSE_ALARM / folds
     limit = chdtri(degrees, share) / degrees if rest is None else fdtri(degrees, rest, 1 - share)
     return HeldOut(value, float(limit), p_value, worst, folds, alone=count <= _MOST_FOLDS)
 
 
 def _predict(
     model: FreeModel, nuisances: FloatArray, out: NDArray[np.bool_]
-) -> tuple[float, int, int | None] | None:
-    """Chi-square per degree, its degrees, and those of the others if no noise is stated."""
+) -> tuple[float, float, int, int | None] | None:
+    """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
     others, others_degrees = _residual(model.design[~out], model.data[~out])
     both, both_degrees = _residual(np.hstack([model.design, nuisances * out[:, None]]), model.data)
     degrees = both_degrees - others_degrees
@@ -88,8 +80,9 @@ def _predict(
         return None
     value = max(both - others, 0.0) / degrees
     if model.stated:
-        return value, degrees, None
-    return value / max(others / others_degrees, np.finfo(float).tiny), degrees, others_degrees
+        return float(chdtrc(degrees, degrees * value)), value, degrees, None
+    value /= max(others / others_degrees, np.finfo(float).tiny)
+    return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
 
 
 def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
@@ -160,17 +153,10 @@ class ExtraColumns:
     size: float  # largest voltage that the columns add, over the largest signal
 
 
-@dataclass(frozen=True)
-class Departure:
-    """Departures from a Gaussian G against the Gaussian itself."""
-
-    log_bayes_factor: float  # natural logarithm, within -8.5 and 8.5
-    kind: str  # the most probable kind of departure
-    share: float  # its share of all departures' probability
-
-
-def departure_test(estimate: ProfileEstimate) -> Departure:
+def departure_test(estimate: ProfileEstimate) -> tuple[float, str, float]:
     """Compare departures of any kind with the Gaussian, by their marginal likelihoods."""
+    # ln of the Bayes factor, within -8.5 and 8.5, the most probable kind of departure, and its
+    # share of all departures' probability.
     prior, averaged = HYPOTHESES[0].estimate, estimate.weighed
     posterior = np.clip(averaged.gaussian_probability, _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
     factor = (1 - posterior) / posterior * prior / (1 - prior)
@@ -179,7 +165,7 @@ def departure_test(estimate: ProfileEstimate) -> Departure:
         if hypothesis.estimate > 0:
             kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(probability)
     kind = max(kinds, key=lambda name: kinds[name])
-    return Departure(float(np.log(factor)), kind, kinds[kind] / max(sum(kinds.values()), 1e-300))
+    return float(np.log(factor)), kind, kinds[kind] / max(sum(kinds.values()), 1e-300)
 
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
@@ -212,11 +198,9 @@ def hysteresis_test(
     estimate: ProfileEstimate, owner: NDArray[np.intp] | None = None
 ) -> ExtraColumns | None:
     """Compare approach and retreat within each scan that has both; ``None`` without any."""
-    # The columns are the relative difference of A, that of the position along the scan in m (of the
-    # sensor's centre), and that of the baseline in V: each is approach minus retreat. Where repeats
-    # have centres and baselines of their own, it is A alone. ``owner`` (n,): number of the scan of
-    # each point, all repeats included.
-    # A step of the baseline between the branches would else be taken for a difference of A.
+    # Columns, each approach minus retreat: of A, relative; of the centre along the scan, in m; of
+    # the baseline, in V, whose step would else count as a difference of A.  It is A alone where
+    # repeats have centres and baselines of their own.  ``owner`` (n,): the scan, repeats included.
     points, model = estimate.points, estimate.model
     owner = points.scan if owner is None else owner
     sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)

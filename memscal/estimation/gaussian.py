@@ -271,7 +271,13 @@ def _solve(
             last[key] = linearise(model, scaled * scale)
         return last[key]
 
-    scale = _typical(model, start)
+    # Typical size of each parameter, so that the solver sees numbers near one.
+    width = max(abs(start[1]), 0.05 * _smoothing_length(model))
+    centres, ellipse = int(model.points.free.sum()), model.points.ellipse
+    scale = np.full(start.size, np.ptp(model.points.u))
+    scale[: 2 + centres] = width
+    scale[0] = abs(start[0])
+    scale[start.size - ellipse :] = _TYPICAL_ELLIPTICITY
     unexplained = model.points.u - evaluate(start / scale).predicted
     noise = robust_scale(standardised(unexplained, weights))
 
@@ -302,15 +308,6 @@ def _solve(
     if not 0 < fit.conversion_constant < np.inf:
         raise _undetermined(model, fit.conversion_constant)
     return fit
-
-
-def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
-    """Typical size of each parameter, so that the solver sees numbers near one."""
-    width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
-    centres = int(model.points.free.sum())
-    ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)
-    drift = np.full(theta.size - 2 - centres - ellipse.size, np.ptp(model.points.u))
-    return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift, ellipse])
 
 
 def _gaussian_shape(k: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:

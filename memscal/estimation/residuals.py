@@ -25,15 +25,13 @@ from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.profile import ProfileEstimate
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import FALSE_ALARM, chi_square_limit
+from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
-#: A point of less weight is an outlier and is left out.
-_OUTLIER = 0.5
 _CLIPPED = 4.0
 
 
@@ -53,7 +51,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     """Linearise about the best Gaussian with all departures that can be resolved."""
     # ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
     points, basis = estimate.points, estimate.departures
-    ordinary = estimate.outlier_weight >= _OUTLIER
+    ordinary = estimate.outlier_weight >= OUTLIER_WEIGHT
     weights, u = estimate.weights / estimate.outlier_weight, points.u
     if clip_outliers:
         most = _CLIPPED * estimate.noise
@@ -137,8 +135,15 @@ class Residuals:
 
 def residuals_of(estimate: ProfileEstimate) -> Residuals:
     """Project a scan off all voltages that an apparatus function can make."""
-    model = free_model(estimate)
-    place, sequence = _passes(estimate)
+    model, points = free_model(estimate), estimate.points
+    runs_along_x = points.free[points.scan, 0]
+    along = np.where(runs_along_x, points.x, points.y)
+    across = np.where(runs_along_x, points.of_places("row"), 0)
+    order = np.lexsort((along, across, points.repeat, points.scan))
+    keys = np.stack([points.scan, points.repeat, across])[:, order]
+    new = np.any(np.diff(keys, axis=1, prepend=keys[:, :1]) != 0, axis=0)
+    place, sequence = np.argsort(order), np.empty_like(order)
+    sequence[order] = np.cumsum(new)
     order = np.argsort(place[model.point])
     point = model.point[order]
     basis, data = orthonormal(model.design[order]), model.data[order]
@@ -229,18 +234,13 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
 
 def _neighbours(residuals: Residuals) -> csr_array:
     """Weights of the pairs of residuals that follow each other in one pass, shape (n, n)."""
-    from scipy.sparse import coo_array
+    from scipy.sparse import diags_array
 
     place, sequence, n = residuals.place, residuals.sequence, residuals.place.size
-    rows, columns, weights = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)], []
-    for apart in range(1, min(_FARTHEST, n - 1) + 1):
-        first = np.flatnonzero(sequence[apart:] == sequence[:-apart])
-        rows.append(first)
-        columns.append(first + apart)
-        weights.append(0.5 * _DECAY ** (place[first + apart] - place[first]))
-    entries = (np.concatenate([np.zeros(0), *weights]), (np.hstack(rows), np.hstack(columns)))
-    pairs = coo_array(entries, shape=(n, n))
-    # Assembled once: every sum of sparse matrices costs more than all of their entries.
+    apart = range(1, min(_FARTHEST, n - 1) + 1)
+    weights = [0.5 * _DECAY ** (place[i:] - place[:-i]) for i in apart]
+    diagonals = [w * (sequence[i:] == sequence[:-i]) for w, i in zip(weights, apart, strict=True)]
+    pairs = diags_array(diagonals, offsets=list(apart), shape=(n, n))
     return (pairs + pairs.T).tocsr()
 
 
@@ -265,18 +265,3 @@ def orthonormal(design: FloatArray) -> FloatArray:
     size = np.linalg.norm(design, axis=0)
     left, singular, _ = np.linalg.svd(design[:, size > 0] / size[size > 0], full_matrices=False)
     return np.asarray(left[:, singular > 1e-10 * singular[0]])
-
-
-def _passes(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Place of each point along the scan, and which pass over the sensor it belongs to."""
-    points = estimate.points
-    runs_along_x = points.free[points.scan, 0]
-    along = np.where(runs_along_x, points.x, points.y)
-    across = np.where(runs_along_x, points.of_places("row"), 0)
-    order = np.lexsort((along, across, points.repeat, points.scan))
-    keys = np.stack([points.scan, points.repeat, across])[:, order]
-    new = np.concatenate([[0], np.any(np.diff(keys, axis=1) != 0, axis=0)])
-    place, sequence = np.empty_like(order), np.empty_like(order)
-    place[order] = np.arange(order.size)
-    sequence[order] = np.cumsum(new)
-    return place, sequence

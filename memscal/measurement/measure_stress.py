@@ -2,7 +2,6 @@
 
 import math
 import platform
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -29,12 +28,9 @@ from memscal.version import __version__
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale")
 
-_FORCE_LIMIT = 3.0
 #: One check of all profiles together may be stricter than one for each.
 _MEAN_LIMIT = 2.0
-#: What the shapes of pressure leave open of the force of one profile, however small the noise.
-_NEGLIGIBLE_FORCE = 0.01
-#: ... of the mean of several, whose shapes differ.
+#: What the shapes of pressure leave open of the mean force of several, whose shapes differ.
 _NEGLIGIBLE_MEAN = 0.005
 _FORCE = (
     "A failure means that A or the gain of the channel, the load, or the unit of one of them is "
@@ -85,16 +81,16 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
-    off = profile.force / profile.load - 1
-    allowed = float(np.linalg.norm([*_relative(profile).values(), _NEGLIGIBLE_FORCE]))
+    allowed = float(np.linalg.norm([*_relative(profile).values(), restore.NEGLIGIBLE_FORCE]))
+    off = abs(profile.force / profile.load - 1) / allowed
     return check(
         "applied_force",
-        abs(off) / allowed,
-        _FORCE_LIMIT,
+        off,
+        restore.FORCE_LIMIT,
         f"Difference of the profile's total force, {profile.force:.4g} N, from the applied load of "
         f"{profile.load:.4g} N, over its standard uncertainty of {allowed * profile.load:.2g} N. "
         + _FORCE,
-        _two_sided(off / allowed),
+        float(erfc(off / math.sqrt(2))),
     )
 
 
@@ -102,22 +98,17 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
     """Return the check of the force of all profiles together."""
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
+    off = abs(mean - 1) / allowed
     return check(
         "applied_force_all",
-        abs(mean - 1) / allowed,
+        off,
         _MEAN_LIMIT,
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
         f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
         "difference from one is counted. " + _FORCE + _BLIND,
-        _two_sided((mean - 1) / allowed),
+        float(erfc(off / math.sqrt(2))),
     )
 
-
-def _two_sided(z: float) -> float:
-    return float(erfc(abs(z) / math.sqrt(2)))
-
-
-_NUMBERED = re.compile(r"(\w+)_(\d+)")
 
 #: Messages of a restoration that the measured stress gives itself.
 _OF_ALL_PROFILES = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NOISE_UNSTATED)
@@ -219,10 +210,10 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
     profiles = tuple(profile for stress in stresses for profile in stress.profiles)
     starts = np.cumsum([0, *(len(stress.profiles) for stress in stresses)])
     checks = [
-        replace(check, name=f"{numbered[1]}_{int(numbered[2]) + start}")
+        replace(check, name=f"{check.kind}_{int(check.profile) + start}")
         for stress, start in zip(stresses, starts, strict=False)
         for check in stress.checks
-        if (numbered := _NUMBERED.fullmatch(check.name))
+        if check.profile
     ]
     # The checks, under their new numbers, state what failed.
     messages = []

@@ -85,27 +85,19 @@ class PressureShape:
     shear: float  # c, outward shear over pressure at the radius of two widths
     film: ElasticFilm
 
-    def transform(self, k: FloatArray, width: float) -> FloatArray:
-        """Transform at ``k`` (rad/m) for a width (m); one at k = 0."""
-        plain = self._order(0, k, width)
-        if self.shear == 0.0:
-            return plain
-        return np.asarray(plain - 0.5 * self._share(k) * k * width * self._order(1, k, width))
-
-    def widening(self, k: FloatArray, width: float) -> FloatArray:
-        """Derivative of :meth:`transform` by the width, in 1/m."""
-        first = self._order(1, k, width)
+    def transform(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+        """Transform at ``k`` (rad/m) for a width (m), one at k = 0; its derivative by the width."""
+        plain, first = self._order(0, k, width), self._order(1, k, width)
         slope = -width * k**2 * first
         if self.shear == 0.0:
-            return np.asarray(slope)
+            return plain, slope
         m = self.exponent
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
         rise = k * first - ratio * width**2 * k**3 * self._order(2, k, width)
-        return np.asarray(slope - 0.5 * self._share(k) * rise)
-
-    def with_slope(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
-        """Transform and its derivative by the width."""
-        return self.transform(k, width), self.widening(k, width)
+        x, nu = k * self.film.thickness, self.film.poisson_ratio
+        pull = base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu)
+        share = 0.5 * self.shear * pull
+        return plain - share * k * width * first, slope - share * rise
 
     def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
         """Return the transform of the exponent m + further, at the radius a of this shape."""
@@ -113,10 +105,6 @@ class PressureShape:
             return gaussian_transfer(k, width)
         square = 2 * (self.exponent + 2) * width**2
         return np.asarray(hyp0f1(self.exponent + further + 2, -square * k**2 / 4))
-
-    def _share(self, k: FloatArray) -> FloatArray:
-        x, nu = k * self.film.thickness, self.film.poisson_ratio
-        return self.shear * (base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
@@ -141,9 +129,9 @@ class _Basis(DepartureBasis):
     shape: PressureShape
 
     def kernels(self, k: FloatArray) -> FloatArray:
-        slope = self.conversion_constant * self.shape.widening(k, self.sigma)
+        kernel, slope = self.shape.transform(k, self.sigma)
         rings = [ring.transform(k) for ring in self.rings]
-        return self._columns(self.shape.transform(k, self.sigma), slope, rings)
+        return self._columns(kernel, self.conversion_constant * slope, rings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +158,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
     kernels = basis.kernels(model.k)
     rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
-    kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
+    kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)[0]
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
     # Priors are flat in log force, log width and the others: the information's log determinant.
     flat = fit.jacobian * np.r_[fit.conversion_constant, fit.sigma, np.ones(basis.flat - 2)]
@@ -199,14 +187,14 @@ def _fit(
     scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
     def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        fit = linearise(model, scaled * scale, shape.with_slope)
+        fit = linearise(model, scaled * scale, shape.transform)
         misfit = standardised(fit.predicted - model.points.u, weights)
         return misfit, standardised(fit.jacobian, weights) * scale
 
     best = gauss_newton(linearised, theta / scale, tolerance=1e-9)
     if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
         best = theta / scale
-    return linearise(model, best * scale, shape.with_slope)
+    return linearise(model, best * scale, shape.transform)
 
 
 #: A shape of less probability is left out.

@@ -104,9 +104,9 @@ def accept_other_sensor(
     )
 
 
-_FORCE_LIMIT = 3.0
+FORCE_LIMIT = 3.0
 #: What the shapes of pressure themselves leave open of the force, however small the noise.
-_NEGLIGIBLE_FORCE = 0.01
+NEGLIGIBLE_FORCE = 0.01
 
 
 def _reconvolution(restored: Restoration) -> QualityCheck:
@@ -124,11 +124,11 @@ def _reconvolution(restored: Restoration) -> QualityCheck:
 def _force(restored: Restoration) -> QualityCheck:
     load = restored.scan.stated_load
     allowed = np.hypot(restored.force_uncertainty, restored.scan.load_uncertainty or 0.0)
-    allowed = float(np.hypot(allowed, _NEGLIGIBLE_FORCE * load))
+    allowed = float(np.hypot(allowed, NEGLIGIBLE_FORCE * load))
     return check(
         "restored_force",
         abs(restored.force - load) / allowed,
-        _FORCE_LIMIT,
+        FORCE_LIMIT,
         f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
         f"of {load:.4g} N, in their standard uncertainty. A failure means that A, the load or the "
         "unit of one of them is wrong, or that the film's Poisson's ratio, which decides how much "
@@ -139,16 +139,7 @@ def _force(restored: Restoration) -> QualityCheck:
 def _noise(restored: Restoration) -> list[QualityCheck]:
     if restored.points.u_errors is None:
         return []
-    checks = [
-        check(
-            "noise_as_stated",
-            restored.posterior.found_noise,
-            quality.NOISE_LIMIT,
-            "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
-            "something besides electronic noise scatters the scan, such as position or load; the "
-            "uncertainties have been raised accordingly.",
-        )
-    ]
+    checks = [quality.noise_check(restored.posterior.found_noise)]
     residuals = residuals_of(restored.posterior.estimate)
     if residuals.degrees >= FEWEST_RESIDUALS:
         size = chi_square_test(residuals)

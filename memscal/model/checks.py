@@ -7,7 +7,7 @@ from typing import Any, Literal
 #: Chance that a check fails although its assumption holds.
 FALSE_ALARM = 1e-3
 #: Scatter over stated noise up to which a scan counts as being as noisy as stated.
-NOISE_LIMIT = 1.5
+_NOISE_LIMIT = 1.5
 #: Share of points that may be outliers.
 OUTLIER_LIMIT = 0.10
 #: A point of less weight is an outlier.
@@ -94,6 +94,16 @@ def check(
 ) -> QualityCheck:
     """Return a check, which passes while its value is at most the limit."""
     return QualityCheck(name, float(value), float(limit), bool(value <= limit), meaning, p_value)
+
+
+def noise_check(scatter: float, channel: str = "zz") -> QualityCheck:
+    """Return the check of the scatter over the stated noise."""
+    meaning = (
+        f"Scatter about the fitted profile over the stated u_{channel}_errors. A failure means "
+        "that something besides electronic noise scatters the scan, such as position or load; the "
+        "uncertainties have been raised accordingly."
+    )
+    return check("noise_as_stated", scatter, _NOISE_LIMIT, meaning)
 
 
 def state_of_checks(checks: Iterable[QualityCheck]) -> str:

@@ -89,9 +89,10 @@ def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
     with localcontext() as context:
         context.prec = 800  # the widest span of two doubles
         number, spread = Decimal(repr(float(value))), Decimal(repr(float(uncertainty)))
-        spread = _two_digits(spread)
-        place = Decimal(1).scaleb(spread.adjusted() - 1)
-        number = number.quantize(place)
+        for _ in range(2):  # 0.0996 gives 0.10, not 0.100
+            place = Decimal(1).scaleb(spread.adjusted() - 1)
+            spread = spread.quantize(place)
+        number = number.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
         exponent = max(number.adjusted() if number else spread.adjusted(), spread.adjusted())
         if exponent in _PLAIN_EXPONENTS:
             exponent = 0
@@ -99,13 +100,6 @@ def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
         if not number:
             number = abs(number)  # never "-0.00"
         return f"{number:f}", f"{spread:f}", exponent
-
-
-def _two_digits(spread: Decimal) -> Decimal:
-    """Round to two significant digits; 0.0996 gives 0.10, not 0.100."""
-    for _ in range(2):
-        spread = spread.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
-    return spread
 
 
 def format_bound(bound: float, *, upper: bool) -> str:
