@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison, stress
+from helpers.friction_results import LOADS, comparison, interface_comparison, stress
 from matplotlib.axes import Axes
 
 from memscal.cli.compare import figure_stems
@@ -174,12 +174,6 @@ def test_loads_that_were_recorded_look_as_their_neighbours():
     assert looks[1.36] == looks[1.37]
     assert looks[1.37] != looks[2.75]
     assert looks[2.75][1] == "2.75 N"
-
-
-def test_an_axis_of_friction_is_monotone_and_ends_at_infinity():
-    t = friction_position(FRICTION)
-    assert np.all(np.diff(t) > 0)
-    assert (t[0], t[-1]) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
