@@ -59,16 +59,6 @@ def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) 
     np.testing.assert_array_equal(grid.from_image(image), field)
 
 
-@given(count=st.integers(2, 12), seed=SEEDS)
-def test_of_an_image_only_the_even_part_is_kept(count: int, seed: int) -> None:
-    grid = EvenGrid(count, 0.7)
-    image = np.random.default_rng(seed).normal(size=(2 * count - 1, 2 * count - 1))
-    kept = grid.to_image(grid.from_image(image))
-    assert kept.sum() == pytest.approx(image.sum(), abs=1e-9)
-    # What is left over is orthogonal to all that is even.
-    assert np.sum((image - kept) * kept) == pytest.approx(0.0, abs=1e-9)
-
-
 @given(seed=SEEDS)
 def test_convolution_on_a_quarter_plane_is_linear_convolution_in_the_plane(seed: int) -> None:
     # The fields end before half of the grid, so that nothing wraps around.

@@ -256,6 +256,9 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     scan = memscal.read_scan(DATA / "rod_scan_65.h5")
     largest = np.max(np.abs(table.sigma_zz - contact.base_stress(table.r)))
     assert largest < 2e-3 * contact.base_stress(0.0)
+    shear = contact.base_shear(table.r)  # the table's S13 is for the third axis upward
+    assert_allclose(table.sigma_rz, shear, atol=4e-3 * np.abs(shear).max())
+    assert table.force == pytest.approx(1.0, abs=1e-4)
 
     def voltage(stress: np.ndarray) -> np.ndarray:
         distance = np.abs(scan.x - ours.parameters["centre"])

@@ -212,11 +212,6 @@ def test_evidence_is_drawn_below_that_of_the_best_law():
     np.testing.assert_allclose(drawn, expected)
 
 
-def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionComparison):
-    with pytest.raises(InputError, match="interface=True"):
-        of_friction.interface_figure(found)
-
-
 def test_one_load_and_one_loading_are_enough():
     found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
     several = of_friction.comparison_figures(found).values()
@@ -229,3 +224,5 @@ def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionCom
         profile_figure(found, loading="sideways")
     with pytest.raises(InputError, match="not stated"):
         friction_set_figure(found, lubrication="")
+    with pytest.raises(InputError, match="interface=True"):
+        of_friction.interface_figure(found)

@@ -78,12 +78,3 @@ def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
 def test_a_value_that_is_none_is_refused(wrong: float) -> None:
     with pytest.raises(InputError, match="not negative"):
         family().coordinate(wrong)
-
-
-def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
-    one = family()
-    assert one.only(1).loads.tolist() == [1.0]
-    turned = one.only([1, 0])
-    assert turned.loads.tolist() == [1.0, 0.5]
-    assert_same_to_rounding(turned.at(0.2).spectra, one.at(0.2).spectra[:, ::-1])
-    assert_same_to_rounding(turned.changes["thickness"], one.changes["thickness"][:, ::-1])
