@@ -74,9 +74,3 @@ def test_what_is_flat_beyond_a_value_bounds_from_below_only() -> None:
     found = estimate(60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100)
     assert found.interval.high is None
     assert found.interval.low == pytest.approx(value_at(0.5 - np.sqrt(3.84 / 6000)), rel=1e-2)
-
-
-def test_a_lower_level_gives_a_narrower_interval() -> None:
-    chi_square = ((COORDINATES - 0.4) / 0.1) ** 2
-    wide, narrow = (estimate(chi_square, level=level).interval for level in (0.95, 0.6))
-    assert wide.low < narrow.low < narrow.high < wide.high
