@@ -14,10 +14,10 @@ def value_at(t: float) -> float:
     return float("inf") if t == 1 else 0.3 * t / (1 - t)
 
 
-def estimate(chi_square: FloatArray, last: float = np.inf, level: float = 0.95) -> BoundedEstimate:
+def estimate(chi_square: FloatArray, last: float = np.inf) -> BoundedEstimate:
     return profile_estimate(
         np.array([value_at(t) for t in COORDINATES]), COORDINATES, chi_square, value_at,
-        reason=lambda interval: friction_reason(interval, last), level=level,
+        reason=lambda interval: friction_reason(interval, last),
     )  # fmt: skip
 
 
