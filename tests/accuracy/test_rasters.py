@@ -25,7 +25,7 @@ from memscal.model.scan import Scan
 pytestmark = pytest.mark.accuracy
 LOG = logging.getLogger(__name__)
 
-SEEDS = 20 if FULL else 2
+SEEDS, SIZE = (20, {}) if FULL else (2, {"side": 41, "half": 5e-3})
 AXIS = np.arange(-2 * WIDTH, 2 * WIDTH, 0.05e-3)
 INSIDE = np.hypot.outer(AXIS, AXIS) < 2 * WIDTH
 METHODS = ("white-noise", "bayesian")
@@ -34,7 +34,7 @@ METHODS = ("white-noise", "bayesian")
 @lru_cache
 def halves(seed: int, method: str) -> tuple[memscal.ApparatusFunction, ...]:
     """Calibrate with the black fields of a checkerboard, and with the white ones."""
-    scan = tailed_raster(seed=seed)
+    scan = tailed_raster(seed=seed, **SIZE)
     black = np.indices(scan.u_zz.shape).sum(axis=0) % 2 == 0
     parts = (replace(scan, u_zz=np.where(kept, scan.u_zz, np.nan)) for kept in (black, ~black))
     return tuple(memscal.calibrate(part, method=method).apparatus for part in parts)
@@ -93,7 +93,7 @@ def test_halves_of_a_raster_differ_as_their_uncertainty_says(method: str) -> Non
 def test_held_out_points_are_predicted_as_well_as_by_a_tuned_wiener_filter() -> None:
     ratios: dict[str, list[float]] = {method: [] for method in METHODS}
     for seed in range(SEEDS):
-        scan = tailed_raster(seed=seed)
+        scan = tailed_raster(seed=seed, **SIZE)
         held = np.random.default_rng(1000 + seed).random(scan.u_zz.shape) < 0.2
         train = replace(scan, u_zz=np.where(held, np.nan, scan.u_zz))
         peer = best_wiener(scan, held)

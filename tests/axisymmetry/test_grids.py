@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.signal import fftconvolve
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
-from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
@@ -47,14 +46,6 @@ def test_a_quarter_plane_gives_the_complex_transform_of_its_mirrored_plane(count
     np.testing.assert_allclose(grid.wavenumber, np.hypot.outer(ky, ky), rtol=1e-12)
 
 
-@given(count=st.integers(3, 24), seed=SEEDS)
-def test_the_inverse_on_a_quarter_plane_undoes_the_transform(count: int, seed: int) -> None:
-    grid = EvenGrid(count, 0.3)
-    field = np.random.default_rng(seed).normal(size=(count, count))
-    np.testing.assert_allclose(grid.inverse(grid.forward(field)), field, atol=1e-12)
-    np.testing.assert_allclose(grid.transfer(field), grid.forward(field))
-
-
 @given(count=st.integers(2, 12), seed=SEEDS)
 def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) -> None:
     grid = EvenGrid(count, 0.7)
@@ -66,16 +57,6 @@ def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) 
     np.testing.assert_array_equal(image, image[::-1])
     np.testing.assert_array_equal(image, image[:, ::-1])
     np.testing.assert_array_equal(grid.from_image(image), field)
-
-
-@given(count=st.integers(2, 12), seed=SEEDS)
-def test_of_an_image_only_the_even_part_is_kept(count: int, seed: int) -> None:
-    grid = EvenGrid(count, 0.7)
-    image = np.random.default_rng(seed).normal(size=(2 * count - 1, 2 * count - 1))
-    kept = grid.to_image(grid.from_image(image))
-    assert kept.sum() == pytest.approx(image.sum(), abs=1e-9)
-    # What is left over is orthogonal to all that is even.
-    assert np.sum((image - kept) * kept) == pytest.approx(0.0, abs=1e-9)
 
 
 @given(seed=SEEDS)
@@ -173,37 +154,6 @@ def test_lifting_then_cutting_gives_the_profile_back(seed: int) -> None:
     np.testing.assert_allclose(on_grid(profile, whole, 0.02), lifted, atol=1e-12)
 
 
-def test_the_error_of_lifting_falls_with_the_fourth_power_of_the_step() -> None:
-    grid = EvenGrid(50, 0.123)
-    exact = gaussian(grid.radius)
-    errors = [np.abs(on_grid(gaussian, grid, step) - exact).max() for step in (0.4, 0.2, 0.1, 0.05)]
-    assert errors[0] / errors[-1] > 1448  # an order of 3.5 over three halvings
-    assert errors[-1] < 1e-7
-
-
-def test_the_transform_of_a_lifted_field_is_the_hankel_transform_of_its_profile() -> None:
-    grid = EvenGrid(120, 0.1)
-
-    def profile(r: FloatArray) -> FloatArray:
-        return (1 + 0.3 * r**2) * np.exp(-(r**2) / 1.5)
-
-    spectrum = grid.forward(on_grid(profile, grid, 0.02))
-    r = np.linspace(0.0, 11.0, 2001)
-    k = grid.wavenumber[:40:7, :40:9]
-    radial = hankel_transform(r, profile(r), k.ravel()).reshape(k.shape)
-    np.testing.assert_allclose(spectrum[:40:7, :40:9], radial, atol=1e-7)
-
-
 def test_a_lattice_without_a_central_point_is_refused():
     with pytest.raises(InputError, match="no central point"):
         Lattice(np.arange(8) * 0.1, np.arange(7) * 0.2)
-
-
-def test_a_period_holds_the_plane_as_the_transform_sees_it():
-    grid = EvenGrid(9, 0.5)
-    field = np.random.default_rng().normal(size=(9, 9))
-    period = grid.to_period(field)
-    assert period.shape == (16, 16)
-    spectrum = np.fft.fft2(period) * grid.cell_area
-    np.testing.assert_allclose(spectrum[:9, :9].real, grid.forward(field), atol=1e-12)
-    np.testing.assert_allclose(grid.from_quotient(period), field, atol=1e-15)

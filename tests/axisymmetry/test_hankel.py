@@ -14,7 +14,6 @@ from memscal.axisymmetry.hankel import (
     hankel_transform,
     radial_spline,
 )
-from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
 K = np.linspace(0.05, 20.0, 60)
@@ -71,11 +70,6 @@ def test_a_spline_has_no_kink_on_the_axis_wherever_the_table_begins(start: float
     np.testing.assert_allclose(spline(inner), np.cos(inner), atol=2e-5)
     slope = (spline(np.array([1e-4])) - spline(np.array([0.0]))) / 1e-4
     assert abs(slope[0]) < 1e-3
-
-
-def test_three_radii_are_too_few() -> None:
-    with pytest.raises(InputError, match="3 radii cannot be interpolated"):
-        radial_spline(np.arange(3.0), np.arange(3.0))
 
 
 @given(product=st.floats(1.0, 3000.0), k_max=st.floats(6.5, 60.0))
@@ -139,32 +133,6 @@ def test_the_integral_is_the_transform_at_zero(r_max: float) -> None:
     k = Wavenumbers.covering(12.0, r_max)
     ring = RadialSpectrum(k, 4 * np.pi * np.exp(-(k.k**2)) - np.pi * np.exp(-(k.k**2) / 4))
     assert ring.integral == pytest.approx(3 * np.pi, rel=1e-10)
-
-
-def test_the_product_of_transforms_is_the_transform_of_the_convolution() -> None:
-    # Convolving 1/(a^2 + r^2)^(3/2) fields adds their depths: exp(-ak) exp(-bk).
-    wavenumbers = Wavenumbers.covering(40.0, 20.0)
-
-    def depth(a: float, r: FloatArray) -> FloatArray:
-        return a / (2 * np.pi * (a**2 + r**2) ** 1.5)
-
-    r = np.linspace(0.0, 20.0, 31)
-    product = np.exp(-0.7 * wavenumbers.k) * np.exp(-0.8 * wavenumbers.k)
-    np.testing.assert_allclose(wavenumbers.synthesise(product, r), depth(1.5, r), atol=1e-12)
-
-
-@given(degree=st.integers(0, 31), upper=st.floats(1e-6, 1e6), panels=st.integers(1, 7))
-def test_a_rule_of_sixteen_nodes_is_exact_to_degree_thirty_one(degree, upper, panels) -> None:
-    nodes, weights = gauss_panels(upper, upper / panels * 1.0001, order=16)
-    assert weights @ (nodes / upper) ** degree == pytest.approx(upper / (degree + 1), rel=1e-12)
-
-
-@pytest.mark.parametrize(("order", "phase"), [(16, 16.0), (64, 100.0)])
-def test_a_panel_integrates_the_phase_that_its_nodes_resolve(order: int, phase: float) -> None:
-    nodes, weights = gauss_panels(1.0, 1.0, order)
-    for start in np.linspace(0.0, 2 * np.pi, 13):
-        exact = (np.sin(phase + start) - np.sin(start)) / phase
-        assert weights @ np.cos(phase * nodes + start) == pytest.approx(exact, abs=5e-14)
 
 
 @given(upper=st.floats(1e-3, 1e3), longest=st.floats(1e-1, 1e4), order=st.integers(1, 20))

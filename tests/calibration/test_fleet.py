@@ -75,10 +75,6 @@ def test_files_and_joint_scans_are_calibrated(tmp_path: Path) -> None:
     assert "A = " in repr(found[0])
 
 
-def test_no_scans_are_no_results() -> None:
-    assert memscal.calibrate_many([], workers=2) == []
-
-
 @pytest.mark.parametrize(("options", "words"), [
     *[({"workers": workers}, "workers is") for workers in (0, -1, 1.5, 1000)],
     ({"method": "nonsense"}, "nonsense"), ({"method": "bayesian", "bogus": 1}, "bogus"),
@@ -88,7 +84,8 @@ def test_a_wrong_number_of_processes_method_or_option_is_refused_at_once(options
         memscal.calibrate_many(scans(2), **options)
 
 
-def test_one_scan_is_no_list() -> None:
+def test_one_scan_is_no_list_and_no_scans_are_no_results() -> None:
+    assert memscal.calibrate_many([], workers=2) == []
     with pytest.raises(memscal.MemscalError, match="one scan"):
         memscal.calibrate_many(scans(1)[0])
 

@@ -113,6 +113,7 @@ def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draw
         budget = apparatus.budget["conversion_constant"]
         assert set(budget) == {"noise", "regularisation", "window", "misfit", *common.effects}
         assert budget["load"] / apparatus.conversion_constant == pytest.approx(0.01, rel=1e-3)
+        assert apparatus.budget["gaussian_sigma"]["load"] == 0.0
     own.apparatus.save(tmp_path / "sensor.h5")
     saved = memscal.load_apparatus(tmp_path / "sensor.h5")
     parameters, process = saved.parameters, saved.process

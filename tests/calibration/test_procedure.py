@@ -231,15 +231,6 @@ def test_points_on_no_lattice_cannot_be_swept() -> None:
         calibration.sweep(amplitudes=3, draws=1)
 
 
-def test_the_result_is_the_same_however_often_and_whatever_the_global_random_state() -> None:
-    scan = simulated()
-    one = memscal.calibrate(scan).apparatus
-    np.random.seed(99)  # noqa: NPY002  # the legacy global state is what must not matter
-    two = memscal.calibrate(scan).apparatus
-    assert_same_to_rounding(one.field.g, two.field.g)
-    assert_same_to_rounding(one.parameters.covariance, two.parameters.covariance)
-
-
 @pytest.mark.parametrize(("arguments", "words"), [
     ({"reference": {1: 2}}, "The reference is a dict"),
     ({"reference": [None, None]}, "2 references were given, but there is one scan"),

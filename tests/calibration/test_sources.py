@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.bounds import FULL, RARE
+from helpers.rasters import TailedEllipse
 from helpers.scans import EXACT_FILM, EXACT_ROD
 from PIL import Image
 from scipy.integrate import quad
@@ -21,17 +22,16 @@ from memscal.errors import InputError, MemscalError
 
 A, SIGMA, CENTRE, SIZE = 2.0, 0.3e-3, (0.05e-3, -0.03e-3), 0.4e-3
 LONG, SHORT, TURNED = 0.5e-3, 0.25e-3, 0.4
-LOBE, SHARE = (0.3e-3, 0.5e-3), 0.3
+LOBE, SHARE = np.array([0.3e-3, 0.5e-3]), 0.3
 PIXEL = 25e-6
 NAMES = {"disc": "disc:0.4mm", "slit": "slit:400um", "gaussian": "gaussian:0.4mm", "point": "point"}
 
 
-def elliptic(x, y, long: float, short: float):
-    """Elliptic Gaussian of unit integral, turned."""
-    along = np.cos(TURNED) * x + np.sin(TURNED) * y
-    across = np.cos(TURNED) * y - np.sin(TURNED) * x
-    form = (along / long) ** 2 + (across / short) ** 2
-    return np.exp(-form / 2) / (2 * np.pi * long * short)
+def lobed(long: float, short: float, blur: float = 0.0) -> TailedEllipse:
+    """Elliptic Gaussian of unit integral, blurred; one that is not round has a lobe beside it."""
+    wide, share = np.hypot(SHORT, blur), SHARE * (long != short)
+    ellipse = (1.0, 0.0, 0.0, np.hypot(long, blur), np.hypot(short, blur), TURNED)
+    return TailedEllipse((ellipse, (share, *LOBE, wide, wide, 0.0)))
 
 
 def reading(kind: str, x, y):
@@ -42,12 +42,9 @@ def reading(kind: str, x, y):
     if kind == "slit":
         return ndtr((x + SIZE / 2) / SIGMA) - ndtr((x - SIZE / 2) / SIGMA)
     long, short = {"point": (0, 0), "gaussian": (SIZE, SIZE), "ellipse": (LONG, SHORT)}[kind]
-    # The ellipse has a lobe to one side; the centroid of both is at the scan's position.
-    share = SHARE if kind == "ellipse" else 0.0
-    x, y = (axis + lobe * share / (1 + share) for axis, lobe in zip((x, y), LOBE, strict=True))
-    seen = elliptic(x, y, np.hypot(long, SIGMA), np.hypot(short, SIGMA))
-    wide = np.hypot(SHORT, SIGMA)
-    seen += share * elliptic(x - LOBE[0], y - LOBE[1], wide, wide)
+    # The centroid of the ellipse and its lobe is at the scan's position.
+    dx, dy = LOBE * (kind == "ellipse") * SHARE / (1 + SHARE)
+    seen = lobed(long, short, SIGMA).at(x + dx, y + dy)
     return seen * (2 * np.pi * long * short if long else 1.0)
 
 
@@ -65,11 +62,7 @@ def scanned(kind: str, *, raster: bool = False, noise: float = 0.005, seed: int 
 
 def field(long: float = LONG, short: float = SHORT) -> memscal.StressField:
     x = np.arange(-80, 81) * PIXEL
-    plane = np.meshgrid(x, x)
-    values = elliptic(*plane, long, short)
-    if long != short:
-        values += SHARE * elliptic(plane[0] - LOBE[0], plane[1] - LOBE[1], SHORT, SHORT)
-    values *= 2 * np.pi * long * short
+    values = lobed(long, short).at(*np.meshgrid(x, x)) * 2 * np.pi * long * short
     return memscal.StressField(x=x, y=x + 1e-3, values=values, unit="uT")
 
 

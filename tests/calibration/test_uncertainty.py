@@ -39,14 +39,6 @@ def test_each_input_of_the_reference_counts_what_moving_it_changes(source, chang
     assert counted == pytest.approx(difference, rel=0.5, abs=5e-4 * usual.conversion_constant)
 
 
-def test_the_load_scales_the_conversion_constant_and_nothing_else() -> None:
-    apparatus = memscal.calibrate(replace(simulated(), load_uncertainty=0.02)).apparatus
-    assert apparatus.budget["conversion_constant"]["load"] == pytest.approx(
-        0.02 * apparatus.conversion_constant
-    )
-    assert apparatus.budget["gaussian_sigma"]["load"] == 0.0
-
-
 @pytest.mark.parametrize("options", [{}, {"raster": True, "points": 17}])
 def test_the_budget_adds_up_to_the_stated_uncertainty(options) -> None:
     apparatus = memscal.calibrate(memscal.simulate(**options)).apparatus

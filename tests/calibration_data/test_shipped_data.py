@@ -20,6 +20,7 @@ from numpy.testing import assert_allclose
 import memscal
 from memscal import ElasticFilm, Indenter
 from memscal.formats.inspection import check
+from memscal.formats.tables.reference import read_reference_table
 from memscal.mechanics.press_rod import press_rod
 
 DATA = Path(__file__).parents[2] / "calibration_data"
@@ -256,6 +257,12 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     scan = memscal.read_scan(DATA / "rod_scan_65.h5")
     largest = np.max(np.abs(table.sigma_zz - contact.base_stress(table.r)))
     assert largest < 2e-3 * contact.base_stress(0.0)
+    shear = contact.base_shear(table.r)  # the table's S13 is for the third axis upward
+    units = {"r": "r (mm)", "r_unit": "mm", "sigma": "S33 (MPa)", "sigma_unit": "MPa"}
+    signs = {"shear": "S13 (MPa)", "sign": -1, "shear_sign": -1}
+    sheared = read_reference_table(DATA / TABLES[1], load=1.0, **units, **signs).profile
+    assert_allclose(sheared.sigma_rz, shear, atol=4e-3 * np.abs(shear).max())
+    assert table.force == pytest.approx(1.0, abs=1e-4)
 
     def voltage(stress: np.ndarray) -> np.ndarray:
         distance = np.abs(scan.x - ours.parameters["centre"])

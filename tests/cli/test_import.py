@@ -7,7 +7,6 @@ import pytest
 from helpers.console import Run, names
 
 import memscal
-from memscal.mechanics.press_rod import press_rod
 
 SET_UP = [
     *("--load", 1, "--load-uncertainty", 0.01, "--radius", 0.25, "--radius-uncertainty", 0.002),
@@ -115,24 +114,6 @@ def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: R
     assert "Warning" not in sphere.out
     rod = run("import", "mixed.csv", "-o", "rod.h5", *loads)
     assert (rod.code, "--repeat" in rod.err) == (0, False)
-
-
-def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folder: Path):
-    """The shipped table is by finite elements, with S13 for the third axis upward."""
-    table = Path(__file__).parents[2] / "calibration_data" / "rod_reference_fem.csv"
-    done = run(
-        "import", table, "--format", "reference", "-o", "rod.h5", "--load", 1, "--sign", "-1",
-        "--r", "r (mm)", "--r-unit", "mm", "--sigma", "S33 (MPa)", "--sigma-unit", "MPa",
-        "--shear", "S13 (MPa)", "--shear-sign", "-1", "--solver", "a FEM program",
-    ).exits(0)  # fmt: skip
-    assert "SYNTHETIC" in done.out
-    found = memscal.read_reference("rod.h5")
-    assert (found.solver, found.film) == ("a FEM program", None)
-    film, rod = memscal.simulate().film, memscal.Rod(radius=0.25e-3)
-    ours = press_rod(film, rod, 1.0)
-    shear = ours.base_shear(found.r)
-    np.testing.assert_allclose(found.sigma_rz, shear, atol=4e-3 * np.abs(shear).max())
-    assert found.force == pytest.approx(1.0, abs=1e-4)
 
 
 @pytest.mark.parametrize(("arguments", "hints"), [

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from memscal.cli.output import emit_tables, working
-from memscal.summaries.table import Table, readable
+from memscal.summaries.table import Table
 
 
 class Terminal(io.StringIO):
@@ -19,22 +19,10 @@ class Terminal(io.StringIO):
         return True
 
 
-def stream(encoding: str) -> io.TextIOWrapper:
-    return io.TextIOWrapper(io.BytesIO(), encoding=encoding)
-
-
 TABLE = Table(
     "Quality checks", ("check", "result"), [("drift", "passed"), ("[bold]symmetry", "FAILED")],
     frozenset({1}),
 )  # fmt: skip
-
-
-@pytest.mark.parametrize(("encoding", "text"), [
-    ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"), ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
-    ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
-])  # fmt: skip
-def test_a_number_stays_the_same_in_every_encoding(encoding, text):
-    assert readable("σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa", stream(encoding)) == text
 
 
 def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]):

@@ -69,14 +69,6 @@ def test_a_sum_of_gaussians_is_stored_as_truth(run: Run, folder: Path):
     assert (truth["kernel_weights"], truth["kernel_sigmas_um"]) == ("1.5, -0.5", "700, 400")
 
 
-def test_a_disc_is_simulated_and_stored_as_truth(run: Run, folder: Path):
-    assert run("simulate", "-o", "disc.h5", "--disc-radius", 800, "--sigma", 300).code == 0
-    scan = memscal.read_scan("disc.h5")
-    own = memscal.simulate(kernel=memscal.SmoothedDisc(radius=800e-6, sigma=300e-6))
-    assert scan.synthetic == own.synthetic
-    np.testing.assert_allclose(scan.u_zz, own.u_zz, rtol=1e-12)
-
-
 def test_noise_and_law_may_be_left_unstated(run: Run, folder: Path):
     silent = ["--no-state-noise", "--no-state-law"]
     assert "neo-hookean" in run("simulate", "-o", "scan.h5", *silent).exits(0).out

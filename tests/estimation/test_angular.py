@@ -5,23 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.rasters import tailed_raster
-from helpers.scans import estimated, reference_spectrum, simulated
+from helpers.scans import estimated, simulated
 from scipy.signal import fftconvolve
 
 import memscal
 from memscal.estimation.angular import ORDERS, AngularDepartures, raster_noise
 from memscal.estimation.points import measured_points
-from memscal.estimation.profile import ProfileEstimate, estimate_profile
-from memscal.model.scan import Scan
 
 RADII = np.array([0.3e-3, 0.8e-3])
 ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
-
-
-def in_the_plane(scan: Scan) -> ProfileEstimate:
-    points = measured_points(scan)
-    contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
-    return estimate_profile(points, reference_spectrum(contact, points), angular=True)
 
 
 def test_kernels_are_blurred_rings_of_their_order() -> None:
@@ -93,13 +85,13 @@ def test_a_spike_is_an_outlier_and_asymmetry_is_none() -> None:
     spikes = (16, 18), (5, 25), (20, 12)
     for place in spikes:
         u[place] += 12 * scan.synthetic["noise"]
-    weight = in_the_plane(replace(scan, u_zz=u)).outlier_weight.reshape(u.shape)
+    weight = estimated(replace(scan, u_zz=u), angular=True).outlier_weight.reshape(u.shape)
     assert {tuple(map(int, place)) for place in np.argwhere(weight < 0.5)} == set(spikes)
 
 
 def test_a_round_sensor_keeps_its_profile_and_its_centre() -> None:
     scan = simulated(raster=True, points=33, half_range=6e-3, noise=0.005, seed=4)
-    round_, any_ = estimated(scan), in_the_plane(scan)
+    round_, any_ = estimated(scan), estimated(scan, angular=True)
     np.testing.assert_allclose(any_.centre, round_.centre, atol=2e-6)
     assert any_.conversion_constant == pytest.approx(round_.conversion_constant, rel=1e-3)
     assert np.abs(any_.oval).max() < 0.01 * any_.largest_signal

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
-from memscal.estimation.bayesian import HYPOTHESES, SHAPES, Rings
+from memscal.estimation.bayesian import HYPOTHESES, SHAPES
 from memscal.estimation.profile import constrained_profile
 
 R = np.linspace(0.0, 3e-3, 121)
@@ -147,22 +147,3 @@ def test_a_strength_of_one_is_as_large_as_the_gaussian(shape) -> None:
     )
     gaussian = CONVERSION * np.exp(-0.5 * (SIGMA * NODES.k) ** 2)
     assert expected == pytest.approx(np.sqrt(NODES.weights @ gaussian**2), rel=1e-6)
-
-
-def test_a_ring_carries_its_amplitude_whatever_its_radius_and_blur() -> None:
-    rings = Rings(np.array([0.0, 1e-3, 3e-3]), np.array([0.2e-3, 0.3e-3, 1e-3]), np.ones(3))
-    r = np.linspace(0.0, 10e-3, 20001)
-    integrals = 2 * np.pi * np.trapezoid(rings.radial(r) * r[:, None], r, axis=0)
-    np.testing.assert_allclose(integrals, 1.0, rtol=1e-6)
-    np.testing.assert_allclose(rings.transform(np.zeros(1))[0], 1.0)
-
-
-def test_the_basis_moves_the_estimate_as_its_columns_say() -> None:
-    basis, r = estimated(simulated(noise=0.002)).basis, np.linspace(0.0, 3e-3, 31)
-    columns = basis.kernels(NODES.k)
-    np.testing.assert_allclose(
-        np.stack([NODES.synthesise(c, r) for c in columns.T], axis=1),
-        basis.radial(r),
-        atol=1e-8 * np.abs(basis.radial(r)).max(),
-    )
-    assert basis.blocks[-1].stop == basis.integrals.size == columns.shape[1]

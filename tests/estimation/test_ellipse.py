@@ -72,18 +72,23 @@ def test_the_columns_are_the_derivatives_of_the_response() -> None:
 
 
 def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
-    truth, deviates = (0.25, -0.15), []
+    truth, rows = (0.25, -0.15), []
     for seed in range(SEEDS):
-        p = memscal.calibrate(
-            elliptic_scan(truth, 0.01, seed), method="bayesian"
-        ).apparatus.parameters
-        names = ("ellipticity", "ellipticity_diagonal", "gaussian_sigma")
-        wanted = (*truth, SIGMA)
-        deviates.append([(p[n] - w) / p.uncertainty(n) for n, w in zip(names, wanted, strict=True)])
+        estimate = estimated(elliptic_scan(truth, 0.01, seed))
+        fit = estimate.gaussian
+        variance = np.diag(fit.covariance(estimate.weights, estimate.noise_scale))
+        rows.append([[*fit.ellipticity, fit.sigma], np.sqrt(variance[[-2, -1, 1]])])
+    values, stated = np.array(rows).swapaxes(0, 1)
     low, high = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
-    scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
-    assert np.all(scatter < 1.1 * high)
-    assert np.all(scatter[:2] > low / 1.2)
+    scatter = np.sqrt(np.mean(((values - [*truth, SIGMA]) / stated) ** 2, axis=0))
+    # The calibration states the same of each scan, to a hundredth.
+    assert np.all(scatter < 1.09 * high)
+    assert np.all(scatter[:2] > low / 1.18)
+    scan = elliptic_scan(truth, 0.01, SEEDS - 1)
+    p = memscal.calibrate(scan, method="bayesian").apparatus.parameters
+    for i, name in enumerate(("ellipticity", "ellipticity_diagonal", "gaussian_sigma")):
+        assert p[name] == pytest.approx(values[-1, i], abs=0.01 * stated[-1, i])
+        assert p.uncertainty(name) == pytest.approx(stated[-1, i], rel=0.01)
 
 
 def test_the_field_of_an_elliptic_sensor_is_elliptic() -> None:

@@ -56,11 +56,6 @@ def test_uneven_and_unsorted_positions_change_nothing() -> None:
     assert fit(uneven).sigma == pytest.approx(fit(even).sigma, rel=1e-5)
 
 
-def test_a_raster_s_centre_is_found_in_both_directions() -> None:
-    scan = simulated(raster=True, points=17, noise=0.0, centre=(0.4e-3, -0.7e-3))
-    np.testing.assert_allclose(fit(scan).centre[0], [0.4e-3, -0.7e-3], atol=1e-9)
-
-
 def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
     for raster in (False, True):
         model = forward(simulated(raster=raster, points=13, noise=0.0))

@@ -94,8 +94,3 @@ def test_more_groups_than_ten_are_held_out_several_at_a_time_and_one_alone_not_a
     assert found.folds == 10
     assert not found.alone
     assert hold_out(estimate, np.zeros_like(estimate.points.repeat)) is None
-
-
-def test_loads_recorded_with_scatter_are_one_load() -> None:
-    load = np.array([0.51, 1.49, 0.5, 1.0, 1.5, 0.99, 1.02])
-    assert load_groups(load).tolist() == [0, 2, 0, 1, 2, 1, 1]

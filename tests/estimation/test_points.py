@@ -7,7 +7,7 @@ import pytest
 from helpers.scans import simulated
 
 from memscal.errors import InputError
-from memscal.estimation.points import joined_points, measured_points, scans_by_load
+from memscal.estimation.points import measured_points, scans_by_load
 
 
 def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
@@ -19,21 +19,6 @@ def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
     assert points.u.size == 2 * 21 - 2
     assert np.isfinite(points.u).all()
     assert np.isfinite(points.load).all()
-
-
-def test_a_raster_keeps_both_coordinates_of_every_point() -> None:
-    scan = simulated(raster=True, points=9)
-    points = measured_points(scan)
-    assert points.planar
-    k = 5 * 9 + 2
-    assert (points.y[k], points.x[k], points.u[k]) == (scan.y[5], scan.x[2], scan.u_zz[5, 2])
-
-
-def test_repeats_share_positions_and_know_their_row() -> None:
-    points = measured_points(simulated(points=11, repeats=3, branch=["approach", "retreat", ""]))
-    assert np.array_equal(points.x[:11], points.x[11:22])
-    assert np.array_equal(np.unique(points.repeat), [0, 1, 2])
-    assert np.array_equal(joined_points([points, points]).branch, np.tile([1, 2, 0], 2).repeat(11))
 
 
 def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings() -> None:

@@ -14,13 +14,6 @@ from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
 from memscal.estimation.profile import point_messages
 
 
-def test_without_noise_the_profile_is_the_scan() -> None:
-    scan = simulated(noise=0.0, kernel=RING)
-    estimate = estimated(scan)
-    np.testing.assert_allclose(estimate.predicted, scan.u_zz, atol=2e-4 * estimate.largest_signal)
-    assert estimate.conversion_constant == pytest.approx(CONVERSION, rel=1e-3)
-
-
 def test_the_noise_is_found_from_the_scatter_alone() -> None:
     # 40 scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
     degrees, seeds = 60, range(40)

@@ -32,24 +32,6 @@ def test_a_table_of_the_contact_has_the_contact_s_transform() -> None:
     assert exact.integral == pytest.approx(1.0, abs=1e-9)
 
 
-def test_a_reference_from_elsewhere_makes_the_thickness_of_the_film_irrelevant() -> None:
-    r = np.array([0.0, 0.5, 1.0, 1.4999, 1.5001, 2.0, 10.0]) * 1e-3
-    pressure = 1 / (np.pi * 1.5e-3**2)
-    disc = memscal.StressProfile(r=r, sigma_zz=np.where(r < 1.5e-3, pressure, 0.0), load=1.0)
-    found = [
-        memscal.calibrate(replace(SCAN, film=replace(SCAN.film, thickness=h)), reference=disc)
-        for h in (2e-3, 2.5e-3)
-    ]
-    one, other = (calibration.apparatus.parameters for calibration in found)
-    assert other.values == pytest.approx(one.values, rel=1e-12)
-
-
-def test_the_transform_is_per_newton_whatever_the_load() -> None:
-    light = reference_spectrum(CONTACT, POINTS)
-    heavy = memscal.indent(SCAN.film, SCAN.indenter, load=2.5)
-    np.testing.assert_allclose(reference_spectrum(heavy, POINTS).values, light.values, rtol=1e-12)
-
-
 def test_the_order_of_preference_is_given_then_carried_then_solved() -> None:
     other = CONTACT.profile()
     carrying = replace(SCAN, reference=other)
@@ -153,9 +135,3 @@ def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertaint
     np.testing.assert_allclose(
         changes["thickness"], difference, atol=0.02 * np.abs(difference).max()
     )
-
-
-def test_sources_whose_uncertainty_is_not_stated_are_left_out() -> None:
-    bare = simulated()
-    spectrum = reference_spectrum(CONTACT, POINTS)
-    assert film_sensitivities(bare, spectrum) == rod_sensitivities(bare, spectrum) == {}

@@ -11,8 +11,6 @@ import memscal
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.residuals import (
     Residuals,
-    _neighbours,
-    _traces,
     chi_square_test,
     free_model,
     neighbour_correlation_test,
@@ -117,18 +115,6 @@ def test_neighbours_of_different_passes_are_no_neighbours() -> None:
     assert runs_test(made(values, passes=10)).value == 1.0
     assert runs_test(made(values, passes=20)).p_value == 1.0
     assert neighbour_correlation_test(made(values, passes=20)).value == 0.0
-
-
-def test_the_traces_are_those_of_the_matrices() -> None:
-    residuals = residuals_of(estimated(simulated(repeats=2, points=21)))
-    neighbours = _neighbours(residuals)
-    apart = np.abs(np.subtract.outer(residuals.place, residuals.place))
-    weights = np.where((apart > 0) & (apart <= 8), 0.5 * 0.5**apart, 0.0)
-    weights[np.not_equal.outer(residuals.sequence, residuals.sequence)] = 0.0
-    np.testing.assert_allclose(neighbours.toarray(), weights)
-    moved = (np.eye(apart.shape[0]) - residuals.basis @ residuals.basis.T) @ weights
-    wanted = [np.trace(np.linalg.matrix_power(moved, p)) for p in (1, 2, 3)]
-    np.testing.assert_allclose(_traces(neighbours, residuals.basis), wanted, rtol=1e-9)
 
 
 def test_the_moments_of_the_neighbours_correlation_give_its_tail() -> None:

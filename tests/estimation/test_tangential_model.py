@@ -11,7 +11,7 @@ from memscal import GaussianMixture
 from memscal.errors import InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
-from memscal.estimation.reference import carried_force, reference_spectra
+from memscal.estimation.reference import reference_spectra
 from memscal.model.arrays import FloatArray
 from memscal.simulation.rod_scan import PAPER_ROD
 
@@ -61,19 +61,6 @@ def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sens
     np.testing.assert_allclose(found, expected, atol=2e-4 * np.abs(contact.base_shear(1e-3)))
 
 
-def test_the_signal_is_odd_along_its_component_and_even_across() -> None:
-    x, y = np.random.default_rng().uniform(-4e-3, 4e-3, (2, 8))
-    signals = []
-    for sx, sy in ((1, 1), (-1, 1), (1, -1)):
-        model = model_at(sx * x, sy * y)
-        signals.append(model.signal(model.geometry(np.zeros((1, 2))), KERNEL.transform(model.k)))
-    np.testing.assert_allclose(signals[1], -signals[0], rtol=1e-9)
-    np.testing.assert_allclose(signals[2], signals[0], rtol=1e-9)
-    on_axis = model_at(np.zeros(3), np.array([-1e-3, 0.0, 2e-3]))
-    geometry = on_axis.geometry(np.zeros((1, 2)))
-    assert np.all(on_axis.signal(geometry, KERNEL.transform(on_axis.k)) == 0)
-
-
 def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
     rng = np.random.default_rng()
     # One point exactly at the centre, where a shear changes fastest.
@@ -103,18 +90,6 @@ def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
     np.testing.assert_allclose(slope, (wide - narrow) / 2e-4, atol=1e-5 * np.abs(slope).max())
 
 
-def test_a_tabulated_shear_has_the_transform_of_the_contact_it_is_of() -> None:
-    scan = shear_scan(seed=1)
-    contact = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear")
-    points = [measured_points(scan, "xz")]
-    [solved] = reference_spectra([contact], points)
-    [tabulated] = reference_spectra([contact.profile()], points, solved.wavenumbers)
-    np.testing.assert_allclose(
-        tabulated.values, solved.values, atol=1e-5 * np.abs(solved.values).max()
-    )
-    assert carried_force(contact.profile(), tabulated) == pytest.approx(1.0, abs=1e-5)
-
-
 def test_a_reference_whose_shear_has_the_other_sign_is_refused() -> None:
     scan = shear_scan(seed=1)
     profile = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear").profile()
@@ -124,13 +99,3 @@ def test_a_reference_whose_shear_has_the_other_sign_is_refused() -> None:
     with pytest.raises(InputError, match="outward") as refusal:
         reference_spectra([wrong], points)
     assert "--shear-sign -1" in refusal.value.cure
-
-
-def test_the_points_of_a_channel_are_its_own_voltages_and_noise() -> None:
-    scan = shear_scan(seed=2)
-    points = measured_points(scan, "xz")
-    np.testing.assert_array_equal(points.u, scan.channels["u_xz"])
-    np.testing.assert_array_equal(points.u_errors, scan.channels["u_xz_errors"])
-    assert (points.order, measured_points(scan).order) == (1, 0)
-    without = replace(scan, channels={"u_xz": scan.channels["u_xz"]})
-    assert measured_points(without, "xz").u_errors is None  # not the noise of u_zz

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison, stress
+from helpers.friction_results import LOADS, comparison, interface_comparison, stress
 from matplotlib.axes import Axes
 
 from memscal.cli.compare import figure_stems
@@ -176,12 +176,6 @@ def test_loads_that_were_recorded_look_as_their_neighbours():
     assert looks[2.75][1] == "2.75 N"
 
 
-def test_an_axis_of_friction_is_monotone_and_ends_at_infinity():
-    t = friction_position(FRICTION)
-    assert np.all(np.diff(t) > 0)
-    assert (t[0], t[-1]) == (0.0, 1.0)
-
-
 @pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
 def test_a_profile_between_the_measured_radii_is_even_and_smooth(first):
     width = 1e-3
@@ -218,11 +212,6 @@ def test_evidence_is_drawn_below_that_of_the_best_law():
     np.testing.assert_allclose(drawn, expected)
 
 
-def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionComparison):
-    with pytest.raises(InputError, match="interface=True"):
-        of_friction.interface_figure(found)
-
-
 def test_one_load_and_one_loading_are_enough():
     found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
     several = of_friction.comparison_figures(found).values()
@@ -235,3 +224,5 @@ def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionCom
         profile_figure(found, loading="sideways")
     with pytest.raises(InputError, match="not stated"):
         friction_set_figure(found, lubrication="")
+    with pytest.raises(InputError, match="interface=True"):
+        of_friction.interface_figure(found)

@@ -19,7 +19,6 @@ from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.hdf5 import reader as hdf5_reader
-from memscal.formats.hdf5.limits import attribute_text_lengths
 from memscal.formats.scan import read_scan, write_scan
 
 SIGNAL = "/entry/data/u_zz"
@@ -270,18 +269,6 @@ def test_every_flipped_byte_of_a_heap_of_texts_is_met_without_hanging(path: Path
         file["/entry/data/x"].attrs["units"] = "mm"
     sweep = SWEEP.replace("range(8, len(good), 97)", "range(heap, heap + 160)")
     assert sum(run_sweep(path, sweep)) == 160
-
-
-@pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
-@pytest.mark.parametrize("further", [0, 5, 30])
-def test_the_claims_of_an_attribute_are_found_where_hdf5_stores_it(tmp_path: Path, libver, further):
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w", libver=libver, track_order=further == 5) as file:
-        for i in range(further):
-            file.attrs[f"further_{i}"] = "y" * i
-        file.attrs["axes"] = ["repeat", "x"]
-        header = h5py.h5o.get_info(file.id).addr
-    assert attribute_text_lengths(path.read_bytes(), header, b"axes", 2) == [6, 1]
 
 
 def test_a_text_dataset_longer_than_any_text_is_refused(path: Path):

@@ -66,13 +66,6 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
     assert abs(np.sqrt(np.mean(np.square(apart))) - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
 
 
-def test_the_budget_is_the_uncertainty_where_the_likelihood_is_a_parabola() -> None:
-    for one in found(0.1):
-        if one.standard_uncertainty is not None:
-            whole = np.linalg.norm(list(one.budget.values()))
-            assert whole == pytest.approx(one.standard_uncertainty, rel=0.35)
-
-
 def test_all_loads_together_tell_more_than_each() -> None:
     confronted = laboratory().drawn(0.1, seed=1)
     joint, single = confronted.effective([0, 1]), confronted.effective([0])

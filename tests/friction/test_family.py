@@ -57,13 +57,6 @@ def test_between_its_values_a_family_that_rises_never_falls() -> None:
     assert passed[-1] == pytest.approx(one.spectra[-1, 0, 0])
 
 
-def test_the_slope_of_a_member_is_the_derivative_by_the_coordinate() -> None:
-    one, t, step = family(), 0.37, 1e-5
-    above, below = (one.at(one.value_at(t + d)).spectra for d in (step, -step))
-    slope = one.at(one.value_at(t)).by_coordinate
-    np.testing.assert_allclose((above - below) / (2 * step), slope, rtol=1e-6)
-
-
 def test_a_family_is_not_extrapolated() -> None:
     fields = {name: getattr(family(), name) for name in family().__dataclass_fields__}
     short = ProfileFamily(**(fields | {"values": np.array([0.05, 0.1, 0.2, 0.3, 0.4])}))
@@ -85,12 +78,3 @@ def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
 def test_a_value_that_is_none_is_refused(wrong: float) -> None:
     with pytest.raises(InputError, match="not negative"):
         family().coordinate(wrong)
-
-
-def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
-    one = family()
-    assert one.only(1).loads.tolist() == [1.0]
-    turned = one.only([1, 0])
-    assert turned.loads.tolist() == [1.0, 0.5]
-    assert_same_to_rounding(turned.at(0.2).spectra, one.at(0.2).spectra[:, ::-1])
-    assert_same_to_rounding(turned.changes["thickness"], one.changes["thickness"][:, ::-1])

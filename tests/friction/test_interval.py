@@ -14,10 +14,10 @@ def value_at(t: float) -> float:
     return float("inf") if t == 1 else 0.3 * t / (1 - t)
 
 
-def estimate(chi_square: FloatArray, last: float = np.inf, level: float = 0.95) -> BoundedEstimate:
+def estimate(chi_square: FloatArray, last: float = np.inf) -> BoundedEstimate:
     return profile_estimate(
         np.array([value_at(t) for t in COORDINATES]), COORDINATES, chi_square, value_at,
-        reason=lambda interval: friction_reason(interval, last), level=level,
+        reason=lambda interval: friction_reason(interval, last),
     )  # fmt: skip
 
 
@@ -74,9 +74,3 @@ def test_what_is_flat_beyond_a_value_bounds_from_below_only() -> None:
     found = estimate(60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100)
     assert found.interval.high is None
     assert found.interval.low == pytest.approx(value_at(0.5 - np.sqrt(3.84 / 6000)), rel=1e-2)
-
-
-def test_a_lower_level_gives_a_narrower_interval() -> None:
-    chi_square = ((COORDINATES - 0.4) / 0.1) ** 2
-    wide, narrow = (estimate(chi_square, level=level).interval for level in (0.95, 0.6))
-    assert wide.low < narrow.low < narrow.high < wide.high

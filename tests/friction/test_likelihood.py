@@ -121,11 +121,3 @@ def test_the_tables_of_the_evidence_hold_the_same_chi_square(laboratory: Laborat
     whole = laboratory.drawn(0.1, seed=7).whole
     chi_square = log_likelihood(whole.tables().together())[1][:, 0]
     assert chi_square == pytest.approx(whole.chi_square, rel=1e-6)
-
-
-def test_repeats_tell_more_than_one_line() -> None:
-    once = Laboratory.of().drawn(0.15, seed=8)
-    often = Laboratory.of(points=bare_points(repeats=4)).drawn(0.15, seed=8)
-    i = int(np.argmin(np.abs(once.members.values - 0.15)))
-    assert often.whole.information[i] > once.whole.information[i]
-    assert often.whole.degrees == 2 * (4 * 33 - 3)

@@ -40,11 +40,11 @@ def simulated(branch: Any = None, **options: Any) -> Scan:
     return replace(memscal.simulate(**(exact | options)), branch=branch)
 
 
-def estimated(scan: Scan) -> ProfileEstimate:
+def estimated(scan: Scan, *, angular: bool = False) -> ProfileEstimate:
     """Estimate the profile of a scan with the rod's own solution as reference."""
     points: ScanPoints = measured_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
-    return estimate_profile(points, reference_spectrum(contact, points))
+    return estimate_profile(points, reference_spectrum(contact, points), angular=angular)
 
 
 def reference_spectrum(reference: Any, points: ScanPoints, nodes: Any = None) -> RadialSpectrum:

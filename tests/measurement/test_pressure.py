@@ -43,11 +43,6 @@ def test_widening_is_the_derivative_by_the_width(shape: PressureShape) -> None:
     np.testing.assert_allclose(slope * WIDTH, difference / 2e-4, atol=1e-6)
 
 
-@pytest.mark.parametrize("shape", pressure_shapes(EXACT_FILM), ids=str)
-def test_every_shape_carries_one_newton(shape: PressureShape) -> None:
-    assert shape.transform(np.zeros(1), WIDTH)[0][0] == pytest.approx(1.0, abs=1e-12)
-
-
 def test_shapes_of_one_width_have_one_mean_square_radius() -> None:
     k = np.array([1.0])
     normal = [shape for shape in pressure_shapes(EXACT_FILM) if shape.shear == 0.0]

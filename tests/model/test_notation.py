@@ -19,14 +19,10 @@ from memscal.model.notation import format_measured
     (1.5, 25.0, "mm", "(2 ± 25) mm"),
     (12345.0, 1234.0, "Pa", "(12300 ± 1200) Pa"),
     (999999.0, 51.0, "", "(9.99999 ± 0.00051)×10⁵"),
-    (0.5, 0.01, "1", "0.500 ± 0.010"),
+    (0.5, 0.01, "1", "0.500 ± 0.010"), (-0.0001, 0.02, "mV", "(0.000 ± 0.020) mV"),
 ])  # fmt: skip
 def test_a_value_is_rounded_to_two_digits_of_its_uncertainty(value, uncertainty, unit, plain):
     assert format_measured(value, uncertainty, unit) == plain
-
-
-def test_a_value_that_rounds_to_zero_has_no_minus_sign():
-    assert format_measured(-0.0001, 0.02, "mV") == "(0.000 ± 0.020) mV"
 
 
 @pytest.mark.parametrize("uncertainty", [None, 0.0, float("nan"), float("inf")])

@@ -1,6 +1,5 @@
 """Expected uncertainties of a plan: laws that they follow, and limits in which they are known."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,6 @@ import memscal
 from memscal import Plan
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
-from memscal.estimation.bayesian import departure_basis, weigh_departures
-from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import fit_gaussian_to_points
-from memscal.estimation.points import measured_points
-from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import find_band, smooth_profile
 from memscal.planning.design import Design, expected_calibration, varied_designs
 
@@ -81,29 +75,6 @@ def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
     bands = np.array([find_band(e, smooth_profile(e)).resolved for e in drawn])
     assert abs(expected.band.resolved / bands.mean() - 1) < 0.02 + 3.9 * bands.std() / (
         bands.mean() * np.sqrt(len(drawn))
-    )
-
-
-def test_the_mean_of_repeats_is_worth_all_of_them() -> None:
-    clean = simulated(noise=0.0, repeats=3)
-    noise = 0.01 * float(clean.u_zz.max())
-    found = []
-    for u_zz, share in ((clean.u_zz, 1), (clean.u_zz[0], 3)):
-        errors = np.full(u_zz.shape, noise / np.sqrt(share))
-        points = measured_points(replace(clean, u_zz=u_zz, u_zz_errors=errors))
-        contact = memscal.indent(clean.film, clean.indenter, load=clean.load)
-        references = reference_spectra([contact], [points])
-        model, weights = ForwardModel(points, references), 1 / errors.ravel() ** 2
-        fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
-        basis = departure_basis(model, fit)
-        count = float(share * weights.size)
-        found.append(weigh_departures(model, fit, basis, weights, count, expected_noise=1.0))
-    every, mean = found
-    np.testing.assert_allclose(mean.probability, every.probability, atol=1e-6)
-    assert mean.noise == pytest.approx(every.noise, rel=1e-6)
-    size = np.sqrt(np.diag(every.covariance))
-    np.testing.assert_allclose(
-        mean.covariance / np.outer(size, size), every.covariance / np.outer(size, size), atol=1e-5
     )
 
 

@@ -14,12 +14,7 @@ import memscal
 from memscal.errors import DomainError, InputError
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
-from memscal.simulation.experiment import (
-    PAPER_SPHERE,
-    Reality,
-    drawn,
-    simulate_contacts,
-)
+from memscal.simulation.experiment import PAPER_SPHERE, Reality, drawn, simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, blurred_stress
 
 STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
