@@ -61,9 +61,7 @@ def ring_areas(r: FloatArray) -> FloatArray:
 ACROSS = -1
 
 
-@lru_cache(maxsize=8)
-def _legendre(order: int) -> tuple[FloatArray, FloatArray]:
-    return np.polynomial.legendre.leggauss(order)
+_legendre = lru_cache(maxsize=8)(np.polynomial.legendre.leggauss)
 
 
 # Panels of many nodes are nearly as good as one Gauss rule for all (pi nodes an oscillation),

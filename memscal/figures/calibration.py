@@ -316,15 +316,13 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     radial = data.radial_profile
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_band(axes, radial, floor=-np.inf)
-    _draw_profiles(axes, radial.r, radial.g, radial.g_gaussian)
+    _draw_profiles(axes, data, radial.g, radial.g_gaussian)
     low, high = (radial.g + side * _EXPANDED * radial.g_errors for side in (-1, 1))
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(high), 3 * peak)
     bottom = -min(_largest(-low, floor=0.0), 1.5 * peak)
     axes.set_ylim((bottom - 0.06 * top) / PER_MM2, 1.06 * top / PER_MM2)
-    axes.set_xlim(0.0, _shown_radius(radial) / MM)
-    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
     legend_above(axes)
 
 
@@ -338,11 +336,9 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     floor = max(0.3 * float(smallest), 10**-_LOG_DECADES * peak)
     _draw_band(axes, radial, floor=floor)
     positive = (np.where(g > 0, g, np.nan) for g in (radial.g, radial.g_gaussian))
-    _draw_profiles(axes, radial.r, *positive)
+    _draw_profiles(axes, data, *positive)
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
-    axes.set_xlim(0.0, _shown_radius(radial) / MM)
     axes.set_xlabel("distance from the axis $r$ (mm)")
-    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
 
 
 def draw_transfer(axes: Axes, data: ApparatusData) -> None:
@@ -379,9 +375,12 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
     axes.fill_between(r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
 
 
-def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
+def _draw_profiles(axes: Axes, data: ApparatusData, g: FloatArray, gaussian: FloatArray) -> None:
+    r = data.radial_profile.r
     axes.plot(r / MM, g / PER_MM2, "-", color=COLOURS["deconvolved"], label="deconvolved G")
     axes.plot(r / MM, gaussian / PER_MM2, "--", color=COLOURS["gaussian"], label="Gaussian fit")
+    axes.set_xlim(0.0, _shown_radius(data.radial_profile) / MM)
+    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
 
 
 def _shown_radius(radial: ApparatusRadial) -> float:
