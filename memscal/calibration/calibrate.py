@@ -13,7 +13,7 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
-from memscal.calibration.drawn_scatter import drawn_scatter, is_linear
+from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
@@ -175,6 +175,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
 
 
 _OF_POINTS = ("normal_load", "normal_load_errors")
+#: Methods whose derivatives are complete.
+_LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
 Reference: TypeAlias = (
     StressProfile | StressField | IdealReference | Contact | str | PathLike[str] | None
@@ -522,7 +524,7 @@ def uncertainties(
     """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
     # A linear method's derivatives are complete; of another, the scatter of draws is taken.
-    linear = deconvolution is not solution.deconvolution or is_linear(solution.method)
+    linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
     drawn = None if linear else drawn_scatter(solution)
     results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
     results = replace(results, parameters=replace(results.parameters, reading=reading))
