@@ -53,7 +53,7 @@ def _mixture(lower: ContactState, upper: ContactState, target: Target) -> Contac
         name: (1 - share) * getattr(lower, name) + share * getattr(upper, name)
         for name in ("pressure", "shear", "depth", "load", "anchor", "outward")
     }
-    return replace(upper, **mixed, iterations=lower.iterations + upper.iterations)
+    return replace(upper, **mixed)
 
 
 def _reached(state: ContactState, target: Target) -> float:
