@@ -51,10 +51,8 @@ def _controller() -> ThreadpoolController:
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Run BLAS on one thread, also as a decorator; a number that the user set stays.
-
-    On matrices of a few hundred rows, waiting threads cost ten times the work's processor time.
-    """
+    """Run BLAS on one thread, also as a decorator; a number that the user set stays."""
+    # On matrices of a few hundred rows, waiting threads cost ten times the work's processor time.
     if _set_by_user():
         yield
     else:
@@ -77,10 +75,8 @@ def require_workers(workers: Any) -> None:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes, started afresh: one forked from a process with threads may hang.
-
-    BLAS reads its number of threads, one, from the environment, which is put back afterwards.
-    """
+    """Yield a pool of processes, started afresh: one forked from one with threads may hang."""
+    # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 

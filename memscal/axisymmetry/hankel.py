@@ -9,16 +9,9 @@ The two-dimensional Fourier transform of an axisymmetric field is a Hankel trans
 
 so that :math:`\hat f(0)` is the integral of the field, and convolution is multiplication.
 
-Of a radial vector field :math:`v(r)\,\hat r`, such as the shear at the base, every component is
-:math:`v(r)\cos\theta`, and its transform one of order one,
-
-.. math::
-
-    \hat v(k) = 2\pi\int_0^\infty v(r)\,J_1(kr)\,r\,dr, \qquad
-    v(r) = \frac{1}{2\pi}\int_0^\infty \hat v(k)\,J_1(kr)\,k\,dk .
-
-Convolved with a radial function it stays a radial vector field, and the transforms are
-multiplied: :math:`(G \otimes v\,\hat r)\,\hat{} = \hat G\,\hat v`.
+Of a radial vector field, such as the shear at the base, every component is
+:math:`v(r)\cos\theta`, and its transform is one of order one, with :math:`J_1`.  Convolved with a
+radial function it stays such a field, and the transforms are multiplied.
 """
 
 from __future__ import annotations
@@ -61,9 +54,7 @@ def ring_areas(r: FloatArray) -> FloatArray:
 ACROSS = -1
 
 
-@lru_cache(maxsize=8)
-def _legendre(order: int) -> tuple[FloatArray, FloatArray]:
-    return np.polynomial.legendre.leggauss(order)
+_legendre = lru_cache(maxsize=8)(np.polynomial.legendre.leggauss)
 
 
 # Panels of many nodes are nearly as good as one Gauss rule for all (pi nodes an oscillation),

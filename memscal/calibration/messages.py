@@ -153,7 +153,10 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     def changed(by: str, sign: int) -> str:
         if by not in changes:
             return "cannot be solved at this depth, and nothing is counted for it"
-        return f"would change {_change_of(results.parameters, sign * changes[by] / RECTANGLE)}"
+        change = sign * changes[by] / RECTANGLE
+        rows = _a_and_sigma(results.parameters)
+        words = [f"{symbol} by {change[i] / value:+.1%}" for symbol, i, value in rows]
+        return f"would change {' and '.join(words)}"
 
     if law in ("", LINEAR):
         rubber = f"a neo-Hookean film under a rod that sticks {changed('model_form', 1)}"
@@ -186,12 +189,6 @@ def _changes(solution: Solution, scans: Sequence[Scan]) -> Mapping[str, FloatArr
     """Changes of the parameters by one standard uncertainty of what these scans state."""
     effects = input_effects(scans, solution.stresses, solution.estimate)
     return propagate(solution, solution.deconvolution, np.zeros(0), effects, {}).changes
-
-
-def _change_of(parameters: ParameterSet, change: FloatArray) -> str:
-    """Return relative changes of A and of the fitted width in words."""
-    rows = _a_and_sigma(parameters)
-    return " and ".join(f"{symbol} by {change[i] / value:+.1%}" for symbol, i, value in rows)
 
 
 #: Film properties by their names in messages, with their symbols; the share by which one that

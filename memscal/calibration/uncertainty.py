@@ -1,19 +1,9 @@
 r"""First-order propagation of noise, regularisation and uncertain inputs to A, G and its widths.
 
 A division is linear in the voltages: :math:`A\,G(r)` is the inverse transform of the window times
-the smoothed voltages' transform over the reference's.  Its covariance by noise is exact for given
-centre, weights, smoothing and window; centre, baseline and drift enter by their derivatives.  What
-window and smoothing hide of the posterior is stated apart (``window``).
-
-Method ``bayesian`` is a linear function of the posterior of the profile's parameters: what
-scatters from scan to scan is ``noise``, the rest of the expected squared error ``regularisation``.
-
-A Gaussian that misfits depends on where the points lie.  Where points beyond a share f of the reach
-R count for nothing, its parameters change to first order by :math:`-\sum_{r_i > fR} g_i d_i`, with
-the gain g of its fit and the misfit d, posterior mean less Gaussian.  ``misfit`` is the root mean
-square of that for f from a half to one: the sandwich :math:`\sum_{ij} g_i d_i K_{ij} d_j g_j` of
-a misspecified model (White, Econometrica 50 (1982) 1; Conley, J. Econometrics 92 (1999) 1) with
-:math:`K_{ij}` the share of those f below both :math:`r_i/R` and :math:`r_j/R`.
+the smoothed voltages' transform over the reference's.  Method ``bayesian`` is a linear function of
+the posterior of the profile's parameters: what scatters from scan to scan is ``noise``, the rest
+of the expected squared error ``regularisation``.  All sources are described in docs/method.md.
 
 Inputs add one column each, the change of all results by one standard uncertainty.  An input that
 is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
@@ -79,9 +69,11 @@ class Functional:
 
 
 def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
-    """Return the Gaussian width nearest to G, its full width at half maximum and its area."""
+    """Return the Gaussian width nearest to G, its half width and noise-equivalent area."""
     r, g = field.r, field.radial
-    return (_gaussian_width(r, g, sigma), _half_width(r, g), _equivalent_area(r, g))
+    area = float(1 / np.sum(ring_areas(r) * g**2))  # 4 pi sigma^2 of a Gaussian
+    of_noise = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
+    return (_gaussian_width(r, g, sigma), _half_width(r, g), of_noise)
 
 
 def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
@@ -106,12 +98,6 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
     row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
     row = -2 * row / slope if slope else np.zeros_like(row)
     return Functional("fwhm", float(2 * half), row)
-
-
-def _equivalent_area(r: FloatArray, g: FloatArray) -> Functional:
-    r"""Noise-equivalent area :math:`1/\int G^2\,dA`, in m^2: 4 pi sigma^2 of a Gaussian."""
-    area = float(1 / np.sum(ring_areas(r) * g**2))
-    return Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
 
 
 def _at(r: FloatArray, place: float) -> FloatArray:
@@ -150,24 +136,18 @@ def input_effects(
     if alternatives is not None:
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (a.values - ours.values) for a, ours in pairs]
-    effects = {source: _of_reference(estimate, change) for source, change in changes.items()}
-    return effects | _of_positions(scans, estimate) | _of_loads(scans, stresses, estimate)
-
-
-def _of_reference(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> InputEffect:
-    pairs = zip(estimate.model.references, changes, strict=True)
-    spectra = tuple(replace(reference, values=change) for reference, change in pairs)
-    changed = replace(estimate.model, references=spectra)
-    return InputEffect(-changed.signal(estimate.gaussian.geometry, estimate.kernel))
-
-
-def _of_positions(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, InputEffect]:
+    effects = {}
+    for source, change in changes.items():
+        changed = zip(model.references, change, strict=True)
+        spectra = tuple(replace(reference, values=values) for reference, values in changed)
+        signal = replace(model, references=spectra).signal
+        effects[source] = InputEffect(-signal(estimate.gaussian.geometry, estimate.kernel))
     shares = np.array([scan.position_scale_uncertainty or 0.0 for scan in scans])
-    if not shares.any():
-        return {}
-    slope = estimate.model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
-    error = slope * estimate.distance * shares[estimate.points.scan]
-    return {"position_scale": InputEffect(-error)}
+    if shares.any():
+        slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
+        error = slope * estimate.distance * shares[estimate.points.scan]
+        effects["position_scale"] = InputEffect(-error)
+    return effects | _of_loads(scans, stresses, estimate)
 
 
 def _of_loads(
@@ -347,10 +327,8 @@ def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float]
 
 
 def expected_values(solution: Solution) -> dict[str, float]:
-    """Parameters that scans about the posterior mean give on average, to first order.
-
-    A division follows the noise of its scan, of which scans drawn about the mean know nothing.
-    """
+    """Parameters that scans about the posterior mean give on average, to first order."""
+    # A division follows the noise of its scan, of which scans drawn about the mean know nothing.
     estimate, deconvolution = solution.estimate, solution.deconvolution
     kernel = _kernel_derivatives(solution, deconvolution, np.zeros(0))
     residual = estimate.points.u - drawn_about(solution)
@@ -384,10 +362,16 @@ def _numbers(
     """Value and derivatives of each parameter, in the order in which they are reported."""
     of_g = kernel[1 : 1 + deconvolution.g.r.size]
     functionals = kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma)
-    hidden = kernel.hidden.shape[1]
+    hidden, gaussian = kernel.hidden.shape[1], estimate.gaussian
+    # A round departure beside an ellipse would be read as less of width and ellipticity.
+    gain, count = estimate.gaussian_gain, estimate.points.ellipse
+    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], hidden))}
+    first = len(gain) - count
+    for i, name in enumerate(_OF_GAUSSIAN[2 : 2 + count]):
+        numbers[name] = float(gaussian.ellipticity[i]), _fitted(estimate, gain[first + i], hidden)
     return {
         "conversion_constant": (deconvolution.conversion_constant, kernel[:1]),
-        **_gaussian_numbers(estimate, hidden),
+        **numbers,
         **{f.name: (f.value, of_g.combined(f.row)) for f in functionals},
         **_nuisances(estimate, hidden),
     }
@@ -397,18 +381,6 @@ def _fitted(estimate: ProfileEstimate, row: FloatArray, hidden: int) -> _Derivat
     """Derivatives of a parameter that no regularisation touches."""
     states = np.zeros((1, estimate.basis.integrals.size))
     return _Derivatives(row[None, :], states, np.zeros((1, hidden)))
-
-
-def _gaussian_numbers(
-    estimate: ProfileEstimate, hidden: int
-) -> dict[str, tuple[float, _Derivatives]]:
-    """Width and ellipticity: a round departure beside an ellipse would be read as less of both."""
-    gaussian, gain, count = estimate.gaussian, estimate.gaussian_gain, estimate.points.ellipse
-    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], hidden))}
-    first = len(gain) - count
-    for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[:count]):
-        numbers[name] = float(gaussian.ellipticity[i]), _fitted(estimate, gain[first + i], hidden)
-    return numbers
 
 
 def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float, _Derivatives]]:
@@ -464,7 +436,8 @@ def _posterior_kernel(
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
-    rows = np.vstack([basis.integrals, radial, _interpolated(wavenumbers, k, normalised)])
+    transfer = [np.interp(wavenumbers, k, column) for column in normalised.T]
+    rows = np.vstack([basis.integrals, radial, np.stack(transfer, axis=1)])
     return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
 
 
@@ -518,12 +491,9 @@ def _division_map(
 
 
 def route_difference(solution: Solution) -> float | None:
-    r"""Difference of division and Bayesian estimate beyond what the division hides, over its size.
-
-    The division of the residuals of the Bayesian fit: of A in standard deviations, of G as the
-    root of :math:`\int \Delta G^2\,dA` over its expectation; the larger one.  ``None`` where
-    there is one estimate only.
-    """
+    """Difference of division and Bayesian estimate beyond what the former hides, over its size."""
+    # Of the division of the Bayesian fit's residuals: A's in standard deviations, or the root of
+    # G's squared integral over its expectation, if that is larger.
     estimate, smoothed = solution.estimate, solution.smoothed
     if solution.other is None or smoothed is None:
         return None
@@ -539,13 +509,6 @@ def route_difference(solution: Solution) -> float | None:
     of_a = abs(difference[0]) / np.sqrt(variance[0])
     of_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
     return float(max(of_a, of_g))
-
-
-def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) -> FloatArray:
-    """Interpolate every column linearly, its ends continued: np.interp for all at once."""
-    left = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
-    share = np.clip((places - nodes[left]) / (nodes[left + 1] - nodes[left]), 0.0, 1.0)[:, None]
-    return np.asarray((1 - share) * columns[left] + share * columns[left + 1])
 
 
 def _drawn_columns(
@@ -564,6 +527,8 @@ def _drawn_columns(
 
 def _misfit_columns(estimate: ProfileEstimate, gain: FloatArray) -> FloatArray:
     """Changes of the Gaussian fit, of this gain, with the reach of its scans; mean square: sum."""
+    # The sandwich of a misspecified model: White, Econometrica 50 (1982) 1; Conley, J. Econometrics
+    # 92 (1999) 1.
     points, distance = estimate.points, estimate.distance
     reach = np.array([distance[points.scan == i].max() for i in range(points.scans)])
     share = distance / reach[points.scan]

@@ -315,16 +315,13 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     """Draw G(r), twice its standard uncertainty and the Gaussian, linear."""
     radial = data.radial_profile
     axes.axhline(0.0, color="0.4", lw=0.6)
-    _draw_band(axes, radial, floor=-np.inf)
-    _draw_profiles(axes, radial.r, radial.g, radial.g_gaussian)
+    _draw_profiles(axes, data, radial.g, radial.g_gaussian, floor=-np.inf)
     low, high = (radial.g + side * _EXPANDED * radial.g_errors for side in (-1, 1))
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(high), 3 * peak)
     bottom = -min(_largest(-low, floor=0.0), 1.5 * peak)
     axes.set_ylim((bottom - 0.06 * top) / PER_MM2, 1.06 * top / PER_MM2)
-    axes.set_xlim(0.0, _shown_radius(radial) / MM)
-    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
     legend_above(axes)
 
 
@@ -336,13 +333,10 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     inside = radial.r <= _shown_radius(radial)
     smallest = np.min(np.maximum(radial.g_gaussian[inside], 10**-_LOG_DECADES * peak))
     floor = max(0.3 * float(smallest), 10**-_LOG_DECADES * peak)
-    _draw_band(axes, radial, floor=floor)
     positive = (np.where(g > 0, g, np.nan) for g in (radial.g, radial.g_gaussian))
-    _draw_profiles(axes, radial.r, *positive)
+    _draw_profiles(axes, data, *positive, floor=floor)
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
-    axes.set_xlim(0.0, _shown_radius(radial) / MM)
     axes.set_xlabel("distance from the axis $r$ (mm)")
-    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
 
 
 def draw_transfer(axes: Axes, data: ApparatusData) -> None:
@@ -372,16 +366,18 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     legend_above(axes)
 
 
-def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
-    spread = _EXPANDED * radial.g_errors
+def _draw_profiles(
+    axes: Axes, data: ApparatusData, g: FloatArray, gaussian: FloatArray, *, floor: float
+) -> None:
+    """Draw the band of G above a floor, and both profiles to where they have died away."""
+    radial, blue = data.radial_profile, COLOURS["deconvolved"]
+    r, spread = radial.r / MM, _EXPANDED * radial.g_errors
     low, high = (np.maximum(radial.g + side * spread, floor) / PER_MM2 for side in (-1, 1))
-    blue, r = COLOURS["deconvolved"], radial.r / MM
     axes.fill_between(r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
-
-
-def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
-    axes.plot(r / MM, g / PER_MM2, "-", color=COLOURS["deconvolved"], label="deconvolved G")
-    axes.plot(r / MM, gaussian / PER_MM2, "--", color=COLOURS["gaussian"], label="Gaussian fit")
+    axes.plot(r, g / PER_MM2, "-", color=blue, label="deconvolved G")
+    axes.plot(r, gaussian / PER_MM2, "--", color=COLOURS["gaussian"], label="Gaussian fit")
+    axes.set_xlim(0.0, _shown_radius(radial) / MM)
+    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
 
 
 def _shown_radius(radial: ApparatusRadial) -> float:

@@ -151,15 +151,11 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
 def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
     """Name the curves at their ends; those that end together share a name."""
     bottom, top = axes.get_ylim()
-    groups: list[list[tuple[float, float]]] = []
-    for end in sorted(ends):
-        if groups and end[0] - groups[-1][-1][0] < _APART * (top - bottom):
-            groups[-1].append(end)
-        else:
-            groups.append([end])
+    values = np.array(sorted(ends))
+    apart = np.diff(values[:, 0]) >= _APART * (top - bottom)
+    groups = np.split(values, np.flatnonzero(apart) + 1)
     for group in groups:
-        height = float(np.mean([value for value, _ in group]))
-        low, high = min(mu for _, mu in group), max(mu for _, mu in group)
+        height, (low, high) = float(np.mean(group[:, 0])), (group[:, 1].min(), group[:, 1].max())
         text = friction_name(low)
         if low < high:
             text = f"≥ {text}" if np.isinf(high) else f"{text}–{high:.3g}"

@@ -233,7 +233,14 @@ def external_family(
     tables = [(_checked_friction(profile, reach), profile) for profile in profiles]
     if not tables:
         raise InputError("No table of a calculated stress was given.")
-    loading = _common_loading(tables)
+    loadings = {profile.loading for mu, profile in tables if profile.loading and mu > 0}
+    if len(loadings) > 1:
+        raise InputError(
+            "Some of the tables are for incremental loading and some for total loading.",
+            why="A family holds one loading.",
+            cure="Give the tables of one loading at a time.",
+        )
+    loading = "".join(loadings)
     frictions = np.array(sorted({mu for mu, _ in tables}))
     grid = _grid(tables, frictions, nominal)
     nodes = base_wavenumbers(film.thickness, reach)
@@ -322,22 +329,10 @@ def _checked_friction(profile: StressProfile, reach: float) -> float:
     return float(profile.friction_coefficient)
 
 
-def _common_loading(tables: Sequence[_Table]) -> str:
-    loadings = {profile.loading for mu, profile in tables if profile.loading and mu > 0}
-    if len(loadings) > 1:
-        raise InputError(
-            "Some of the tables are for incremental loading and some for total loading.",
-            why="A family holds one loading.",
-            cure="Give the tables of one loading at a time.",
-        )
-    return loadings.pop() if loadings else ""
-
-
 def _name(profile: StressProfile) -> str:
     return profile.source.file_name if profile.source else f"A table for {profile.load:g} N"
 
 
 def _numbers(grid: Sequence[Sequence[StressProfile]], name: str) -> FloatArray:
     """Return a number that tables may state, NaN where they do not."""
-    rows = [[getattr(cell, name) for cell in row] for row in grid]
-    return np.array([[math.nan if v is None else float(v) for v in row] for row in rows])
+    return np.array([[getattr(cell, name) for cell in row] for row in grid], dtype=np.float64)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -275,12 +276,10 @@ _FEWEST_PLACES = 6
 
 def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int]]:
     """Return the indices of dry and lubricated profiles of one load."""
-    kinds = [profile.lubrication for profile in profiles]
     return [
         (i, j)
-        for i, dry in enumerate(profiles)
-        for j, wet in enumerate(profiles)
-        if (kinds[i], kinds[j]) == ("dry", "lubricated")
+        for (i, dry), (j, wet) in product(enumerate(profiles), repeat=2)
+        if (dry.lubrication, wet.lubrication) == ("dry", "lubricated")
         and abs(dry.load / wet.load - 1) < _SAME_LOAD
     ]
 

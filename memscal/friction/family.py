@@ -1,14 +1,9 @@
-r"""Families of calculated base stresses: along one parameter of the interface, at each load.
+"""Families of calculated base stresses: along one parameter of the interface, at each load.
 
-A family holds the transforms :math:`\hat\sigma(k; P, \theta)` of the base stress of contacts that
-were solved at a few values of one parameter :math:`\theta`: the friction coefficient, or a length
-by which the interface yields.  Between the values it interpolates in the bounded coordinate
-
-.. math:: t = \frac{\theta}{\theta + \theta_0}, \qquad 0 \le t \le 1,
-
-in which :math:`\theta = \infty` is the point :math:`t = 1`, by a monotone cubic (Fritsch and
-Carlson): past the friction at which the contact sticks wholly nothing changes any more, and an
-interpolant must not ring there.
+A family holds the transforms of the base stress of contacts that were solved at a few values of
+one parameter: a friction coefficient, or a length by which the interface yields.  Between them it
+interpolates by a monotone cubic in a bounded coordinate, t = theta/(theta + theta_0): past the
+friction at which the contact sticks wholly nothing changes, and an interpolant must not ring.
 """
 
 from __future__ import annotations
@@ -84,7 +79,7 @@ class ProfileFamily(FrozenArrays):
         return self._interpolated(self.coordinates, 1)[:, 0] if self.slopes is None else self.slopes
 
     def coordinate(self, value: float) -> float:
-        r"""Return the bounded coordinate :math:`t = \theta/(\theta + \theta_0)` of a value."""
+        """Return the bounded coordinate of a value; refuse what no family has."""
         if math.isnan(value) or value < 0:
             raise InputError(f"A {self.name} family has no value {value:g}: it is not negative.")
         return float(bounded(value, self.scale))
@@ -164,21 +159,9 @@ def _scaled_changes(
     length: FloatArray,
     strength: FloatArray,
 ) -> dict[str, FloatArray]:
-    r"""Return the changes by one stated standard uncertainty, by the scales of the contact.
-
-    A film is linear, and a sphere a paraboloid to 2e-4 of its height at a contact of 3.5 mm:
-
-    .. math:: \sigma(r) = \frac{E h}{R}\, f\!\left(\frac rh;\ \frac{PR}{Eh^3},\
-        \frac{\ell R}{h^2},\ \frac{sR}{h},\ \mu, \nu\right)
-
-    for an interface of length :math:`\ell` and strength s.  With derivatives by logarithms,
-
-    .. math:: \hat\sigma_E = \hat\sigma - \hat\sigma_P, \qquad
-        \hat\sigma_R = -\hat\sigma_E + \hat\sigma_\ell + \hat\sigma_s, \qquad
-        \hat\sigma_h = 3\hat\sigma_E + \hat\sigma_k - 2\hat\sigma_\ell - \hat\sigma_s .
-
-    The keywords are the derivatives by P, k, :math:`\ell` and s; s is that of asperities alone.
-    """
+    """Return the changes by one stated standard uncertainty, by the scales of the contact."""
+    # docs/friction.md; the keywords are derivatives by the logarithms of load, wavenumber, length
+    # and strength of the interface (of asperities alone).
     stiffer = spectra - load
     thicker = 3 * stiffer + wavenumber - 2 * length - strength
     larger = -stiffer + length + strength

@@ -1,25 +1,12 @@
-r"""The likelihood of calculated contacts: what a sensor reads of them, and chi-square.
+"""The likelihood of calculated contacts: what a sensor reads of them, and chi-square.
 
-At a distance R from the centre, and for a load :math:`P` about the nominal :math:`P_j`, a sensor
-reads
+The voltages of one load are u = f(theta) + F beta + D(theta) xi + n, as docs/friction.md has it:
+flat nuisance parameters beta of its own (baseline, drift, centre), systematic ones xi of unit
+variance that all loads share, and noise n of covariance N.  With the residual rho = u - f,
+chi-square is rho^T C^-1 rho, C = N + D D^T, the flat ones projected out.
 
-.. math:: u = A\,(G \otimes \sigma)(R) + A\,\frac{\partial (G \otimes \sigma)}{\partial \ln P}
-    \ln\frac{P}{P_j}.
-
-Of a tangential channel it is the component of a vector field, by transforms of order one, and
-changes its sign with the side of the centre.  The voltages of one load are
-:math:`u = f(\theta) + F\beta + D(\theta)\xi + n`, with flat nuisance parameters :math:`\beta` of
-its own (baseline, drift, centre), systematic ones :math:`\xi` of unit variance that all loads
-share (A G, film, sphere, balance, stage), and noise :math:`n` of covariance
-
-.. math:: N = n_\mathrm{el}^2 + (A\,S'\,u(P_{ij})/P_j)^2 + (A\,\partial S/\partial R\;u(x))^2 .
-
-Chi-square is the least over all nuisance parameters,
-
-.. math:: \chi^2(\theta) = \rho^T C^{-1} \rho, \qquad C = N + D D^T,
-
-the flat ones projected out.  D changes with :math:`\theta`, as an error of A or of the load is one
-in proportion to the stress that is calculated, not to the one that was measured.
+What a tangential channel reads is the component of a vector field, by transforms of order one,
+and changes its sign with the side of the centre.
 """
 
 from __future__ import annotations

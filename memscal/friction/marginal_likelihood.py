@@ -1,21 +1,12 @@
 r"""Evidence of laws of the interface: the likelihood averaged over what a law leaves free.
 
-The voltages of a group of points (one load of one scan) are :math:`u = f(\theta) + F\beta +
-D(\theta)\,\xi + n`: flat nuisances :math:`\beta` of the group's own (baseline, drift, centre),
-systematic ones :math:`\xi` of unit variance that all groups share, and noise :math:`n` of the
-covariance :math:`N(\theta)`.  All of them enter linearly, so that they are integrated in closed
-form.  With the residual :math:`\rho = u - f` and :math:`Q = N^{-1} - N^{-1}F(F^TN^{-1}F)^{-1}
-F^TN^{-1}`,
+The nuisances of a group of voltages (one load of one scan; the model and its symbols are those of
+:mod:`memscal.friction.likelihood`) enter linearly, and are integrated in closed form (equation in
+docs/friction.md).  With :math:`Q = N^{-1} - N^{-1}F(F^TN^{-1}F)^{-1}F^TN^{-1}`,
+:math:`g = D^TQ\rho` and :math:`M = 1 + D^TQD`,
 
-.. math::
-
-    -2\ln p(u | \theta) = \chi^2 + \ln\det C, \qquad
-    \chi^2 = \rho^T Q\rho - g^T M^{-1} g, \qquad
-    \ln\det C = \ln\det N + \ln\det F^TN^{-1}F + \ln\det M,
-
-with :math:`g = D^TQ\rho` and :math:`M = 1 + D^TQD`, up to constants that no law changes.  The
-determinant must not be left out: D is in proportion to the calculated stress, and without it a law
-that makes the stress less certain has a smaller :math:`\chi^2` at no cost.
+.. math:: \chi^2 = \rho^T Q\rho - g^T M^{-1} g, \qquad
+    \ln\det C = \ln\det N + \ln\det F^TN^{-1}F + \ln\det M .
 
 Groups only share :math:`\xi`: their contributions add up in :math:`\rho^TQ\rho`, g, M and the
 determinants.  A law with one parameter of each load is therefore integrated load by load.
@@ -59,15 +50,7 @@ class Tables(NamedTuple):
 
 
 def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
-    """Return the logarithm of the likelihood, and chi-square, of each entry of tables.
-
-    One datum of unit noise at a distance of 2, with a systematic of three times the noise:
-
-    >>> tables = Tables(np.array([[4.0]]), np.array([[[6.0]]]), np.array([[[[9.0]]]]),
-    ...                 np.array([[0.0]]))
-    >>> [round(array.item(), 6) for array in log_likelihood(tables)]
-    [-1.351293, 0.4]
-    """
+    """Return the logarithm of the likelihood, and chi-square, of each entry of tables."""
     squares, q = tables.squares, tables.pulls.shape[-1]
     # One factorisation gives both: the last pivot of M bordered by g is chi-square (plus one, so
     # that data without any misfit do not make it singular).

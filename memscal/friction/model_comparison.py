@@ -1,16 +1,9 @@
-r"""Laws of the interface against an effective friction coefficient, by evidence.
+"""Laws of the interface against an effective friction coefficient, by evidence.
 
-A rigid interface that slips at less shear than the one that was measured macroscopically, or one
-that slips there but yields before: both make the stress under a sphere less than full stick does.
-They differ in how that changes with the load.  All dry loads together are explained
-
-(a) by Amontons' law with one effective coefficient,
-(b) by Amontons' law with a coefficient of each load, and
-(c) by the elasto-plastic law at the macroscopic coefficient, with a slip length,
-
-each with what A, G, film, sphere and loads leave uncertain, and weighed by evidence
-(:mod:`memscal.friction.marginal_likelihood`).  From lubricated loads,
-which bear no shear, follows likewise whether the interface yields normally.
+All dry loads together are explained by Amontons' law with one effective coefficient, by one of
+each load, and by an interface that yields over a slip length before it slips: they differ in how
+the stress changes with the load.  From lubricated loads, which bear no shear, follows likewise
+whether the interface yields normally.
 """
 
 from __future__ import annotations
@@ -170,12 +163,10 @@ def compare_interface(
     macroscopic: float,  # coefficient at which the indenter slides
     macroscopic_uncertainty: float | None = None,
     amontons: ProfileFamily | None = None,  # incremental, from 0 to inf
-    slipping: ProfileFamily | None = None,  # elasto-plastic at the macroscopic coefficient
-    yielding: ProfileFamily | None = None,  # normally compliant
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> InterfaceComparison:
-    """Weigh laws of the interface; families without a load within 1 % of each are calculated."""
+    """Weigh laws of the interface; a family without a load within 1 % of each is calculated."""
     if not profiles:
         raise InputError(
             "Laws of the interface are compared with measured profiles, but none is given."
@@ -194,13 +185,12 @@ def compare_interface(
         rigid = family_at_loads(dry, amontons, partial(amontons_family, **contacts))
         tangential = weigh_slip_length(
             _measured(dry, apparatus, rigid),
-            _measured(dry, apparatus, family_at_loads(dry, slipping, law)),
+            _measured(dry, apparatus, family_at_loads(dry, None, law)),
             macroscopic=macroscopic,
             lubrication=dry[0].lubrication,
         )
     if wet:
-        law = partial(normal_compliance_family, **contacts)
-        family = family_at_loads(wet, yielding, law)
+        family = family_at_loads(wet, None, partial(normal_compliance_family, **contacts))
         normal = weigh_normal_compliance(_measured(wet, apparatus, family))
     messages = tuple(_messages(tangential, normal, macroscopic_uncertainty, dry))
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
@@ -251,10 +241,9 @@ def _messages(
             )
 
 
-#: Nodes over all values, and over those that the data do not exclude.
-_COARSE, _FINE = 81, 161
-#: Of one load: with others its parameter is known better than alone.
-_FINER = 321
+#: Nodes over all values, over those that the data do not exclude, and over those of one load,
+#: whose parameter is known better with others than alone.
+_COARSE, _FINE, _FINER = 81, 161, 321
 #: Values are excluded where twice the log-likelihood falls short of the best by this.
 _EXCLUDED = 25.0
 #: Sweeps over the loads that look for the best parameter of each.

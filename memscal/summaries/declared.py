@@ -24,11 +24,9 @@ _UNCERTAINTY = "_uncertainty"
 
 
 def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
-    """Return the quantities of an object as JSON holds them, in the units in which they are shown.
-
-    A number stands with its unit and, where that is declared, its standard uncertainty; an array
-    or a budget by source names its unit in its key.  ``values`` stand in for attributes.
-    """
+    """Return an object's quantities as JSON holds them; ``values`` stand in for attributes."""
+    # In the units in which they are shown: a number stands with its unit and, where that is
+    # declared, its standard uncertainty; an array or a budget by source has it in its key.
     declared, held = by_name(quantities), {}
     for name, quantity in declared.items():
         key = quantity.label or name
@@ -107,10 +105,7 @@ def labelled_dataset(
     values: Mapping[str, ArrayLike],
     axes: Mapping[str, tuple[str, ...]] | None = None,
 ) -> Dataset:
-    """Return values in SI units by the names of their quantities, which give axes and words.
-
-    ``axes``: those of quantities that here run along others than declared.
-    """
+    """Return values in SI units by their quantities; ``axes``: where they differ from those."""
     import xarray
 
     variables = {}
@@ -127,10 +122,8 @@ def labelled_dataset(
 def record_arrays(
     record: Record, holder: object, names: Mapping[str, str] | None = None
 ) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
-    """Return what an object holds of a record as variables of an xarray Dataset, in SI units.
-
-    ``names`` replaces names of quantities and axes that another record of the Dataset has, too.
-    """
+    """Return what an object holds of a record as variables of an xarray Dataset, in SI units."""
+    # ``names`` replaces names of quantities and axes that another record of the Dataset has, too.
     names, variables = names or {}, {}
     for quantity in record.quantities:
         value = getattr(holder, quantity.name, None)

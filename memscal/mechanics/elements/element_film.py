@@ -111,11 +111,7 @@ def smooth(
 def _quartics(along: FloatArray) -> FloatArray:
     """Return the five Lagrange quartics of a side, shape (n, 5), at ``along`` from 0 to 1."""
     nodes = np.arange(_DEGREE + 1) / _DEGREE
-    values = np.ones((along.size, _DEGREE + 1))
-    for i, node in enumerate(nodes):
-        for other in np.delete(nodes, i):
-            values[:, i] *= (along - other) / (node - other)
-    return values
+    return np.vander(along, _DEGREE + 1) @ np.linalg.inv(np.vander(nodes))
 
 
 # Exact for what is polynomial: two gradients and r.  It is so also on the axis, where u/r is.

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from memscal.model.arrays import FloatArray
-from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
+from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
 # Share of K that does not go through the pressure, in shear moduli: enough to keep elements from
@@ -80,11 +80,6 @@ class Rubber:
     def shear_modulus(self) -> float:
         """Shear modulus G at small strain."""
         return 2 * (self.c1 + self.c2)
-
-    @property
-    def law(self) -> str:
-        """Name of the law."""
-        return MOONEY_RIVLIN if self.c2 else NEO_HOOKEAN
 
     def energy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the stored energy per undeformed volume, shape (...), where p has settled."""

@@ -32,7 +32,7 @@ from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
-from memscal.model.film import ElasticFilm
+from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 
 # What is told the share of the work that is done.
@@ -323,13 +323,13 @@ class FiniteStrainField(FieldByOrder):
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
         elements, x = self.pressing.elements, self.pressed.x
-        points = elements.nodes.T / _MM
+        law, points = MOONEY_RIVLIN if elements.material.c2 else NEO_HOOKEAN, elements.nodes.T / _MM
         return FieldMesh(
             points=points,
             triangles=anticlockwise(points, elements.bases[0].element_dofs.T),
             displacement=x[: 2 * elements.n].reshape(2, -1).T / _MM,
             stress=elements.nodal_stress(x) * _MPA,
-            notes=f"{elements.material.law} film at finite strain under {self.pressed.load:.6g} N",
+            notes=f"{law} film at finite strain under {self.pressed.load:.6g} N",
         )
 
 

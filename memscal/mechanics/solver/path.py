@@ -1,10 +1,8 @@
-r"""Path of a contact to its loads: friction depends on history, and is followed step by step.
+"""Path of a contact to its loads: friction depends on history, and is followed step by step.
 
-*Incremental* loading is the slow one of an experiment.  On a rigid interface every step ends when
-the surfaces meet at the next ring (or part, on the way back): the ring then sticks exactly where it
-first touched.  On a compliant one, contact has no edge; steps are even in the cube root of the load
-(the square root of the depth), which is even in the contact radius for a sphere.  *Total* loading
-is one step from the untouched film.
+On a rigid interface every step of an incremental loading ends when the surfaces meet at the next
+ring (or part, on the way back).  On a compliant one, contact has no edge; steps are even in the
+cube root of the load (the square root of the depth): in the contact radius, for a sphere.
 """
 
 import math
@@ -55,7 +53,7 @@ def _mixture(lower: ContactState, upper: ContactState, target: Target) -> Contac
         name: (1 - share) * getattr(lower, name) + share * getattr(upper, name)
         for name in ("pressure", "shear", "depth", "load", "anchor", "outward")
     }
-    return replace(upper, **mixed, iterations=lower.iterations + upper.iterations)
+    return replace(upper, **mixed)
 
 
 def _reached(state: ContactState, target: Target) -> float:

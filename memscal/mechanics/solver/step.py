@@ -80,7 +80,6 @@ class ContactState:
     slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
     anchor: FloatArray  # outward displacement at which a sticking ring bears no shear, in m
     outward: FloatArray  # outward displacement in m
-    iterations: int = 0  # linear systems that were solved
 
 
 @dataclass(frozen=True)
@@ -239,7 +238,7 @@ def take_step(
             changed = not np.array_equal(revised.slip, status.slip)
             revised, settled = replace(revised, pressing=status.pressing), not changed
         if settled:
-            return _accepted(problem, status, tractions, held, iteration)
+            return _accepted(problem, status, tractions, held)
         status = revised
     raise ConvergenceError(
         f"The contact did not settle within {_MOST_ITERATIONS} iterations on the way to {goal}.",
@@ -338,7 +337,7 @@ def _revised_separation(
 
 
 def _accepted(
-    problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None, count: int
+    problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None
 ) -> ContactState:
     p, q, depth = tractions
     _, u = problem.displacements(p, q)
@@ -348,4 +347,4 @@ def _accepted(
     anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
     touching = status.pressing | (np.arange(problem.size) == held)
     load = float(problem.compliance.areas @ p)
-    return ContactState(p, q, depth, load, touching, slip, anchor, u, count)
+    return ContactState(p, q, depth, load, touching, slip, anchor, u)
