@@ -114,10 +114,7 @@ _ONLY = {
     "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
     "reference": _REFERENCE_NAMES,
 }
-_NEEDED = {
-    "scan": ("x", "u"),
-    "reference": ("r_unit", "sigma", "sigma_unit", "load"),
-}
+_NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "load")}
 
 
 @click.command("import", epilog=EXAMPLES)

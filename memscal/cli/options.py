@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import click
 
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 else:  # generic since click 8.2 only
     _Number = click.ParamType
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
+_Command = Callable[..., Any]
+_Adder = Callable[[_Command], _Command]
 
 FILE = click.Path(path_type=Path)
 """A file's name; the library checks whether it can be read or written."""
@@ -68,10 +69,6 @@ class Quantity(_Number):
         if self.high < math.inf:
             bounds.append(f"at most {self.high:g}")
         return f"a number {' and '.join(bounds)}" if bounds else "a finite number"
-
-
-class _Adder(Protocol):
-    def __call__(self, command: _Command, /) -> _Command: ...
 
 
 def option(

@@ -39,14 +39,14 @@ _ROUND, _SEEN = 0.005, 17
 
 def is_source(stress: BaseStress | None) -> bool:
     """Whether a reference is a source that needs no film, rod and load."""
-    return isinstance(stress, StressProfile) and stress.form is not None
+    return stress is not None and stress.form is not None
 
 
 def require_one_kind(
     references: Sequence[BaseStress | None], alternatives: Sequence[BaseStress | None]
 ) -> None:
     """Refuse references that no one conversion constant belongs to."""
-    forms = [getattr(reference, "form", None) for reference in references]
+    forms = [reference and reference.form for reference in references]
     kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
     if len(kinds) > 1 or any(map(is_source, alternatives)) or (kinds != {None} and alternatives):
         raise InputError(
@@ -121,14 +121,12 @@ def require_same_set_up(
     """Refuse a reference of another film, rod or load than its scan; or return the differences."""
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
+    given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
     differences: list[str] = []
-    for scan, given in zip(scans, references, strict=True):
-        stress = scan.reference if given is None else given
-        if stress is not None and not is_source(stress):
-            differences += _other_set_up(scan, stress, "reference")
-    for scan, given in zip(scans, alternatives, strict=False):
-        if given is not None:
-            differences += _other_set_up(scan, given, "alternative")
+    for kind, stresses in (("reference", given), ("alternative", alternatives)):
+        for scan, stress in zip(scans, stresses, strict=False):
+            if stress is not None and not (kind == "reference" and is_source(stress)):
+                differences += _other_set_up(scan, stress, kind)
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
     if any(text.startswith("load") for text in differences):
@@ -216,23 +214,22 @@ def reference_spectra(
     wavenumbers: Wavenumbers | None = None,
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
-    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
+    pairs = list(zip(references, data, strict=True))
     if wavenumbers is None:
-        last = max(_last_wavenumber(*pair) for pair in zip(references, data, strict=True))
+        last = max(_last_wavenumber(*pair) for pair in pairs)
         # Fields are lifted to squares that reach one span from the centre, to their corners.
-        wavenumbers = Wavenumbers.covering(last, 1.5 * max(spans))
-    return tuple(
-        _spectrum(pair[0], wavenumbers, pair[1], span)
-        for pair, span in zip(zip(references, data, strict=True), spans, strict=True)
-    )
+        wavenumbers = Wavenumbers.covering(last, 1.5 * max(map(_span, data)))
+    return tuple(_spectrum(stress, wavenumbers, points) for stress, points in pairs)
 
 
-def _spectrum(
-    stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints, span: float
-) -> RadialSpectrum:
-    values, order = _per_newton(stress, wavenumbers.k, span, points.order), points.order
+def _span(points: ScanPoints) -> float:
+    return float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
+
+
+def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) -> RadialSpectrum:
+    values = _per_newton(stress, wavenumbers.k, _span(points), points.order)
     if isinstance(stress, Contact) or stress.form is None:
-        return RadialSpectrum(wavenumbers, values, order)
+        return RadialSpectrum(wavenumbers, values, points.order)
     if stress.ideal is not None and stress.ideal.shape == "slit":
         if points.planar:
             raise InputError(

@@ -2,10 +2,9 @@
 
 import contextlib
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from memscal.errors import FormatError, OutputError, placed
@@ -21,7 +20,7 @@ from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
-from memscal.model.scan import BRANCHES, Scan, branch_numbers, require_rod_friction
+from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
@@ -194,9 +193,7 @@ def _data_group(scan: Scan) -> Group:
     if scan.u_zz_correlation is not None:
         data |= {axis: writer.index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
         data |= _nodes(scan, {"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
-    optional = {
-        name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
-    }
+    optional = {name: getattr(scan, name) for name in LIKE_SIGNAL}
     data |= _nodes(scan, optional | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
@@ -283,22 +280,17 @@ def write_scans(
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
     made = not target.exists()
-    staging: str | None = None
     try:
         target.mkdir(exist_ok=True)
-        staging = tempfile.mkdtemp(prefix=".memscal-", dir=target)
-        for name, scan in scans.items():
-            write_scan(scan, Path(staging, name))
-        for name in scans:
-            os.replace(Path(staging, name), target / name)
+        with TemporaryDirectory("", ".memscal-", target, ignore_cleanup_errors=True) as staging:
+            for name, scan in scans.items():
+                write_scan(scan, Path(staging, name))
+            for name in scans:
+                os.replace(Path(staging, name), target / name)
     except OSError as error:
-        raise OutputError(
-            f"The output {target} cannot be written: {error.strerror}.",
-            cure="Choose another folder.",
-        ) from error
+        problem = f"The output {target} cannot be written: {error.strerror}."
+        raise OutputError(problem, cure="Choose another folder.") from error
     finally:
-        if staging is not None:
-            shutil.rmtree(staging, ignore_errors=True)
         if made:
             # Of a folder that holds the scans this takes nothing away.
             with contextlib.suppress(OSError):

@@ -104,28 +104,22 @@ def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, Ev
 def _even_axis(positions: FloatArray) -> EvenAxis | None:
     """Fit the coarsest even lattice through all positions; steps are counted between them."""
     order = np.argsort(positions, kind="stable")
-    gaps = np.diff(positions[order])
+    ordered = positions[order]
+    gaps = np.diff(ordered)
     # One of the gaps is about the step; the others are noise and missing rows.
     candidates = np.unique(gaps[gaps > max(_ROUNDING, 1e-9 * np.ptp(positions))])[::-1]
     if candidates.size > _CANDIDATES:
         candidates = candidates[np.geomspace(1, candidates.size, _CANDIDATES).astype(int) - 1]
-    for step in candidates:
-        number = np.concatenate([[0], np.cumsum(np.rint(gaps / step))])
-        axis = _fitted(positions[order], number)
-        if axis is not None:
+    for candidate in candidates:
+        number = np.concatenate([[0], np.cumsum(np.rint(gaps / candidate))])
+        centred = number - number.mean()
+        step = float(centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0))
+        start = float(ordered.mean() - step * number.mean())
+        if step > 0 and np.abs(ordered - start - step * number).max() <= _OFF_LATTICE * step:
             index = np.empty(positions.size, dtype=np.intp)
-            index[order] = axis.index
-            return replace(axis, index=index)
+            index[order] = number
+            return EvenAxis(start, step, index)
     return None
-
-
-def _fitted(ordered: FloatArray, number: FloatArray) -> EvenAxis | None:
-    centred = number - number.mean()
-    step = float(centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0))
-    start = float(ordered.mean() - step * number.mean())
-    if not step > 0 or np.abs(ordered - start - step * number).max() > _OFF_LATTICE * step:
-        return None
-    return EvenAxis(start, step, number.astype(np.intp))
 
 
 def _neighbours(positions: FloatArray, repeat: IntArray) -> tuple[float, IntArray]:
@@ -176,6 +170,9 @@ def _typical_step(values: FloatArray, cluster: IntArray) -> float:
     means = np.bincount(cluster, values) / np.bincount(cluster)
     return float(np.median(np.diff(means))) if means.size > 1 else 0.0
 
+
+LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors")
+"""Arrays of a scan that have the shape of its readings, where they are stated."""
 
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
@@ -246,9 +243,8 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
             "and finite.",
             why="It correlates every point of one repeat with every other.",
         )
-    if not np.allclose(correlation, correlation.T, atol=1e-9) or not np.allclose(
-        np.diag(correlation), 1.0
-    ):
+    symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
+    if not (symmetric and np.allclose(np.diag(correlation), 1.0)):
         raise InputError(
             "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
             cure="Divide a covariance by the standard uncertainties of row and column, and "
@@ -415,7 +411,7 @@ class Scan:
             repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
             object.__setattr__(self, "repeat", repeat)
         self._check_signal_shape()
-        for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
+        for name in LIKE_SIGNAL:
             if (values := getattr(self, name)) is not None:
                 object.__setattr__(self, name, self._like_signal(name, values))
         if self.branch is not None:
@@ -516,7 +512,7 @@ class Scan:
                     changes[name] = values[keep]
             if self.u_zz_correlation is not None:
                 changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
-        for name in ("branch", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
+        for name in ("branch", "u_zz", *LIKE_SIGNAL):
             if (values := getattr(self, name)) is not None:
                 changes[name] = values[keep]
         channels = {name: values[keep] for name, values in self.channels.items()}

@@ -74,8 +74,7 @@ class Plan:
         require_positive("half range of the scan", self.half_range, "m")
         require_positive("load", self.load, "N")
         require_positive("conversion constant", self.conversion_constant, "V/Pa")
-        if self.load_uncertainty is not None:
-            require_non_negative("relative standard uncertainty of the load", self.load_uncertainty)
+        require_non_negative("relative standard uncertainty of the load", self.load_uncertainty)
         if self.repeats < 1 or self.repeats != int(self.repeats):
             raise InputError(
                 f"The scan would be repeated {self.repeats} times.",
@@ -336,8 +335,7 @@ def _search(plan: Plan, vary: str) -> tuple[str, int, int, Callable[[int], Plan]
     # The sensor has to lie within.
     least = max(least, int(np.ceil(2 * off / step)) + 1)
     most = max(min(most, int(2 * (off + _FARTHEST * plan.film.thickness) / step) + 1), least)
-    name = "half range"
-    return name, least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
+    return "half range", least, most, lambda n: replace(plan, half_range=step * (n - 1) / 2)
 
 
 def _reached(design: Design, name: str) -> float:

@@ -100,12 +100,10 @@ def to_json(subject: str, value: Any) -> str:
 def _json_value(subject: str, value: Any) -> Any:
     if value is None or isinstance(value, (str, bool, int)):
         return value
-    if isinstance(value, np.generic):
-        return _json_value(subject, value.item())
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _json_value(subject, value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
-    if isinstance(value, np.ndarray):
-        return _json_value(subject, value.tolist())
     if isinstance(value, Mapping):
         return {str(key): _json_value(subject, item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -148,9 +146,7 @@ def content_digest(items: Iterable[DigestItem]) -> str:
 def _attributes(node: Node) -> dict[str, Any]:
     if isinstance(node, Group):
         return node.all_attributes
-    if isinstance(node, Number):
-        return {"units": node.units, **node.attributes}
-    return {}
+    return {"units": node.units, **node.attributes} if isinstance(node, Number) else {}
 
 
 def _canonical(value: Any) -> tuple[str, list[int], bytes]:
@@ -245,13 +241,10 @@ def _plain_text(text: str) -> bytes:
 
 def _attach_scales(file: Any, root: Group) -> None:
     """Make every axis an HDF5 dimension scale and attach it to the arrays that run along it."""
-    arrays = [(p, n) for p, n in walk(root) if isinstance(n, Number) and n.axes]
-    for path, node in arrays:
-        folder, _, name = path.rpartition("/")
-        if node.axes == (name,):
-            file[path].make_scale(name)
-    for path, node in arrays:
-        folder, _, name = path.rpartition("/")
-        if node.axes != (name,):
-            for i, axis in enumerate(node.axes):
-                file[path].dims[i].attach_scale(file[f"{folder}/{axis}"])
+    numbers = [(path.rpartition("/"), n.axes) for path, n in walk(root) if isinstance(n, Number)]
+    for (folder, _, name), axes in numbers:
+        if axes == (name,):
+            file[f"{folder}/{name}"].make_scale(name)
+    for (folder, _, name), axes in numbers:
+        for i, axis in enumerate(axes if axes != (name,) else ()):
+            file[f"{folder}/{name}"].dims[i].attach_scale(file[f"{folder}/{axis}"])

@@ -5,7 +5,7 @@ import hashlib
 import itertools
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,26 +169,20 @@ def _find_delimiter(lines: list[str]) -> str:
     sample = lines[:50]
     best, score = " ", 0.0
     for delimiter in _DELIMITERS:
-        widths = [len(_cells(line, delimiter)) for line in sample]
+        widths = [len(line.split(None if delimiter == " " else delimiter)) for line in sample]
         common = max(set(widths), key=widths.count)
         if common > 1 and widths.count(common) > score:
             best, score = delimiter, widths.count(common)
     return best
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return line.split() if delimiter == " " else line.split(delimiter)
-
-
 def _split(name: str, lines: list[str], delimiter: str) -> list[tuple[str, ...]]:
-    rows: Iterable[list[str]]
-    try:
-        if delimiter == " ":
-            rows = [line.split() for line in lines]
-        else:
+    rows = [line.split() for line in lines]
+    if delimiter != " ":
+        try:
             rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True))
-    except (csv.Error, TypeError) as error:
-        raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
+        except (csv.Error, TypeError) as error:
+            raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
     cut = [tuple(cell.strip() for cell in row) for row in rows]
     if max(len(row) for row in cut) > _MAX_COLUMNS:
         raise FormatError(f"{name} has more than {_MAX_COLUMNS} columns.")
