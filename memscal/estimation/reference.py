@@ -61,11 +61,9 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     sensors = {(s.sensor.name or "unnamed", s.sensor.channel, s.unit): None for s in scans}
     if len(sensors) > 1:
         named = ", ".join(f"{name} ({channel}, in {unit})" for name, channel, unit in sensors)
-        raise InputError(
-            f"The scans are of {len(sensors)} sensors: {named}.",
-            why="Scans that are fitted together share one apparatus function.",
-            cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
-        )
+        why = "Scans that are fitted together share one apparatus function."
+        cure = "Calibrate each sensor by itself; check /entry/instrument/stress_sensor."
+        raise InputError(f"The scans are of {len(sensors)} sensors: {named}.", why=why, cure=cure)
     films: dict[str, ElasticFilm] = {}
     for film in (scan.film for scan in scans if scan.film is not None):
         first = films.setdefault(film.name, film)
@@ -232,11 +230,9 @@ def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) 
         return RadialSpectrum(wavenumbers, values, points.order)
     if stress.ideal is not None and stress.ideal.shape == "slit":
         if points.planar:
-            raise InputError(
-                "A slit is the reference of a raster.",
-                why="It is scanned across, along a line, and shows nothing of any other direction.",
-                cure="Give a line scan.",
-            )
+            why = "It is scanned across, along a line, and shows nothing of any other direction."
+            cure = "Give a line scan."
+            raise InputError("A slit is the reference of a raster.", why=why, cure=cure)
         return RadialSpectrum(wavenumbers, values, ACROSS, source=True)
     # What a scan samples of a field is looked at.
     seen = np.linspace(0.0, min(np.pi / points.step, wavenumbers.k[-1]), _SEEN)[1:]
@@ -284,11 +280,9 @@ def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -
             cure="Change the sign of sigma_rz in the reference (memscal import --shear-sign -1).",
         )
     if not order and values[0] <= 0:
-        raise InputError(
-            "The stress of the reference adds up to a pull, not a push.",
-            why="Normal stress is positive in compression.",
-            cure="Change the sign of sigma_zz in the reference.",
-        )
+        problem = "The stress of the reference adds up to a pull, not a push."
+        why = "Normal stress is positive in compression."
+        raise InputError(problem, why=why, cure="Change the sign of sigma_zz in the reference.")
     return values
 
 
@@ -322,11 +316,9 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
         )
     first = float(profile.r[0])
     if first > 0.1 * needed:
-        raise InputError(
-            f"The reference begins at r = {first * 1e3:.4g} mm.",
-            why="The stress on the axis, its largest, is missing.",
-            cure="Give the reference from r = 0 outward.",
-        )
+        why = "The stress on the axis, its largest, is missing."
+        cure = "Give the reference from r = 0 outward."
+        raise InputError(f"The reference begins at r = {first * 1e3:.4g} mm.", why=why, cure=cure)
 
 
 def reference_sensitivities(

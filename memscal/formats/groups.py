@@ -149,10 +149,8 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
     axes = [axis.removesuffix("_prime") for axis in quantity.axes]
     shape = tuple(lengths.setdefault(a, n) for a, n in zip(axes, values.shape, strict=True))
     if values.shape != shape:
-        raise FormatError(
-            f"{file.where(at)} has shape {values.shape}, but its axes give {shape}.",
-            cure="Write the file again.",
-        )
+        problem = f"{file.where(at)} has shape {values.shape}, but its axes give {shape}."
+        raise FormatError(problem, cure="Write the file again.")
     return values
 
 
@@ -202,11 +200,9 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     dimensions = [parameter_dimension(name, unit, of) for name, unit in pairs]
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
-        raise InputError(
-            f"A parameter cannot be called {min(reserved)}.",
-            why="The group of the parameters holds something else of that name.",
-            cure="Give it another name.",
-        )
+        why = "The group of the parameters holds something else of that name."
+        cure = "Give it another name."
+        raise InputError(f"A parameter cannot be called {min(reserved)}.", why=why, cure=cure)
     children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
     for name, value, dimension in zip(parameters.names, parameters.values, dimensions, strict=True):
         children[name] = si(float(value), dimension)
@@ -226,10 +222,8 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     """Read the parameters, in SI units."""
     names = tuple(text_list(file, f"{path}/names"))
     if not names or len(set(names)) != len(names):
-        raise FormatError(
-            f"{file.where(path)}/names is missing or names a parameter twice.",
-            why="It lists the parameters, in the order of their covariance.",
-        )
+        problem = f"{file.where(path)}/names is missing or names a parameter twice."
+        raise FormatError(problem, why="It lists the parameters, in the order of their covariance.")
     for name in names:  # their units are entered
         estimated_quantity(name).read_in(reading)
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
@@ -340,11 +334,9 @@ def read_round_indenter(file: SafeFile, path: str) -> RoundIndenter:
     """Read a rod or a sphere, the indenters of a scan."""
     shape = _shape(file, path)
     if shape not in _ROUND:
-        raise FormatError(
-            f'{file.where(path)}/shape is "{shape}".',
-            why="A scan is made with a flat rod or with a sphere.",
-            cure='Write "rod" or "sphere".',
-        )
+        why = "A scan is made with a flat rod or with a sphere."
+        cure = 'Write "rod" or "sphere".'
+        raise FormatError(f'{file.where(path)}/shape is "{shape}".', why=why, cure=cure)
     return _ROUND[shape](**read_record(records.ROUND_INDENTER, file, path))
 
 

@@ -225,11 +225,9 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
         )
     if axes != _POINTS and ("y" in axes) != file.has(f"{_DATA}/y"):
         stated = "names y, but there is no" if "y" in axes else "does not name y, but there is a"
-        raise FormatError(
-            f"{file.where(_DATA)}@axes {stated} {_DATA}/y.",
-            why="Without it a raster and a repeated line scan look the same.",
-            cure="Add the missing axis, or correct the attribute.",
-        )
+        why = "Without it a raster and a repeated line scan look the same."
+        cure = "Add the missing axis, or correct the attribute."
+        raise FormatError(f"{file.where(_DATA)}@axes {stated} {_DATA}/y.", why=why, cure=cure)
     return axes
 
 
@@ -264,11 +262,9 @@ def ensure_folder_writable(
         ensure_writable(target)
         return
     if not target.is_dir():
-        raise OutputError(
-            f"The output {target} is not a folder.",
-            why="An experiment is several scans, each a file of its own.",
-            cure="Give the name of a folder; a new one is made.",
-        )
+        why = "An experiment is several scans, each a file of its own."
+        cure = "Give the name of a folder; a new one is made."
+        raise OutputError(f"The output {target} is not a folder.", why=why, cure=cure)
     for name in names:
         ensure_writable(target / name, overwrite=overwrite)
 

@@ -47,10 +47,8 @@ def _read_scans(
     stored = json_value(file, "/entry/scans/names", list, None)
     size = max(of) if stored is None else len(stored)
     if max(of) > size:
-        raise FormatError(
-            f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}.",
-            cure="Run memscal apply again.",
-        )
+        problem = f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}."
+        raise FormatError(problem, cure="Run memscal apply again.")
     scans = []
     for i, name in enumerate(stored or [f"scan_{i}" for i in range(1, size + 1)], start=1):
         path, source = f"/entry/scans/{name}", sources.get(str(name))
@@ -128,10 +126,8 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         )
     paths = profile_paths(file)
     if not paths:
-        raise FormatError(
-            f"{file.where('/entry/profiles')} names no profile.",
-            why="It lists the groups that hold one.",
-        )
+        why = "It lists the groups that hold one."
+        raise FormatError(f"{file.where('/entry/profiles')} names no profile.", why=why)
     inputs = text_list(file, "/entry/inputs/names")
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
@@ -207,11 +203,9 @@ def _scan_number(file: SafeFile, path: str) -> int:
     """Which scan a profile comes from, counted from one."""
     number = values.require_scalar(file, f"{path}/scan", "dimensionless")
     if not 1 <= number <= _MOST_SCANS:
-        raise FormatError(
-            f"{file.where(path)}/scan is {number:g}.",
-            why=f"Scans are counted from 1 to {_MOST_SCANS} at most.",
-            cure="Run memscal apply again.",
-        )
+        why = f"Scans are counted from 1 to {_MOST_SCANS} at most."
+        cure = "Run memscal apply again."
+        raise FormatError(f"{file.where(path)}/scan is {number:g}.", why=why, cure=cure)
     return int(number)
 
 
@@ -265,10 +259,8 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
     budget = groups.read_budget(file, f"{path}/budget")
     if not sources or not budget.keys() >= _BUDGET.keys():
-        raise FormatError(
-            f"{file.where(path)} states no covariance of its stress, or no budget.",
-            why="Measured stress without uncertainty means little.",
-        )
+        problem = f"{file.where(path)} states no covariance of its stress, or no budget."
+        raise FormatError(problem, why="Measured stress without uncertainty means little.")
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
     profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
     if file.has(f"{path}/curve"):

@@ -35,16 +35,12 @@ def require_schema(file: SafeFile, schema: str) -> str:
         )
     newest = SCHEMA_VERSION.partition(".")[0]
     if int(major) > int(newest):
-        raise SchemaVersionError(
-            f"{file.name} was written by a newer memscal: {schema} version {version}.",
-            why=f"This memscal reads versions up to {newest}.x and would misread it.",
-            cure="Upgrade memscal.",
-        )
+        problem = f"{file.name} was written by a newer memscal: {schema} version {version}."
+        why = f"This memscal reads versions up to {newest}.x and would misread it."
+        raise SchemaVersionError(problem, why=why, cure="Upgrade memscal.")
     if int(major) < int(newest):
-        raise SchemaVersionError(
-            f"{file.name} has {schema} version {version}, which is not read any more.",
-            cure="Write it again with the current memscal.",
-        )
+        problem = f"{file.name} has {schema} version {version}, which is not read any more."
+        raise SchemaVersionError(problem, cure="Write it again with the current memscal.")
     return version
 
 
@@ -59,17 +55,13 @@ def require_array(
 ) -> FloatArray:
     """Return the array at a path in SI units."""
     if not file.has(path):
-        raise FormatError(
-            f"{file.where(path)} is missing.",
-            why=f"It should hold a {dimension}.",
-            cure=f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".',
-        )
+        why = f"It should hold a {dimension}."
+        cure = f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".'
+        raise FormatError(f"{file.where(path)} is missing.", why=why, cure=cure)
     values = file.array(path)
     if ndim is not None and values.ndim != ndim:
-        raise FormatError(
-            f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected.",
-            cure="Check the shape of the array.",
-        )
+        problem = f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected."
+        raise FormatError(problem, cure="Check the shape of the array.")
     return to_si(values, units_of(file, path), dimension, file.where(path))
 
 

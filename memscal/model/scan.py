@@ -189,16 +189,12 @@ _LINE = 0.01
 def require_contacts(scan: Scan) -> None:
     """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
     if scan.normal_load_errors is not None and scan.normal_load is None:
-        raise InputError(
-            "normal_load_errors is given without normal_load.",
-            why="It is the standard uncertainty of the load at each point.",
-            cure="Give normal_load too, the load that was set at each point.",
-        )
+        why = "It is the standard uncertainty of the load at each point."
+        cure = "Give normal_load too, the load that was set at each point."
+        raise InputError("normal_load_errors is given without normal_load.", why=why, cure=cure)
     if scan.lubrication not in LUBRICATIONS:
-        raise InputError(
-            f"The lubrication of the scan is {scan.lubrication!r}.",
-            cure="Give 'dry' or 'lubricated', or leave it out.",
-        )
+        cure = "Give 'dry' or 'lubricated', or leave it out."
+        raise InputError(f"The lubrication of the scan is {scan.lubrication!r}.", cure=cure)
     if scan.lubricant and scan.lubrication != "lubricated":
         stated = scan.lubrication or "not stated"
         raise InputError(
@@ -210,11 +206,9 @@ def require_contacts(scan: Scan) -> None:
 def require_rod_friction(friction: float | None) -> None:
     """Refuse a friction of the rod that no film of rubber is solved with."""
     if friction not in (None, 0.0, math.inf):
-        raise InputError(
-            f"The rod's friction is {friction:g}.",
-            why="Only a rod that slides freely or sticks is solved at finite strain.",
-            cure="Give 0 or inf, or leave it out: the difference is then counted.",
-        )
+        why = "Only a rod that slides freely or sticks is solved at finite strain."
+        cure = "Give 0 or inf, or leave it out: the difference is then counted."
+        raise InputError(f"The rod's friction is {friction:g}.", why=why, cure=cure)
 
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
@@ -564,17 +558,13 @@ class Scan:
                 raise InputError(f"{name} {problem}")
         loads = self.normal_load
         if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
-            raise InputError(
-                "normal_load holds a load that is infinite or not above zero.",
-                cure="Mark points without contact as missing (NaN).",
-            )
+            problem = "normal_load holds a load that is infinite or not above zero."
+            raise InputError(problem, cure="Mark points without contact as missing (NaN).")
 
     def _check_positions(self) -> None:
         if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
-            raise InputError(
-                f"The direction of the scan is {self.direction!r}.",
-                cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
-            )
+            cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
+            raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
         arrays.require_non_negative(
             "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
         )

@@ -88,10 +88,8 @@ def simulate_contacts(
     # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
     loads = checked_loads(load)
     if np.unique(loads).size != loads.size:
-        raise InputError(
-            f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",
-            cure="Give each load once, and the number of its repeats.",
-        )
+        problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
+        raise InputError(problem, cure="Give each load once, and the number of its repeats.")
     require_range("spacing", spacing, 1e-9, 0.1, "m")
     require_non_negative("noise", noise)
     require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)

@@ -34,11 +34,9 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
     # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
     integral = float(kernel.transform(np.array([1e-2]))[0])
     if not abs(integral - 1) <= 1e-6:
-        raise InputError(
-            f"The kernel's transform is {integral:g} at k = 0, not 1.",
-            why="An apparatus function has unit integral.",
-            cure="Divide the kernel by its integral; the conversion constant carries the size.",
-        )
+        problem = f"The kernel's transform is {integral:g} at k = 0, not 1."
+        cure = "Divide the kernel by its integral; the conversion constant carries the size."
+        raise InputError(problem, why="An apparatus function has unit integral.", cure=cure)
     return kernel
 
 
@@ -113,11 +111,9 @@ def shear_channel(
 ) -> Shear:
     """Return the tangential channel if it is among the channels of a scan."""
     if tuple(channels) not in (("zz",), ("zz", "xz")):
-        raise InputError(
-            f"The channels are {tuple(channels)}.",
-            why="A line scan along x has the normal channel, and may have the shear's along x.",
-            cure='Give ("zz",) or ("zz", "xz").',
-        )
+        why = "A line scan along x has the normal channel, and may have the shear's along x."
+        cure = 'Give ("zz",) or ("zz", "xz").'
+        raise InputError(f"The channels are {tuple(channels)}.", why=why, cure=cure)
     if len(channels) == 1:
         return None
     require_positive("conversion_constant of the channel xz", conversion_constant, "V/Pa")

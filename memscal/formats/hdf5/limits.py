@@ -139,11 +139,8 @@ _UNWRITTEN = "was never written in full", "Values that are not there would read 
 
 def refuse(where: str, problem: str, why: str) -> UnsafeFileError:
     """Return the error for a dataset that is not read."""
-    return UnsafeFileError(
-        f"{where} {problem}.",
-        why=why,
-        cure="Copy the data into a plain file: contiguous, or with gzip, shuffle and fletcher32.",
-    )
+    cure = "Copy the data into a plain file: contiguous, or with gzip, shuffle and fletcher32."
+    return UnsafeFileError(f"{where} {problem}.", why=why, cure=cure)
 
 
 def claimed_bytes(dataset: Any) -> int:

@@ -56,11 +56,9 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
     if not data.startswith(_SIGNATURE):
-        raise FormatError(
-            f"{name} is not an HDF5 file.",
-            why="It does not begin with HDF5's signature.",
-            cure="Convert a table with `memscal import`.",
-        )
+        why = "It does not begin with HDF5's signature."
+        cure = "Convert a table with `memscal import`."
+        raise FormatError(f"{name} is not an HDF5 file.", why=why, cure=cure)
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
@@ -148,11 +146,9 @@ class SafeFile:
             self._opened[path] = self._follow(self._open(folder or "/"), path, name)
         item = self._opened[path]
         if item is not None and self._listed is not None and path not in self._listed:
-            raise FormatError(
-                f"{self.where(path)} was added after the file was written.",
-                why="The list of its contents lacks it, so that no digest covers it.",
-                cure="Remove it, or make the file again.",
-            )
+            problem = f"{self.where(path)} was added after the file was written."
+            why = "The list of its contents lacks it, so that no digest covers it."
+            raise FormatError(problem, why=why, cure="Remove it, or make the file again.")
         return item
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
@@ -160,11 +156,9 @@ class SafeFile:
         if not isinstance(folder, h5py.h5g.GroupID) or not folder.links.exists(key):
             return None
         if folder.links.get_info(key).type != h5py.h5l.TYPE_HARD:
-            raise UnsafeFileError(
-                f"{self.where(path)} is reached through a soft, external or other link.",
-                why="A link can lead to another file, to a pipe, or round in a circle.",
-                cure="Copy the linked data into the file.",
-            )
+            problem = f"{self.where(path)} is reached through a soft, external or other link."
+            why = "A link can lead to another file, to a pipe, or round in a circle."
+            raise UnsafeFileError(problem, why=why, cure="Copy the linked data into the file.")
         return h5py.h5o.open(folder, key)
 
     def _dataset(self, path: str) -> Any:

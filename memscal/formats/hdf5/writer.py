@@ -108,10 +108,8 @@ def _json_value(subject: str, value: Any) -> Any:
         return {str(key): _json_value(subject, item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_json_value(subject, item) for item in value]
-    raise InputError(
-        f"{subject} holds a {type(value).__name__}, which JSON cannot hold.",
-        cure="Give numbers, text, truth values, lists and mappings.",
-    )
+    problem = f"{subject} holds a {type(value).__name__}, which JSON cannot hold."
+    raise InputError(problem, cure="Give numbers, text, truth values, lists and mappings.")
 
 
 def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:

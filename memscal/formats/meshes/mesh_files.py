@@ -144,11 +144,9 @@ def _run(request: str, folder: str, seconds: float, name: str) -> None:
             f"Reading {name} takes longer than {seconds:.3g} s.", why="It was ended.", cure=_AS_VTU
         )
     if done.returncode:
-        raise UnsafeFileError(
-            f"The process that read {name} was ended by an error ({done.returncode}).",
-            why="The mesh is damaged, or larger than the memory that its file's size allows.",
-            cure=_AS_VTU,
-        )
+        problem = f"The process that read {name} was ended by an error ({done.returncode})."
+        why = "The mesh is damaged, or larger than the memory that its file's size allows."
+        raise UnsafeFileError(problem, why=why, cure=_AS_VTU)
 
 
 _KINDS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".xmf": "xdmf"}
@@ -232,10 +230,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
 def _require_meshio() -> None:
     if importlib.util.find_spec("meshio") is None:
-        raise InputError(
-            "Meshes are read and written with meshio, which is not installed.",
-            cure='Install it with: pip install "memscal[fem-io]"',
-        )
+        problem = "Meshes are read and written with meshio, which is not installed."
+        raise InputError(problem, cure='Install it with: pip install "memscal[fem-io]"')
 
 
 def _checked(
@@ -300,11 +296,9 @@ def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, Fl
 
 
 def _unusable(source: SourceFile, content: str) -> FormatError:
-    return FormatError(
-        f"{source.file_name} has {content}.",
-        why="A stress at the base cannot be found in it.",
-        cure="Save the mesh again, as an unstructured grid (.vtu).",
-    )
+    why = "A stress at the base cannot be found in it."
+    cure = "Save the mesh again, as an unstructured grid (.vtu)."
+    return FormatError(f"{source.file_name} has {content}.", why=why, cure=cure)
 
 
 def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:

@@ -56,10 +56,8 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     tolerance = _TOLERANCE * float(np.abs(inside).max())
     varying = [i for i in range(3) if np.ptp(inside[:, i]) > tolerance]
     if len(varying) < 2:
-        raise InputError(
-            f"{name} holds a mesh that is a line or a point.",
-            cure="Give a section of the film from the axis outward, or the film in 3-D.",
-        )
+        cure = "Give a section of the film from the axis outward, or the film in 3-D."
+        raise InputError(f"{name} holds a mesh that is a line or a point.", cure=cure)
     up = varying[-1] if vertical is None else [*AXES, vertical].index(vertical)
     if up not in varying:
         raise InputError(
@@ -140,10 +138,8 @@ def average_over_circles(
         nodes = {name: np.bincount(index.ravel(), v) / number for name, v in columns.items()}
         fields = {n: LinearNDInterpolator(distinct * reach, v)(points) for n, v in nodes.items()}
     except QhullError as error:
-        raise InputError(
-            "The nodes on the base of the film lie on one line.",
-            cure="Name the axis across the film (vertical; --vertical).",
-        ) from error
+        cure = "Name the axis across the film (vertical; --vertical)."
+        raise InputError("The nodes on the base of the film lie on one line.", cure=cure) from error
     # Circles of which less than half as much is inside as of others are left out: the corners.
     inside = np.isfinite(next(iter(fields.values())))
     share = inside.sum(axis=1)
@@ -187,10 +183,8 @@ def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
     name, _, number = field.rpartition(":")
     if field not in counts and name in counts and number.isdecimal():
         if not 1 <= int(number) <= counts[name]:
-            raise InputError(
-                f"The field {name!r} in {mesh.source.file_name} has no component {number}.",
-                why=f"It has {counts[name]}, counted from 1.",
-            )
+            problem = f"The field {name!r} in {mesh.source.file_name} has no component {number}."
+            raise InputError(problem, why=f"It has {counts[name]}, counted from 1.")
         return Component(name, name in at_points, int(number) - 1, f"component {number}")
     if field not in counts:
         raise _no_such_field(mesh, field, at_points, in_cells)
@@ -243,11 +237,9 @@ def _no_such_field(
     places = {"at the nodes": points, "in the cells": cells}
     lists = "; ".join(listed(fields, where) for where, fields in places.items() if fields)
     has = f"has, with their numbers of components, {lists}" if lists else "has no fields at all"
-    return InputError(
-        f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
-        why=f"It {has}.",
-        cure="Give the name of the stress among them, or save the mesh with its stress.",
-    )
+    problem = f"{mesh.source.file_name} has no field {printable(field, 80)!r}."
+    cure = "Give the name of the stress among them, or save the mesh with its stress."
+    return InputError(problem, why=f"It {has}.", cure=cure)
 
 
 _FEWEST_RADII = 3
@@ -338,17 +330,13 @@ def _require_meaning(
 ) -> None:
     """Refuse an option that the mesh gives no meaning to."""
     if section and centre is not None:
-        raise InputError(
-            f"A centre was given, but the mesh in {name} is a section.",
-            why="The axis of a section is at radius 0.",
-            cure="Leave out the centre (--centre), or shift the mesh.",
-        )
+        problem = f"A centre was given, but the mesh in {name} is a section."
+        cure = "Leave out the centre (--centre), or shift the mesh."
+        raise InputError(problem, why="The axis of a section is at radius 0.", cure=cure)
     if not section and shear is not None:
-        raise InputError(
-            f"A shear field was given, but the mesh in {name} is a body in 3-D.",
-            why="The radial shear is read from sections only.",
-            cure="Leave it out (shear; --shear), or give a section of the film.",
-        )
+        problem = f"A shear field was given, but the mesh in {name} is a body in 3-D."
+        cure = "Leave it out (shear; --shear), or give a section of the film."
+        raise InputError(problem, why="The radial shear is read from sections only.", cure=cure)
 
 
 def _shear_component(

@@ -69,10 +69,8 @@ class Table:
     def _index(self, column_name: str | int) -> int:
         if isinstance(column_name, str) and column_name in self.names:
             if self.names.count(column_name) > 1:
-                raise InputError(
-                    f"{self.source.file_name} has several columns named {column_name!r}.",
-                    cure="Give the number of the column, counted from 1.",
-                )
+                problem = f"{self.source.file_name} has several columns named {column_name!r}."
+                raise InputError(problem, cure="Give the number of the column, counted from 1.")
             return self.names.index(column_name)
         heads = [match and match[1] for match in map(_HEAD.fullmatch, self.names)]
         if heads.count(str(column_name)) == 1:
