@@ -104,9 +104,8 @@ def _check_kinds(values: dict[str, Any], usual: Method) -> None:
         default = getattr(usual, name, None)
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if isinstance(default, float) and not (number and math.isfinite(value)):
-            raise click.UsageError(
-                f"--option {name}={value}: {name} is a number, such as {default}."
-            )
+            problem = f"--option {name}={value}: {name} is a number, such as {default}."
+            raise click.UsageError(problem)
         if type(default) is int and type(value) is not int:
             raise click.UsageError(f"--option {name}={value}: {name} is a whole number.")
 

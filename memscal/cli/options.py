@@ -218,10 +218,14 @@ def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
     return kind(radius=si(options["radius"], -3), radius_uncertainty=spread)
 
 
+def named(names: Iterable[str]) -> str:
+    """Return options as they are typed, by the names of their values."""
+    return ", ".join("--" + name.replace("_", "-") for name in names)
+
+
 def _require(subject: str, options: Mapping[str, Any], names: Iterable[str]) -> None:
-    missing = ["--" + name.replace("_", "-") for name in names if options[name] is None]
-    if missing:
-        raise click.UsageError(f"{subject} is not fully given: add {', '.join(missing)}.")
+    if missing := [name for name in names if options[name] is None]:
+        raise click.UsageError(f"{subject} is not fully given: add {named(missing)}.")
 
 
 kernel_options = options_of(

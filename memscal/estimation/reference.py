@@ -327,12 +327,9 @@ def reference_sensitivities(
     """Change of each scan's transform by one standard uncertainty of each input, by its name."""
     # Scans share the error of a common film or rod, and that of the film's law.
     changes: dict[str, list[FloatArray]] = {}
-    films, rods = ([getattr(scan, of) for scan in scans] for of in ("film", "indenter"))
-    for sensitivities, owners in (
-        (film_sensitivities, films),
-        (rod_sensitivities, rods),
-        (law_sensitivities, [None] * len(scans)),
-    ):
+    of_inputs = film_sensitivities, rod_sensitivities, law_sensitivities
+    for sensitivities, of in zip(of_inputs, ("film", "indenter", "law"), strict=True):
+        owners = [getattr(scan, of, None) for scan in scans]
         distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
             number = distinct.index(owner)

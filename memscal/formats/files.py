@@ -147,9 +147,8 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> 
         descriptor = os.open(shown, flags)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            f"{shown} cannot be read: {reason}.", cure="Check the name and the permissions."
-        ) from error
+        problem = f"{shown} cannot be read: {reason}."
+        raise InputError(problem, cure="Check the name and the permissions.") from error
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):

@@ -101,10 +101,8 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
             children[quantity.key] = si(value, quantity.dimension, quantity.axes)
         elif value is not None and kind is not None and (value or kind.always):
             children[quantity.key] = kind.write(quantity, value)
-    plot: dict[str, Attribute] = {}
-    if record.signal:
-        plot = {"signal": record.signal, "axes": record.axes}
-    return Group(record.nx_class, children | others, plot)
+    plot: dict[str, Attribute] = {"signal": record.signal, "axes": record.axes}
+    return Group(record.nx_class, children | others, plot if record.signal else {})
 
 
 def read_record(
@@ -159,14 +157,14 @@ def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, 
     texts: dict[str, Any] = {}
     notes: dict[str, Any] = {}
     for at, quantity in paths:
-        value = KINDS[quantity.dimension].read(file, at)
+        value, name = KINDS[quantity.dimension].read(file, at), quantity.origin
         if isinstance(value, SourceFile):
-            texts |= {quantity.origin: value.file_name, f"{quantity.origin}_sha256": value.sha256}
+            texts |= {name: value.file_name, f"{name}_sha256": value.sha256}
         elif isinstance(value, str):
-            texts[quantity.origin] = value
+            texts[name] = value
         else:
             of_messages = quantity.dimension == "messages"
-            notes[quantity.origin] = [item.text for item in value] if of_messages else value
+            notes[name] = [item.text for item in value] if of_messages else value
     return texts | notes
 
 
@@ -288,10 +286,8 @@ def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | Non
     """Read the film and the indenter of a scan or an artifact, where it states them."""
     film, indenter = "/entry/sample/film", "/entry/indenter"
     stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
-    return (
-        read_film(file, film) if file.has(film) else None,
-        read_round_indenter(file, indenter) if stated else None,
-    )
+    rod_or_sphere = read_round_indenter(file, indenter) if stated else None
+    return read_film(file, film) if file.has(film) else None, rod_or_sphere
 
 
 def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
@@ -365,11 +361,8 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
     made |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
-    return (
-        data,
-        write_record(records.CONTACT, profile, **of),
-        write_record(records.SOLVER, profile, **made),
-    )
+    parameters = write_record(records.CONTACT, profile, **of)
+    return data, parameters, write_record(records.SOLVER, profile, **made)
 
 
 def _form(form: IdealReference | StressField) -> Group:

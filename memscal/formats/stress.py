@@ -32,12 +32,12 @@ _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 def _read_points(file: SafeFile, path: str, of: Reading) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
-    stored = {
-        channel: read_record(points_record(channel).read_in(of), file, f"{path}/points_{channel}")
-        for channel in _CHANNELS
-        if file.has(f"{path}/points_{channel}")
-    }
-    return {name: MeasuredPoints(**{"noise": None} | points) for name, points in stored.items()}
+    points: dict[str, MeasuredPoints] = {}
+    for channel in _CHANNELS:
+        if file.has(group := f"{path}/points_{channel}"):
+            stored = read_record(points_record(channel).read_in(of), file, group)
+            points[channel] = MeasuredPoints(**{"noise": None} | stored)
+    return points
 
 
 def _read_scans(
@@ -132,11 +132,9 @@ def stress_from(file: SafeFile) -> MeasuredStress:
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
+    of_scans = zip(paths, numbers, strict=True)
     return MeasuredStress(
-        profiles=tuple(
-            _read_profile(file, path, scans[number - 1])
-            for path, number in zip(paths, numbers, strict=True)
-        ),
+        profiles=tuple(_read_profile(file, path, scans[i - 1]) for path, i in of_scans),
         scans=scans,
         **read_record(records.CONVERSION.read_in(scans[0].reading), file, "/entry/sensor"),
         checks=groups.read_quality(file, "/entry/quality"),
@@ -162,13 +160,10 @@ def profile_paths(file: SafeFile) -> list[str]:
 
 
 def _entry(measured: MeasuredStress) -> Group:
-    profiles = {
-        f"profile_{i + 1}": _profile_group(profile, measured.scans)
-        for i, profile in enumerate(measured.profiles)
-    }
-    scans: dict[str, Node] = {
-        f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(measured.scans)
-    }
+    groups_of = [_profile_group(profile, measured.scans) for profile in measured.profiles]
+    profiles = {f"profile_{i}": group for i, group in enumerate(groups_of, 1)}
+    numbered = enumerate(measured.scans, 1)
+    scans: dict[str, Node] = {f"scan_{i}": _scan_group(scan) for i, scan in numbered}
     first = measured.scans[0]
     sensor, digest = first.sensor.name, measured.artifact_digest
     of_artifact = {"content_sha256": digest} if digest else {}

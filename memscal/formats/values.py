@@ -69,9 +69,8 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
     """Return the one number at a path in SI units; an array of one is accepted."""
     values = require_array(file, path, dimension)
     if values.size != 1:
-        raise FormatError(
-            f"{file.where(path)} has {values.size} values, but one number is expected."
-        )
+        problem = f"{file.where(path)} has {values.size} values, but one number is expected."
+        raise FormatError(problem)
     return float(values.reshape(()))
 
 
@@ -100,9 +99,8 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     try:
         value = json.loads(file.text(path))
     except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{file.where(path)} is not JSON: {error}.", cure="Write the file again."
-        ) from error
+        problem = f"{file.where(path)} is not JSON: {error}."
+        raise InputError(problem, cure="Write the file again.") from error
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
     if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:

@@ -540,9 +540,8 @@ class Scan:
 
     def _check_values(self) -> None:
         if np.any(np.isinf(self.u_zz)):
-            raise InputError(
-                "u_zz holds an infinite voltage.", cure="Mark missing points with NaN."
-            )
+            problem = "u_zz holds an infinite voltage."
+            raise InputError(problem, cure="Mark missing points with NaN.")
         if self.load is not None and not (np.isfinite(self.load) and self.load > 0):
             raise InputError(
                 f"The load of the scan is {self.load:g} N, but it must be above zero.",

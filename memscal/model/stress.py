@@ -342,8 +342,6 @@ class StressProfile:
         # Three mirrored radii make the axis an inner point of the spline.
         inner = slice(1, 4) if self.r[0] == 0 else slice(0, 3)
         density = self.sigma_zz * self.r
-        spline, _ = table_spline(
-            np.concatenate([-self.r[inner][::-1], self.r]),
-            np.concatenate([-density[inner][::-1], density]),
-        )
+        radii, values = (np.concatenate([-v[inner][::-1], v]) for v in (self.r, density))
+        spline, _ = table_spline(radii, values)
         return float(2 * np.pi * spline.integrate(0.0, self.r[-1]))

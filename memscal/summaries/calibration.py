@@ -118,11 +118,11 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         "estimates": _estimates_json(apparatus),
     }
     values["film_law"] = (apparatus.film and apparatus.film.law) or None
-    choice = apparatus.process.configuration.get("centre")
+    configuration = apparatus.process.configuration
+    choice = configuration.get("centre")
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
         values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
-    configuration = apparatus.process.configuration
     values |= {name: configuration[name] for name in _OF_FILM if name in configuration}
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
@@ -224,11 +224,8 @@ def rehearsal_table(
         elasticity = f"E = {film.young_modulus / 1e6:.4g} MPa"
         elasticity += f", Poisson's ratio {film.poisson_ratio:.4g}, {film.law_text}"
         rows.append(("film", f"{film.thickness / MM:.4g} mm, {elasticity}"))
-    rows += [
-        ("reference", _origin(stress)),
-        ("method", method),
-        *(("would write", str(path)) for path in outputs),
-    ]
+    rows += [("reference", _origin(stress)), ("method", method)]
+    rows += [("would write", str(path)) for path in outputs]
     return Table("A calibration would use", ("", ""), rows)
 
 

@@ -172,19 +172,13 @@ class SafeFile:
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size
         if self._budget < 0:
-            raise refuse(
-                self.where(path),
-                "brings the data of this file over the limit",
-                f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file.",
-            )
+            why = f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file."
+            raise refuse(self.where(path), "brings the data of this file over the limit", why)
 
     def _check_length(self, path: str, length: int) -> None:
         if length > MAX_TEXT_BYTES:
-            raise refuse(
-                self.where(path),
-                f"claims a text of {length:,} bytes",
-                f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is.",
-            )
+            why = f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is."
+            raise refuse(self.where(path), f"claims a text of {length:,} bytes", why)
         self._spend(path, length)
 
     def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:

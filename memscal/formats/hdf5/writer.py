@@ -192,10 +192,9 @@ def tree_to_bytes(root: Group) -> bytes:
         for path, node in walk(root):
             if isinstance(node, Group):
                 if wrong := [name for name in node.children if not _NAME.fullmatch(name)]:
-                    raise InputError(
-                        f"{wrong[0]!r} cannot be written into {path}: a name is lower-case ASCII.",
-                        cure="Use the letters a to z, digits and underscores.",
-                    )
+                    problem = f"{wrong[0]!r} cannot be written into {path}"
+                    cure = "Use the letters a to z, digits and underscores."
+                    raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
                 group = file if path == "/" else file.create_group(path)
                 for name, value in node.all_attributes.items():
                     _write_attribute(group, name, value)

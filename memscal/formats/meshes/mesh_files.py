@@ -103,11 +103,8 @@ def run_meshio(
     header = json.loads(np.load(answer, allow_pickle=False).tobytes())
     if "error" in header:
         kind_of_error = UnsafeFileError if header["unsafe"] else FormatError
-        raise kind_of_error(
-            f"{name} cannot be read as a mesh.",
-            why=f"The reader says: {printable(header['error'], _MAX_REASON)}.",
-            cure=_AS_VTU,
-        )
+        why = f"The reader says: {printable(header['error'], _MAX_REASON)}."
+        raise kind_of_error(f"{name} cannot be read as a mesh.", why=why, cure=_AS_VTU)
     numbers = []
     while answer.tell() < len(answer.getbuffer()):
         numbers.append(np.load(answer, allow_pickle=False))
@@ -140,9 +137,8 @@ def _run(request: str, folder: str, seconds: float, name: str) -> None:
             cure="Run memscal where Python may start itself.",
         ) from error
     if late:
-        raise UnsafeFileError(
-            f"Reading {name} takes longer than {seconds:.3g} s.", why="It was ended.", cure=_AS_VTU
-        )
+        problem = f"Reading {name} takes longer than {seconds:.3g} s."
+        raise UnsafeFileError(problem, why="It was ended.", cure=_AS_VTU)
     if done.returncode:
         problem = f"The process that read {name} was ended by an error ({done.returncode})."
         why = "The mesh is damaged, or larger than the memory that its file's size allows."
@@ -310,17 +306,14 @@ def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool
     points, unit = from_si(np.pad(mesh.points, ((0, 0), (0, 1))), "length")
     moved, _ = from_si(np.pad(mesh.displacement, ((0, 0), (0, 1))), "length")
     stress = np.pad(mesh.stress, ((0, 0), (0, 2)))
-    written = meshio.Mesh(
-        points,
-        [(_CELLS[mesh.triangles.shape[1]], mesh.triangles)],
-        point_data={f"displacement_{unit}": moved, "stress_Pa": stress},
-    )
+    cells = [(_CELLS[mesh.triangles.shape[1]], mesh.triangles)]
+    fields = {f"displacement_{unit}": moved, "stress_Pa": stress}
+    written = meshio.Mesh(points, cells, point_data=fields)
     with tempfile.TemporaryDirectory(prefix="memscal-") as folder:
-        plain = os.path.join(folder, "mesh.vtu")
+        plain = Path(folder, "mesh.vtu")
         # Not Mesh.write, which finds the format by the name, in any of forty.
-        meshio.vtu.write(plain, written)
-        with open(plain, "rb") as file:
-            data = file.read()
+        meshio.vtu.write(str(plain), written)
+        data = plain.read_bytes()
     head, grid, body = data.partition(b"<UnstructuredGrid>")
     atomic_write_bytes(path, head + _comment(mesh) + grid + body, overwrite=overwrite)
 

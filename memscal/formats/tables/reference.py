@@ -83,15 +83,9 @@ def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
         cure = "Give one half of a section through the axis, with r from 0."
         raise InputError(f"{name} has a negative radius ({lowest * 1e3:g} mm).", why=why, cure=cure)
     notes = list(samples.notes)
-    columns = _sorted_by_radius(samples, notes)
-    profile = StressProfile(
-        r=columns["r"],
-        sigma_zz=columns["sigma_zz"],
-        sigma_rz=columns.get("sigma_rz"),
-        **stated,  # what no table or mesh holds: load, film, indenter
-        discretisation=samples.discretisation,
-        source=samples.source,
-    )
+    # Stated is what no table or mesh holds: load, film, indenter.
+    fields: dict[str, Any] = {**_sorted_by_radius(samples, notes), **stated}
+    profile = StressProfile(**fields, discretisation=samples.discretisation, source=samples.source)
     notes += _compare_with_load(profile, samples)
     return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
 
@@ -194,10 +188,8 @@ def read_reference_table(
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
-    columns = {
-        "r": table.quantity(r, r_unit, "length"),
-        "sigma_zz": sign * table.quantity(sigma, sigma_unit, "stress"),
-    }
+    columns = {"r": table.quantity(r, r_unit, "length")}
+    columns["sigma_zz"] = sign * table.quantity(sigma, sigma_unit, "stress")
     if shear is not None:
         columns["sigma_rz"] = shear_sign * table.quantity(shear, sigma_unit, "stress")
     samples = Samples(

@@ -139,13 +139,8 @@ def read_table(
         f"Read {len(body)} rows of {width} columns separated by a "
         f"{_DELIMITERS.get(delimiter, repr(delimiter))}, with a decimal {mark}."
     )
-    return Table(
-        source=source,
-        names=tuple(printable(cell, _MAX_NAME) for cell in header),
-        rows=body,
-        decimal=decimal,
-        notes=tuple(notes),
-    )
+    names = tuple(printable(cell, _MAX_NAME) for cell in header)
+    return Table(source, names, rows=body, decimal=decimal, notes=tuple(notes))
 
 
 def _is_comment(line: str) -> bool:
