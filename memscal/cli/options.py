@@ -167,11 +167,9 @@ def _measured(
 ) -> _Adder:
     """Return the options of quantities, then those of their uncertainties (the last texts)."""
     options = [(name, kind, about) for name, kind, about, _ in entries]
-    if uncertainties:
-        options += [
-            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + of)
-            for name, kind, _, of in entries
-        ]
+    for name, kind, _, of in entries if uncertainties else ():
+        spread = Quantity(kind.name, open_low=False)
+        options.append((f"{name}-uncertainty", spread, _UNCERTAINTY + of))
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )

@@ -194,9 +194,9 @@ def _choose_law(options: dict[str, Any]) -> None:
 
 
 def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
-    film, body = common.film_from(options), indenter_of(indenter, options)
-    interface = interface_of(options)
     from memscal.mechanics.indent import indent
+
+    film, body = common.film_from(options), indenter_of(indenter, options)
 
     friction = options["friction"]
     if friction is None:
@@ -204,12 +204,11 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
         friction = math.inf if indenter == "rod" and film.law != "linear" else 0.0
     names = ("loading", "backend", "rings")
     settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
-    settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
+    settings |= {"interface": interface_of(options), "film_radius": si(options["film_radius"], -3)}
     settings["strain"] = "linear" if film.law == "linear" else "finite"
     with out.working("Pressing") as show:
         settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
-        if options["depths"]:
-            depths = [si(depth, -6) for depth in options["depths"]]
+        if depths := [si(depth, -6) for depth in options["depths"]]:
             return indent(film, body, depth=depths, **settings)
         return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)
 

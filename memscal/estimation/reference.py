@@ -154,12 +154,10 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
         names.append("young_modulus")
     if kind == "reference":
         names += ["law", "mooney_rivlin_ratio"]
-    differences = []
-    if film is not None:
-        differences += points.stated_differences(FILM, names, (scan.film, film), places, "film")
-    if stress.indenter is not None:
-        pair = scan.indenter, stress.indenter
-        differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+    # What one side does not state does not differ.
+    differences = points.stated_differences(FILM, names, (scan.film, film), places, "film")
+    pair = scan.indenter, stress.indenter
+    differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
     if kind == "reference" and finite:
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         rods = scan, SimpleNamespace(rod_friction=friction)

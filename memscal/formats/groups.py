@@ -195,24 +195,23 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
     pairs, of = zip(parameters.names, stated, strict=True), parameters.reading
-    dimensions = [parameter_dimension(name, unit, of) for name, unit in pairs]
+    dimensions = {name: parameter_dimension(name, unit, of) for name, unit in pairs}
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
         why = "The group of the parameters holds something else of that name."
         cure = "Give it another name."
         raise InputError(f"A parameter cannot be called {min(reserved)}.", why=why, cure=cure)
     children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
-    for name, value, dimension in zip(parameters.names, parameters.values, dimensions, strict=True):
-        children[name] = si(float(value), dimension)
+    for name, dimension in dimensions.items():
+        children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
     for axis in _AXES:
         children[axis] = writer.index_axis(axis, len(parameters.names))
-    scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions])
+    scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions.values()])
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
     children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
     if budget:
-        of_names = dict(zip(parameters.names, dimensions, strict=True))
-        children["budget"] = budget_group(budget, of_names)
+        children["budget"] = budget_group(budget, dimensions)
     return Group("NXcollection", children)
 
 
@@ -352,11 +351,9 @@ def read_sensor(file: SafeFile, path: str) -> StressSensor:
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
-    of: dict[str, Node] = {}
-    if profile.film is not None:
-        of["film"] = write_record(records.FILM, profile.film)
-    if profile.indenter is not None:
-        of["indenter"] = indenter_group(profile.indenter)
+    film, indenter = profile.film, profile.indenter
+    of = {"film": write_record(records.FILM, film)} if film else {}
+    of |= {"indenter": indenter_group(indenter)} if indenter else {}
     numerics = write_record(records.NUMERICS, profile)
     made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
     made |= write_record(records.PROFILE_NOTES, profile).children
@@ -453,9 +450,9 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
 
 def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
-
-    def check(name: str) -> QualityCheck:
-        defaults = {"name": name, "meaning": ""}
-        return QualityCheck(**read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults))
-
-    return tuple(map(check, text_list(file, f"{path}/names")))
+    checks = []
+    for name in text_list(file, f"{path}/names"):
+        stated = {"name": name, "meaning": ""}
+        values = read_record(records.CHECK, file, f"{path}/{name}", defaults=stated)
+        checks.append(QualityCheck(**values))
+    return tuple(checks)

@@ -149,9 +149,8 @@ def write_stress(
     measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
     """Write measured stress as a memscal-stress file, whole or not at all."""
-    writer.write_tree(
-        writer.file_tree(writer.STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite
-    )
+    root = writer.file_tree(writer.STRESS_SCHEMA, _entry(measured))
+    writer.write_tree(root, path, overwrite=overwrite)
 
 
 def profile_paths(file: SafeFile) -> list[str]:
@@ -187,10 +186,8 @@ def _entry(measured: MeasuredStress) -> Group:
 
 def _inputs_group(measured: MeasuredStress) -> Group:
     sources = {"artifact": measured.artifact}
-    sources |= {f"scan_{i + 1}": scan.source for i, scan in enumerate(measured.scans)}
-    nodes: dict[str, Node] = {
-        name: write_source(source) for name, source in sources.items() if source is not None
-    }
+    sources |= {f"scan_{i}": scan.source for i, scan in enumerate(measured.scans, 1)}
+    nodes: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     return Group("NXcollection", {"names": to_json("inputs", list(nodes)), **nodes})
 
 
@@ -249,9 +246,10 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     arrays = read_record(records.STRESS_PROFILE, file, path)
     n = arrays["r"].size
     sources = text_list(file, f"{path}/sources")
-    kind = "stress squared"
-    declared = (Quantity(_PREFIX + name, kind, axes=_AXES, required=True) for name in sources)
-    stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
+    of_sources = [
+        Quantity(_PREFIX + name, "stress squared", axes=_AXES, required=True) for name in sources
+    ]
+    stored = read_record(record("NXdata", *of_sources), file, path, sizes={"r": n})
     budget = groups.read_budget(file, f"{path}/budget")
     if not sources or not budget.keys() >= _BUDGET.keys():
         problem = f"{file.where(path)} states no covariance of its stress, or no budget."

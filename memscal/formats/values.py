@@ -117,10 +117,7 @@ _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 
 def altered(file: SafeFile) -> str:
-    """Return how a file differs from what was written, or ``""`` where it does not.
-
-    From then on only what the file lists can be read from it.
-    """
+    """Return how a file differs from what was written, or ``""``; then only that can be read."""
     stated = file.attribute("/", writer.DIGEST_ATTRIBUTE)
     if stated is None:
         return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing."

@@ -38,14 +38,11 @@ _CANDIDATES = 200
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of the points of one scan.
+    """Places of the points of one scan."""
 
-    ``index`` (n,): the place of each point; ``row`` (n,): its row along y, 0 on a line; ``steps``
-    (2,): typical distance of neighbours along x and y, in m, 0 along an axis without spread.
-    """
-
-    index: IntArray
-    row: IntArray
+    index: IntArray  # (n,): the place of each point
+    row: IntArray  # (n,): its row along y, 0 on a line
+    # Typical distance of neighbours along x and y, in m, 0 along an axis without spread.
     steps: tuple[float, float]
 
     @property

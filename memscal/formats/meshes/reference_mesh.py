@@ -259,13 +259,10 @@ def read_reference_mesh(
     centre: tuple[float, float] | None = None,
     **stated: Any,
 ) -> reference.ImportedProfile:
-    """Read the stress at the base of the film from a mesh: a section, or a film in 3-D.
-
-    ``sigma`` is a field of the normal stress or of a tensor of 4, 6 or 9 components, ``"name:2"``
-    component 2.  ``base`` and ``centre`` are in m.  Without ``shear_sign`` the shear is taken for
-    the stress component rz; with 1, for the radial traction of the base on the film.  ``stated``
-    are the profile's ``load`` in N and, where they are known, ``film``, ``indenter``, ``solver``.
-    """
+    """Read the stress at the base of the film from a mesh; ``stated`` are the profile's fields."""
+    # sigma is a field of the normal stress or of a tensor of 4, 6 or 9 components, "name:2" its
+    # component 2. Base and centre are in m. Without shear_sign the shear is taken for the stress
+    # component rz; with 1, for the radial traction of the base on the film.
     reference.require_sign("sign", sign)
     if shear_sign is not None:
         reference.require_sign("shear sign", shear_sign)

@@ -179,12 +179,9 @@ def read_reference_table(
     decimal: str | None = None,
     **stated: Any,
 ) -> ImportedProfile:
-    """Read the stress at the base of the film from a table with one row per radius.
-
-    ``sign`` is -1 where compression is negative, and turns the normal stress; ``shear_sign`` is -1
-    where the shear is S13 with axis 3 from the base to the surface.  ``stated`` are the profile's
-    ``load`` in N and, where they are known, ``film``, ``indenter`` and ``solver``.
-    """
+    """Read the stress at the base of the film from a table; ``stated`` are the profile's fields."""
+    # sign is -1 where compression is negative, and turns the normal stress; shear_sign is -1 where
+    # the shear is S13 with axis 3 from the base to the surface.
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)

@@ -25,9 +25,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 # A name and its unit: x/mm, x (mm) or x [mm].
 _HEAD = re.compile(r"([^/(\[]+?)\s*(?:/(.+)|\((.+)\)|\[(.+)\])")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
-_MAX_NAME = 80
-_MAX_COMMENTS = 20
-_MAX_COMMENT = 300
+_MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT = 80, 20, 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +103,8 @@ class Table:
 def read_table(
     path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None
 ) -> Table:
-    """Read a delimited text file; ``#`` or ``%`` begin a comment.
-
-    The first line with a cell that is no number is the header.
-    """
+    """Read a delimited text file; ``#`` or ``%`` begin a comment."""
+    # The first line is the header where one of its cells is no number.
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
