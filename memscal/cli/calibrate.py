@@ -45,12 +45,9 @@ def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
             workers=workers,
             progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
         )
-    disagreements = [
-        Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
-        for c in drawn.comparisons
-        if not c.agrees
-    ]
-    out.show_messages([*drawn.messages, *disagreements])
+    differing = [c for c in drawn.comparisons if not c.agrees]
+    texts = [f"{estimated_quantity(c.name).words}: {c.reason}" for c in differing]
+    out.show_messages([*drawn.messages, *(Message("disagreement", text) for text in texts)])
     return drawn
 
 

@@ -198,11 +198,10 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         )
     from memscal.model.film import ElasticFilm
 
-    numbers: dict[str, Any] = {
-        name: si(options.get(name), power)
-        for quantity, power in FILM.items()
-        for name in (quantity, f"{quantity}_uncertainty")
-    }
+    numbers: dict[str, Any] = {}
+    for name, power in FILM.items():
+        spread = f"{name}_uncertainty"
+        numbers |= {name: si(options[name], power), spread: si(options.get(spread), power)}
     return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 

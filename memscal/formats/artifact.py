@@ -61,10 +61,6 @@ def write_artifact(
 
 def artifact_tree(data: ApparatusData) -> Group:
     """Return what a memscal-artifact file holds; its root states the content digest."""
-    return file_tree(ARTIFACT_SCHEMA, _entry(data))
-
-
-def _entry(data: ApparatusData) -> Group:
     sensor, of_scan = data.sensor.name, records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
@@ -88,7 +84,8 @@ def _entry(data: ApparatusData) -> Group:
             f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
-    return Group("NXentry", children, {"default": "apparatus_function"})
+    entry = Group("NXentry", children, {"default": "apparatus_function"})
+    return file_tree(ARTIFACT_SCHEMA, entry)
 
 
 def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:

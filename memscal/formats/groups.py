@@ -373,12 +373,6 @@ def _form(form: IdealReference | StressField) -> Group:
     return Group("NXdata", axes, {"signal": "field", "axes": ("y", "x")})
 
 
-def _read_form(file: SafeFile, path: str) -> IdealReference | StressField | None:
-    if file.has(f"{path}/shape"):
-        return IdealReference(**read_record(records.IDEAL_REFERENCE, file, path))
-    return read_field(file, path) if file.has(f"{path}/field") else None
-
-
 def read_field(file: SafeFile, path: str) -> StressField:
     """Read a field from an NXdata group, or from one that holds x, y and sigma_zz or field."""
     axes = file.attribute(path, "axes") if path else None
@@ -416,15 +410,18 @@ def read_profile(
     """Read a stress profile; the load is the one given where it names none."""
     film, indenter = f"{parameters}/film", f"{parameters}/indenter"
     defaults = {} if load is None else {"load": load}
-    if (form := _read_form(file, data)) is not None:
-        stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
-        return replace(form.profile(), **stated)
+    contact = read_record(records.CONTACT, file, parameters, defaults=defaults)
+    if file.has(f"{data}/shape"):
+        ideal = IdealReference(**read_record(records.IDEAL_REFERENCE, file, data))
+        return replace(ideal.profile(), **contact)
+    if file.has(f"{data}/field"):
+        return replace(read_field(file, data).profile(), **contact)
     return StressProfile(
         film=read_film(file, film) if file.has(film) else None,
         indenter=read_indenter(file, indenter) if file.has(indenter) else None,
         source=file.source,
         **read_record(records.PROFILE, file, data),
-        **read_record(records.CONTACT, file, parameters, defaults=defaults),
+        **contact,
         **read_record(records.SOLVER, file, process),
         **read_record(records.NUMERICS, file, f"{process}/numerics"),
         **read_record(records.PROFILE_NOTES, file, process),

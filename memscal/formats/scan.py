@@ -23,8 +23,7 @@ from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
-_DATA = "/entry/data"
-_SAMPLE = "/entry/sample"
+_DATA, _SAMPLE = "/entry/data", "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 _DECLARED = by_name(records.SCAN_DATA.quantities)
@@ -246,11 +245,11 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
     path = "/entry/synthetic"
     if not file.is_group(path):
         return None
-    items = {name: f"{path}/{name}" for name in text_list(file, f"{path}/names")}
-    return {
-        name: file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
-        for name, item in items.items()
-    }
+    truth: dict[str, Any] = {}
+    for name in text_list(file, f"{path}/names"):
+        item = f"{path}/{name}"
+        truth[name] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
+    return truth
 
 
 def ensure_folder_writable(

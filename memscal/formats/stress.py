@@ -209,10 +209,8 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     if profile.curve_r.size:
         optional["curve"] = write_record(records.STRESS_CURVE, profile)
-    covariances = {
-        _PREFIX + source: si(covariance, "stress squared", _AXES)
-        for source, covariance in profile.covariances.items()
-    }
+    by_source = profile.covariances.items()
+    covariances = {_PREFIX + source: si(c, "stress squared", _AXES) for source, c in by_source}
     points = {
         f"points_{channel}": write_record(points_record(channel).read_in(of), of_channel)
         for channel, of_channel in profile.points.items()

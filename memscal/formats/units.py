@@ -101,8 +101,7 @@ def reading_of(unit: str, where: str) -> Reading:
 
 def dimension_of(unit: str, where: str) -> str:
     """Return the dimension of a unit whose quantity is not known beforehand."""
-    canonical = _CANONICAL.get(unit.strip())
-    if canonical is not None:
+    if canonical := _CANONICAL.get(unit.strip()):
         return canonical[0]
     if entered := next((d for d, units in DIMENSIONS.items() if units.stored == unit), ""):
         return entered

@@ -25,8 +25,7 @@ IntArray = NDArray[np.intp]
 
 #: Readings share a place where they are closer than this share of the distance that nine tenths
 #: of the readings of a pass keep from each other; a few may be read twice in one.
-_CLOSE = 0.1
-_TWICE = 0.1
+_CLOSE, _TWICE = 0.1, 0.1
 #: Distances below a nanometre are rounding.
 _ROUNDING = 1e-9
 #: Rows and columns make a raster if they cross at no more than this many nodes for each place.

@@ -331,9 +331,8 @@ def _search(plan: Plan, vary: str) -> tuple[str, int, int, Callable[[int], Plan]
 
 
 def _reached(design: Design, name: str) -> float:
-    if name == "resolved_wavenumber":
-        return design.resolved_wavenumber
-    return design.relative_uncertainty(name)
+    of_band = name == "resolved_wavenumber"
+    return design.resolved_wavenumber if of_band else design.relative_uncertainty(name)
 
 
 def _met(design: Design, name: str, value: float) -> bool:

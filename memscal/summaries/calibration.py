@@ -99,10 +99,9 @@ def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
         names = other.parameters.names
         estimates[other.method] = {name: parameter_json(other.parameters, name) for name in names}
     if "conversion_constant_gaussian" in parameters:
-        estimates["gaussian"] = {
-            "conversion_constant": parameter_json(parameters, "conversion_constant_gaussian"),
-            "gaussian_sigma": parameter_json(parameters, "gaussian_sigma"),
-        }
+        names = ("conversion_constant_gaussian", "gaussian_sigma")
+        a, sigma = (parameter_json(parameters, name) for name in names)
+        estimates["gaussian"] = {"conversion_constant": a, "gaussian_sigma": sigma}
     return estimates
 
 
@@ -116,8 +115,8 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **{name: parameter_json(parameters, name) for name in _IN_JSON if name in parameters},
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
+        "film_law": (apparatus.film and apparatus.film.law) or None,
     }
-    values["film_law"] = (apparatus.film and apparatus.film.law) or None
     configuration = apparatus.process.configuration
     choice = configuration.get("centre")
     if isinstance(choice, Mapping):

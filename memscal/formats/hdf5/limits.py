@@ -14,8 +14,7 @@ import h5py
 
 from memscal.errors import UnsafeFileError
 
-_DESCRIPTOR = 16
-_OBJECT = 16  # header of an object in a global heap
+_DESCRIPTOR, _OBJECT = 16, 16  # _OBJECT: header of an object in a global heap
 _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
 _SHARED = 0x02
 _VARIABLE_LENGTH = 9  # class of the datatype
@@ -128,12 +127,9 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
             position += prefix + length
 
 
-MAX_DATASET_BYTES = 128 * 2**20
-MAX_TEXT_BYTES = 4 * 2**20
-_MAX_RANK = 4
-_MAX_CHUNKS = 2**16
-_MIN_CHUNK_LIMIT = 2**20
-_MAX_NUMBER_BYTES = 16
+MAX_DATASET_BYTES, MAX_TEXT_BYTES = 128 * 2**20, 4 * 2**20
+_MAX_RANK, _MAX_NUMBER_BYTES = 4, 16
+_MAX_CHUNKS, _MIN_CHUNK_LIMIT = 2**16, 2**20
 _UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
 
 

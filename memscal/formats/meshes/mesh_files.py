@@ -40,8 +40,7 @@ _MEMORY, _MEMORY_PER_BYTE = 2**30, 20
 _SECONDS, _BYTES_PER_SECOND = 60.0, 2**20
 # Whatever else is in the environment is not for a process that reads files of others.
 _ENVIRONMENT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PATH", "SYSTEMROOT")
-_MAX_REASON = 400
-_MAX_SHOWN = 80
+_MAX_REASON, _MAX_SHOWN = 400, 80
 _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 # The address of an array in another file, such as film.h5:/data0, where XDMF has numbers.
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
@@ -152,8 +151,7 @@ _OTHERS = {
     *(".exo", ".e", ".bdf", ".unv", ".odb", ".rst", ".mph", ".ply", ".stl", ".obj"),
 }
 _CELLS = {3: "triangle", 6: "triangle6"}
-_MAX_NAME = 80
-_MAX_NOTES = 4000
+_MAX_NAME, _MAX_NOTES = 80, 4000
 
 
 def is_mesh(path: str | os.PathLike[str]) -> bool:

@@ -18,9 +18,7 @@ from memscal.model.notation import printable
 AXES = "xyz"
 # Of the largest coordinate: meshes are often stored in single precision.
 _TOLERANCE = 1e-6
-_FEWEST = 4
-_CIRCLES = 501
-_DIRECTIONS = 72
+_FEWEST, _CIRCLES, _DIRECTIONS = 4, 501, 72
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +44,7 @@ class Base:
     nodes: NDArray[np.int64]
     cells: tuple[tuple[Cells, NDArray[np.int64], FloatArray], ...]
     outward: int
-    notes: tuple[str, ...]
+    note: str
 
 
 def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
@@ -116,7 +114,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
         )
     which = ", its lowest level" if level is None else ""
     note = f"The base was taken at {level_text}{which}: {base_nodes.size} nodes."
-    return Base(base_nodes, tuple(sides), outward, (note,))
+    return Base(base_nodes, tuple(sides), outward, note)
 
 
 def average_over_circles(
@@ -280,7 +278,7 @@ def read_reference_mesh(
     notes = [
         *import_notes([f"Imported from {name} (sha256 {mesh.source.sha256}).", *mesh.notes]),
         *frame.notes,
-        *import_notes(footing.notes),
+        *import_notes([footing.note]),
         _component_note(normal, "Normal stress", treatment),
     ]
     if tangential is not None:

@@ -15,8 +15,7 @@ from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
 # A larger difference between force and load is warned of, one beyond a factor is refused.
-_WARNED = 0.03
-_REFUSED = 2.0
+_WARNED, _REFUSED = 0.03, 2.0
 # Samples whose stress has not decayed to this share of its maximum end early.
 _DECAYED = 0.01
 # In SI; a force calculated from larger numbers would overflow.
@@ -33,19 +32,16 @@ class ImportedProfile:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """Stress at the base as a file states it, in SI, and the words for it in messages.
+    """Stress at the base as a file states it, in SI, and the words for it in messages."""
 
-    ``columns`` (n,) are ``r``, ``sigma_zz`` and perhaps ``sigma_rz``; ``spacing`` is in m.
-    """
-
-    columns: dict[str, FloatArray]
+    columns: dict[str, FloatArray]  # (n,): r, sigma_zz and perhaps sigma_rz
     source: SourceFile
     notes: Sequence[Message]
     kind: str
     item: str
     units: tuple[str, str]
     sign: int
-    spacing: float
+    spacing: float  # in m
     discretisation: str = ""
 
     @property

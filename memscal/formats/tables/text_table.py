@@ -145,7 +145,7 @@ def _is_comment(line: str) -> bool:
 
 def _head_comments(lines: list[str]) -> list[str]:
     """Return what is written above the table: it may say that the data are synthetic."""
-    head = list(itertools.takewhile(_is_comment, lines))
+    head = itertools.takewhile(_is_comment, lines)
     shown = [printable(line.lstrip(" \t#%"), _MAX_COMMENT).strip() for line in head]
     notes = [f"The table says: {line}" for line in shown[:_MAX_COMMENTS] if line]
     if len(shown) > _MAX_COMMENTS:
