@@ -156,12 +156,11 @@ def _entry(scan: Scan) -> Group:
     texts = dict(write_record(records.EXPERIMENT, scan).children)
     notes = {"notes": texts.pop("notes")} if scan.notes else {}
     children: dict[str, Node] = {"title": scan.title} if scan.title else {}
+    of_load = scan.load, scan.load_uncertainty, scan.rod_friction
     children |= {
         **texts,
         "data": _data_group(scan),
-        "indenter": groups.indenter_group(
-            scan.indenter, scan.load, scan.load_uncertainty, scan.rod_friction
-        ),
+        "indenter": groups.indenter_group(scan.indenter, *of_load),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
         "instrument": groups.instrument_group(scan.sensor),
         **notes,

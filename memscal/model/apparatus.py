@@ -12,7 +12,7 @@ from memscal.model.arrays import FloatArray, FrozenArrays
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.notation import VOLTS, Reading
+from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
@@ -196,10 +196,12 @@ class ApparatusData(Checked):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        from memscal.model.quantities import measured_text  # which imports this module
-
-        names = ("conversion_constant", "gaussian_sigma")
-        a, sigma = (measured_text(self.parameters, name) for name in names)
+        of_a = ("conversion_constant", self.reading.scale, self.reading.over(self.reading.unit))
+        values = self.parameters
+        a, sigma = (
+            format_measured(values[name] / scale, values.uncertainty(name) / scale, unit)
+            for name, scale, unit in (of_a, ("gaussian_sigma", 1e-3, "mm"))
+        )
         state = state_of_checks(self.checks)
         return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"
 

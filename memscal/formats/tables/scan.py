@@ -63,13 +63,12 @@ def read_scan_table(
     require_sign("sign of the voltage", u_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     notes = [*table.notes]
-    channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
+    channels = {n: c for n, c in (("u_zz", u), ("u_xz", u_xz), ("u_yz", u_yz)) if c is not None}
     u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
     x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
     reading = reading_of(u_unit, table.where(u))
     of_unit = dimension_in("voltage", reading)
-    stated_channels = {name: column for name, column in channels.items() if column is not None}
-    columns = {n: table.quantity(c, u_unit, of_unit) for n, c in stated_channels.items()}
+    columns = {n: table.quantity(c, u_unit, of_unit) for n, c in channels.items()}
     columns["u_zz"] = u_sign * columns["u_zz"]
     notes += ["The sign of u_zz was changed."] if u_sign < 0 else []
     if reading.si != "V":
