@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -44,12 +45,9 @@ def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
             workers=workers,
             progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
         )
-    disagreements = [
-        Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
-        for c in drawn.comparisons
-        if not c.agrees
-    ]
-    out.show_messages([*drawn.messages, *disagreements])
+    differing = [c for c in drawn.comparisons if not c.agrees]
+    texts = [f"{estimated_quantity(c.name).words}: {c.reason}" for c in differing]
+    out.show_messages([*drawn.messages, *(Message("disagreement", text) for text in texts)])
     return drawn
 
 
@@ -92,10 +90,9 @@ def _option(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not (equals and name.isidentifier()):
         raise click.UsageError(f"--option {text!r} is not of the form NAME=VALUE.")
-    try:
+    with contextlib.suppress(ValueError):
         return name, json.loads(value)
-    except ValueError:
-        return name, value
+    return name, value
 
 
 def _check_kinds(values: dict[str, Any], usual: Method) -> None:
@@ -104,9 +101,8 @@ def _check_kinds(values: dict[str, Any], usual: Method) -> None:
         default = getattr(usual, name, None)
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if isinstance(default, float) and not (number and math.isfinite(value)):
-            raise click.UsageError(
-                f"--option {name}={value}: {name} is a number, such as {default}."
-            )
+            problem = f"--option {name}={value}: {name} is a number, such as {default}."
+            raise click.UsageError(problem)
         if type(default) is int and type(value) is not int:
             raise click.UsageError(f"--option {name}={value}: {name} is a whole number.")
 
@@ -327,29 +323,25 @@ def _rehearse(
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.stages import require_channel_method
+    from memscal.estimation import reference
     from memscal.estimation.points import joined_points, measured_points, scans_of_repeats
-    from memscal.estimation.reference import (
-        at_load_of,
-        reference_profile,
-        reference_spectra,
-        require_one_sensor,
-        require_same_set_up,
-    )
     from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
     channel, override = settings["channel"], settings["override"]
-    require_one_sensor(scans)
+    reference.require_one_sensor(scans)
     require_channel_method(channel, regulariser)
     given = [profile] * len(scans), [alternative] * len(scans)
-    out.show_messages(override_messages(require_same_set_up(scans, *given, override=override)))
+    differences = reference.require_same_set_up(scans, *given, override=override)
+    out.show_messages(override_messages(differences))
     if settings["centre"] == "per-repeat":
         scans = scans_of_repeats(scans, channel)[0]
-    stresses = [reference_profile(scan, profile) for scan in scans]
+    stresses = [reference.reference_profile(scan, profile) for scan in scans]
     peak = 1.0 if settings["relative"] else None
-    loaded = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
+    pairs = zip(stresses, scans, strict=True)
+    loaded = [reference.at_load_of(stress, scan, peak) for stress, scan in pairs]
     readings = [measured_points(scan, channel) for scan in loaded]
-    reference_spectra(stresses, readings)
+    reference.reference_spectra(stresses, readings)
     points, plan = joined_points(readings), (regulariser.name, outputs)
     if as_json:
         out.emit_json(rehearsal_json(stresses[0], *plan))

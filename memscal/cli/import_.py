@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import click
 
 from memscal.cli import options as common
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, Quantity, option, options_of, output_options, si
+from memscal.cli.options import FILE, Quantity, option, output_options, si
 from memscal.cli.output import emit, emit_json, message, prove_writable, show_messages
 from memscal.model.checks import marked_texts
 from memscal.summaries.table import readable
@@ -28,39 +28,6 @@ _REFERENCE_NAMES = (*_OF_TABLES, *_SHARED, *_OF_MESHES)
 _READING = ("delimiter", "decimal")
 _POSITION = Quantity("mm", low=-float("inf"))
 _SIGN = click.Choice(["1", "-1"])
-reference_options = options_of(
-    option("--r", metavar="COLUMN")("Reference: column of the radius."),
-    option("--r-unit", metavar="UNIT")(
-        "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
-    ),
-    option("--sigma", metavar="COLUMN|FIELD")(
-        "Reference: column of the normal stress at the base; in a mesh the field of it, "
-        "or of the stress tensor, and FIELD:2 is its component 2."
-    ),
-    option("--sigma-unit", metavar="UNIT")("Reference: unit of the stresses, such as MPa."),
-    option("--shear", metavar="COLUMN|FIELD")(
-        "Reference: the radial shear stress; in a mesh a stress tensor's own by default."
-    ),
-    option("--sign", _SIGN)(
-        "Reference: -1 where compression is negative.  [default: 1 for a table, -1 for a mesh]"
-    ),
-    option("--shear-sign", _SIGN)(
-        "Reference: -1 where the shear is the stress component S13 with axis 3 from the "
-        "base to the surface; 1 where it is the base's traction on the film, positive outward."
-        "  [default: 1 for a table; for a mesh S13, whichever way its axis points]"
-    ),
-    option("--solver", metavar="TEXT")("Reference: the program that calculated it."),
-    option("--vertical", click.Choice(["x", "y", "z"]))(
-        "Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]"
-    ),
-    option("--base", _POSITION)(
-        "Mesh: position of the base on that axis, in mm.  [default: the lowest]"
-    ),
-    option("--centre", (_POSITION, _POSITION), metavar="MM MM")(
-        "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
-    ),
-)
-"""The options that describe a table or a mesh of stress at the base."""
 
 
 def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> ImportedProfile:
@@ -114,10 +81,7 @@ _ONLY = {
     "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
     "reference": _REFERENCE_NAMES,
 }
-_NEEDED = {
-    "scan": ("x", "u"),
-    "reference": ("r_unit", "sigma", "sigma_unit", "load"),
-}
+_NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "load")}
 
 
 @click.command("import", epilog=EXAMPLES)
@@ -170,7 +134,36 @@ _NEEDED = {
 @option("--sensor-model", metavar="TEXT")("Scan: model of the sensor.")
 @option("--channel", metavar="TEXT")("Scan: name of the channel.  [default: zz]")
 @option("--title", metavar="TEXT")("Scan: title.")
-@reference_options
+@option("--r", metavar="COLUMN")("Reference: column of the radius.")
+@option("--r-unit", metavar="UNIT")(
+    "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
+)
+@option("--sigma", metavar="COLUMN|FIELD")(
+    "Reference: column of the normal stress at the base; in a mesh the field of it, "
+    "or of the stress tensor, and FIELD:2 is its component 2."
+)
+@option("--sigma-unit", metavar="UNIT")("Reference: unit of the stresses, such as MPa.")
+@option("--shear", metavar="COLUMN|FIELD")(
+    "Reference: the radial shear stress; in a mesh a stress tensor's own by default."
+)
+@option("--sign", _SIGN)(
+    "Reference: -1 where compression is negative.  [default: 1 for a table, -1 for a mesh]"
+)
+@option("--shear-sign", _SIGN)(
+    "Reference: -1 where the shear is the stress component S13 with axis 3 from the "
+    "base to the surface; 1 where it is the base's traction on the film, positive outward."
+    "  [default: 1 for a table; for a mesh S13, whichever way its axis points]"
+)
+@option("--solver", metavar="TEXT")("Reference: the program that calculated it.")
+@option("--vertical", click.Choice(["x", "y", "z"]))(
+    "Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]"
+)
+@option("--base", _POSITION)(
+    "Mesh: position of the base on that axis, in mm.  [default: the lowest]"
+)
+@option("--centre", (_POSITION, _POSITION), metavar="MM MM")(
+    "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
+)
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
@@ -226,21 +219,19 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
     missing = [name for name in (*of_table, *_NEEDED[kind]) if options[name] is None]
     if missing:
         raise click.UsageError(
-            f"A {kind} needs more: add {_named(missing)}. See the examples of "
+            f"A {kind} needs more: add {common.named(missing)}. See the examples of "
             "`memscal import --help`."
         )
     other = "reference" if kind == "scan" else "scan"
     if misplaced := _stated(options, _ONLY[other]):
-        raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
+        raise click.UsageError(f"{common.named(misplaced)} belong to --format {other}.")
     if options["rod_friction"] is not None and options["indenter"] != "rod":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
     unused = _stated(options, (*_OF_TABLES, *_READING) if mesh else _OF_MESHES)
     if unused and kind == "reference":
-        raise click.UsageError(f"A {'mesh' if mesh else 'table'} has no use for {_named(unused)}.")
-
-
-def _named(names: Iterable[str]) -> str:
-    return ", ".join("--" + name.replace("_", "-") for name in names)
+        raise click.UsageError(
+            f"A {'mesh' if mesh else 'table'} has no use for {common.named(unused)}."
+        )
 
 
 def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import click
 
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 else:  # generic since click 8.2 only
     _Number = click.ParamType
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
+_Command = Callable[..., Any]
+_Adder = Callable[[_Command], _Command]
 
 FILE = click.Path(path_type=Path)
 """A file's name; the library checks whether it can be read or written."""
@@ -68,10 +69,6 @@ class Quantity(_Number):
         if self.high < math.inf:
             bounds.append(f"at most {self.high:g}")
         return f"a number {' and '.join(bounds)}" if bounds else "a finite number"
-
-
-class _Adder(Protocol):
-    def __call__(self, command: _Command, /) -> _Command: ...
 
 
 def option(
@@ -170,11 +167,9 @@ def _measured(
 ) -> _Adder:
     """Return the options of quantities, then those of their uncertainties (the last texts)."""
     options = [(name, kind, about) for name, kind, about, _ in entries]
-    if uncertainties:
-        options += [
-            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + of)
-            for name, kind, _, of in entries
-        ]
+    for name, kind, _, of in entries if uncertainties else ():
+        spread = Quantity(kind.name, open_low=False)
+        options.append((f"{name}-uncertainty", spread, _UNCERTAINTY + of))
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )
@@ -203,11 +198,10 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         )
     from memscal.model.film import ElasticFilm
 
-    numbers: dict[str, Any] = {
-        name: si(options.get(name), power)
-        for quantity, power in FILM.items()
-        for name in (quantity, f"{quantity}_uncertainty")
-    }
+    numbers: dict[str, Any] = {}
+    for name, power in FILM.items():
+        spread = f"{name}_uncertainty"
+        numbers |= {name: si(options[name], power), spread: si(options.get(spread), power)}
     return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 
@@ -221,10 +215,14 @@ def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
     return kind(radius=si(options["radius"], -3), radius_uncertainty=spread)
 
 
+def named(names: Iterable[str]) -> str:
+    """Return options as they are typed, by the names of their values."""
+    return ", ".join("--" + name.replace("_", "-") for name in names)
+
+
 def _require(subject: str, options: Mapping[str, Any], names: Iterable[str]) -> None:
-    missing = ["--" + name.replace("_", "-") for name in names if options[name] is None]
-    if missing:
-        raise click.UsageError(f"{subject} is not fully given: add {', '.join(missing)}.")
+    if missing := [name for name in names if options[name] is None]:
+        raise click.UsageError(f"{subject} is not fully given: add {named(missing)}.")
 
 
 kernel_options = options_of(

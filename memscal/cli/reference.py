@@ -49,11 +49,11 @@ def indenter_of(shape: str, options: Mapping[str, Any]) -> Indenter:
     needed = _DESCRIBED_BY[shape]
     for name in sorted(set(_DESCRIBED_BY.values()) - {needed}):
         if options[name] is not None:
-            raise click.UsageError(f"{_option(name)} does not describe a {shape}.")
+            raise click.UsageError(f"{common.named([name])} does not describe a {shape}.")
     if shape in _RADIUS:
         return indenter_from(shape, {**options, "radius": options["radius"] or _RADIUS[shape]})
     if options[needed] is None:
-        raise click.UsageError(f"A {shape} needs {_option(needed)}.")
+        raise click.UsageError(f"A {shape} needs {common.named([needed])}.")
     if shape == "cone":
         from memscal.model.indenter import Cone
 
@@ -74,20 +74,12 @@ def interface_of(options: Mapping[str, Any]) -> Interface:
         raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
     normal: GreenwoodTripp | ExponentialCompliance | None = None
     if rough:
-        normal = GreenwoodTripp(
-            roughness=si(rough[0], -6),
-            asperity_density=si(rough[1], 6),
-            asperity_radius=si(rough[2], -6),
-        )
+        height, density, radius = map(si, rough, (-6, 6, -6))
+        normal = GreenwoodTripp(roughness=height, asperity_density=density, asperity_radius=radius)
     if exponential:
-        normal = ExponentialCompliance(
-            decay_length=si(exponential[0], -6), reference_pressure=si(exponential[1], 6)
-        )
+        decay, pressure = map(si, exponential, (-6, 6))
+        normal = ExponentialCompliance(decay_length=decay, reference_pressure=pressure)
     return Interface(normal=normal, slip_length=si(options["slip_length"], -6))
-
-
-def _option(name: str) -> str:
-    return "--" + name.replace("_", "-")
 
 
 EXAMPLES = """\b
@@ -181,9 +173,8 @@ def _check_usage(options: dict[str, Any]) -> None:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
     for name in ("output", "mesh"):
         if options[name] is not None and max(len(loads), len(depths)) > 1:
-            raise click.UsageError(
-                f"A file holds one load: with --{name} give one --load or one --depth."
-            )
+            problem = f"A file holds one load: with --{name} give one --load or one --depth."
+            raise click.UsageError(problem)
     _choose_law(options)
     if mesh is not None and options["backend"] != "fem" and options["film_law"] == "linear":
         raise click.UsageError("--mesh shows finite elements: add --backend fem.")
@@ -203,9 +194,9 @@ def _choose_law(options: dict[str, Any]) -> None:
 
 
 def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
-    film, body = common.film_from(options), indenter_of(indenter, options)
-    interface = interface_of(options)
     from memscal.mechanics.indent import indent
+
+    film, body = common.film_from(options), indenter_of(indenter, options)
 
     friction = options["friction"]
     if friction is None:
@@ -213,12 +204,11 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
         friction = math.inf if indenter == "rod" and film.law != "linear" else 0.0
     names = ("loading", "backend", "rings")
     settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
-    settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
+    settings |= {"interface": interface_of(options), "film_radius": si(options["film_radius"], -3)}
     settings["strain"] = "linear" if film.law == "linear" else "finite"
     with out.working("Pressing") as show:
         settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
-        if options["depths"]:
-            depths = [si(depth, -6) for depth in options["depths"]]
+        if depths := [si(depth, -6) for depth in options["depths"]]:
             return indent(film, body, depth=depths, **settings)
         return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)
 

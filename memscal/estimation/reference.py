@@ -39,14 +39,14 @@ _ROUND, _SEEN = 0.005, 17
 
 def is_source(stress: BaseStress | None) -> bool:
     """Whether a reference is a source that needs no film, rod and load."""
-    return isinstance(stress, StressProfile) and stress.form is not None
+    return stress is not None and stress.form is not None
 
 
 def require_one_kind(
     references: Sequence[BaseStress | None], alternatives: Sequence[BaseStress | None]
 ) -> None:
     """Refuse references that no one conversion constant belongs to."""
-    forms = [getattr(reference, "form", None) for reference in references]
+    forms = [reference and reference.form for reference in references]
     kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
     if len(kinds) > 1 or any(map(is_source, alternatives)) or (kinds != {None} and alternatives):
         raise InputError(
@@ -61,11 +61,9 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     sensors = {(s.sensor.name or "unnamed", s.sensor.channel, s.unit): None for s in scans}
     if len(sensors) > 1:
         named = ", ".join(f"{name} ({channel}, in {unit})" for name, channel, unit in sensors)
-        raise InputError(
-            f"The scans are of {len(sensors)} sensors: {named}.",
-            why="Scans that are fitted together share one apparatus function.",
-            cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
-        )
+        why = "Scans that are fitted together share one apparatus function."
+        cure = "Calibrate each sensor by itself; check /entry/instrument/stress_sensor."
+        raise InputError(f"The scans are of {len(sensors)} sensors: {named}.", why=why, cure=cure)
     films: dict[str, ElasticFilm] = {}
     for film in (scan.film for scan in scans if scan.film is not None):
         first = films.setdefault(film.name, film)
@@ -121,14 +119,12 @@ def require_same_set_up(
     """Refuse a reference of another film, rod or load than its scan; or return the differences."""
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
+    given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
     differences: list[str] = []
-    for scan, given in zip(scans, references, strict=True):
-        stress = scan.reference if given is None else given
-        if stress is not None and not is_source(stress):
-            differences += _other_set_up(scan, stress, "reference")
-    for scan, given in zip(scans, alternatives, strict=False):
-        if given is not None:
-            differences += _other_set_up(scan, given, "alternative")
+    for kind, stresses in (("reference", given), ("alternative", alternatives)):
+        for scan, stress in zip(scans, stresses, strict=False):
+            if stress is not None and not (kind == "reference" and is_source(stress)):
+                differences += _other_set_up(scan, stress, kind)
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
     if any(text.startswith("load") for text in differences):
@@ -158,12 +154,10 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
         names.append("young_modulus")
     if kind == "reference":
         names += ["law", "mooney_rivlin_ratio"]
-    differences = []
-    if film is not None:
-        differences += points.stated_differences(FILM, names, (scan.film, film), places, "film")
-    if stress.indenter is not None:
-        pair = scan.indenter, stress.indenter
-        differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+    # What one side does not state does not differ.
+    differences = points.stated_differences(FILM, names, (scan.film, film), places, "film")
+    pair = scan.indenter, stress.indenter
+    differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
     if kind == "reference" and finite:
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         rods = scan, SimpleNamespace(rod_friction=friction)
@@ -216,30 +210,27 @@ def reference_spectra(
     wavenumbers: Wavenumbers | None = None,
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
-    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
+    pairs = list(zip(references, data, strict=True))
     if wavenumbers is None:
-        last = max(_last_wavenumber(*pair) for pair in zip(references, data, strict=True))
+        last = max(_last_wavenumber(*pair) for pair in pairs)
         # Fields are lifted to squares that reach one span from the centre, to their corners.
-        wavenumbers = Wavenumbers.covering(last, 1.5 * max(spans))
-    return tuple(
-        _spectrum(pair[0], wavenumbers, pair[1], span)
-        for pair, span in zip(zip(references, data, strict=True), spans, strict=True)
-    )
+        wavenumbers = Wavenumbers.covering(last, 1.5 * max(map(_span, data)))
+    return tuple(_spectrum(stress, wavenumbers, points) for stress, points in pairs)
 
 
-def _spectrum(
-    stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints, span: float
-) -> RadialSpectrum:
-    values, order = _per_newton(stress, wavenumbers.k, span, points.order), points.order
+def _span(points: ScanPoints) -> float:
+    return float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
+
+
+def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) -> RadialSpectrum:
+    values = _per_newton(stress, wavenumbers.k, _span(points), points.order)
     if isinstance(stress, Contact) or stress.form is None:
-        return RadialSpectrum(wavenumbers, values, order)
+        return RadialSpectrum(wavenumbers, values, points.order)
     if stress.ideal is not None and stress.ideal.shape == "slit":
         if points.planar:
-            raise InputError(
-                "A slit is the reference of a raster.",
-                why="It is scanned across, along a line, and shows nothing of any other direction.",
-                cure="Give a line scan.",
-            )
+            why = "It is scanned across, along a line, and shows nothing of any other direction."
+            cure = "Give a line scan."
+            raise InputError("A slit is the reference of a raster.", why=why, cure=cure)
         return RadialSpectrum(wavenumbers, values, ACROSS, source=True)
     # What a scan samples of a field is looked at.
     seen = np.linspace(0.0, min(np.pi / points.step, wavenumbers.k[-1]), _SEEN)[1:]
@@ -287,11 +278,9 @@ def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -
             cure="Change the sign of sigma_rz in the reference (memscal import --shear-sign -1).",
         )
     if not order and values[0] <= 0:
-        raise InputError(
-            "The stress of the reference adds up to a pull, not a push.",
-            why="Normal stress is positive in compression.",
-            cure="Change the sign of sigma_zz in the reference.",
-        )
+        problem = "The stress of the reference adds up to a pull, not a push."
+        why = "Normal stress is positive in compression."
+        raise InputError(problem, why=why, cure="Change the sign of sigma_zz in the reference.")
     return values
 
 
@@ -325,11 +314,9 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
         )
     first = float(profile.r[0])
     if first > 0.1 * needed:
-        raise InputError(
-            f"The reference begins at r = {first * 1e3:.4g} mm.",
-            why="The stress on the axis, its largest, is missing.",
-            cure="Give the reference from r = 0 outward.",
-        )
+        why = "The stress on the axis, its largest, is missing."
+        cure = "Give the reference from r = 0 outward."
+        raise InputError(f"The reference begins at r = {first * 1e3:.4g} mm.", why=why, cure=cure)
 
 
 def reference_sensitivities(
@@ -338,12 +325,9 @@ def reference_sensitivities(
     """Change of each scan's transform by one standard uncertainty of each input, by its name."""
     # Scans share the error of a common film or rod, and that of the film's law.
     changes: dict[str, list[FloatArray]] = {}
-    films, rods = ([getattr(scan, of) for scan in scans] for of in ("film", "indenter"))
-    for sensitivities, owners in (
-        (film_sensitivities, films),
-        (rod_sensitivities, rods),
-        (law_sensitivities, [None] * len(scans)),
-    ):
+    of_inputs = film_sensitivities, rod_sensitivities, law_sensitivities
+    for sensitivities, of in zip(of_inputs, ("film", "indenter", "law"), strict=True):
+        owners = [getattr(scan, of, None) for scan in scans]
         distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
             number = distinct.index(owner)

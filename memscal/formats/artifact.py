@@ -61,10 +61,6 @@ def write_artifact(
 
 def artifact_tree(data: ApparatusData) -> Group:
     """Return what a memscal-artifact file holds; its root states the content digest."""
-    return file_tree(ARTIFACT_SCHEMA, _entry(data))
-
-
-def _entry(data: ApparatusData) -> Group:
     sensor, of_scan = data.sensor.name, records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
@@ -88,7 +84,8 @@ def _entry(data: ApparatusData) -> Group:
             f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
-    return Group("NXentry", children, {"default": "apparatus_function"})
+    entry = Group("NXentry", children, {"default": "apparatus_function"})
+    return file_tree(ARTIFACT_SCHEMA, entry)
 
 
 def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:
@@ -109,9 +106,7 @@ def _read_radial(file: SafeFile, path: str, covariance_path: str) -> ApparatusRa
     sizes = {"r": profile["r"].size}
     covariance = read_record(records.RADIAL_COVARIANCE, file, covariance_path, sizes=sizes)
     if not np.allclose(covariance["r"], profile["r"], rtol=1e-9, atol=0):
-        raise FormatError(
-            f"{file.where(covariance_path)}/r differs from {path}/r.",
-            why="The covariance is that of the profile, radius by radius.",
-            cure="Write the file again.",
-        )
+        problem = f"{file.where(covariance_path)}/r differs from {path}/r."
+        why = "The covariance is that of the profile, radius by radius."
+        raise FormatError(problem, why=why, cure="Write the file again.")
     return ApparatusRadial(**profile, g_covariance=covariance["g_covariance"])

@@ -68,24 +68,17 @@ def _checked_target(
     for source in inputs:
         with contextlib.suppress(OSError):
             if os.path.samestat(status, os.stat(source)):
-                raise OutputError(
-                    f"The output {shown} is also an input.",
-                    why=f"Writing it would destroy what is being read. {_UNTOUCHED}",
-                    cure="Give the output another name.",
-                )
+                why = f"Writing it would destroy what is being read. {_UNTOUCHED}"
+                cure = "Give the output another name."
+                raise OutputError(f"The output {shown} is also an input.", why=why, cure=cure)
     if not stat.S_ISREG(status.st_mode):
         kind = "a folder" if stat.S_ISDIR(status.st_mode) else "not a regular file"
-        raise OutputError(
-            f"The output {shown} is {kind}.",
-            why="A result is written as one regular file that takes its name when it is whole.",
-            cure="Give the name of a file.",
-        )
+        why = "A result is written as one regular file that takes its name when it is whole."
+        cure = "Give the name of a file."
+        raise OutputError(f"The output {shown} is {kind}.", why=why, cure=cure)
     if not overwrite:
-        raise OutputError(
-            f"The output {shown} exists already.",
-            why=_UNTOUCHED,
-            cure="Choose another name, or allow overwriting (--force; overwrite=True in Python).",
-        )
+        cure = "Choose another name, or allow overwriting (--force; overwrite=True in Python)."
+        raise OutputError(f"The output {shown} exists already.", why=_UNTOUCHED, cure=cure)
     return target
 
 
@@ -139,11 +132,9 @@ def _sync_folder(folder: Path) -> None:
 
 def _output_error(target: Path, error: OSError) -> OutputError:
     reason = os.strerror(error.errno) if error.errno else str(error)
-    return OutputError(
-        f"The output {target} cannot be written: {reason}.",
-        why=_UNTOUCHED,
-        cure=_CURES.get(error.errno or 0, "Choose another folder, or another name."),
-    )
+    problem = f"The output {target} cannot be written: {reason}."
+    cure = _CURES.get(error.errno or 0, "Choose another folder, or another name.")
+    return OutputError(problem, why=_UNTOUCHED, cure=cure)
 
 
 def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> bytes:
@@ -156,17 +147,14 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> 
         descriptor = os.open(shown, flags)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            f"{shown} cannot be read: {reason}.", cure="Check the name and the permissions."
-        ) from error
+        problem = f"{shown} cannot be read: {reason}."
+        raise InputError(problem, cure="Check the name and the permissions.") from error
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
-            raise UnsafeFileError(
-                f"{shown} is not a regular file.",
-                why="A folder, pipe or device could keep a program waiting for ever.",
-                cure="Give the name of a file.",
-            )
+            why = "A folder, pipe or device could keep a program waiting for ever."
+            cure = "Give the name of a file."
+            raise UnsafeFileError(f"{shown} is not a regular file.", why=why, cure=cure)
         if status.st_size > limit:
             raise _too_large(shown, status.st_size, limit)
         return _read_whole(descriptor, shown, limit)

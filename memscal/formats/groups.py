@@ -101,10 +101,8 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
             children[quantity.key] = si(value, quantity.dimension, quantity.axes)
         elif value is not None and kind is not None and (value or kind.always):
             children[quantity.key] = kind.write(quantity, value)
-    plot: dict[str, Attribute] = {}
-    if record.signal:
-        plot = {"signal": record.signal, "axes": record.axes}
-    return Group(record.nx_class, children | others, plot)
+    plot: dict[str, Attribute] = {"signal": record.signal, "axes": record.axes}
+    return Group(record.nx_class, children | others, plot if record.signal else {})
 
 
 def read_record(
@@ -149,10 +147,8 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
     axes = [axis.removesuffix("_prime") for axis in quantity.axes]
     shape = tuple(lengths.setdefault(a, n) for a, n in zip(axes, values.shape, strict=True))
     if values.shape != shape:
-        raise FormatError(
-            f"{file.where(at)} has shape {values.shape}, but its axes give {shape}.",
-            cure="Write the file again.",
-        )
+        problem = f"{file.where(at)} has shape {values.shape}, but its axes give {shape}."
+        raise FormatError(problem, cure="Write the file again.")
     return values
 
 
@@ -161,14 +157,14 @@ def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, 
     texts: dict[str, Any] = {}
     notes: dict[str, Any] = {}
     for at, quantity in paths:
-        value = KINDS[quantity.dimension].read(file, at)
+        value, name = KINDS[quantity.dimension].read(file, at), quantity.origin
         if isinstance(value, SourceFile):
-            texts |= {quantity.origin: value.file_name, f"{quantity.origin}_sha256": value.sha256}
+            texts |= {name: value.file_name, f"{name}_sha256": value.sha256}
         elif isinstance(value, str):
-            texts[quantity.origin] = value
+            texts[name] = value
         else:
             of_messages = quantity.dimension == "messages"
-            notes[quantity.origin] = [item.text for item in value] if of_messages else value
+            notes[name] = [item.text for item in value] if of_messages else value
     return texts | notes
 
 
@@ -199,26 +195,23 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
     pairs, of = zip(parameters.names, stated, strict=True), parameters.reading
-    dimensions = [parameter_dimension(name, unit, of) for name, unit in pairs]
+    dimensions = {name: parameter_dimension(name, unit, of) for name, unit in pairs}
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
-        raise InputError(
-            f"A parameter cannot be called {min(reserved)}.",
-            why="The group of the parameters holds something else of that name.",
-            cure="Give it another name.",
-        )
+        why = "The group of the parameters holds something else of that name."
+        cure = "Give it another name."
+        raise InputError(f"A parameter cannot be called {min(reserved)}.", why=why, cure=cure)
     children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
-    for name, value, dimension in zip(parameters.names, parameters.values, dimensions, strict=True):
-        children[name] = si(float(value), dimension)
+    for name, dimension in dimensions.items():
+        children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
     for axis in _AXES:
         children[axis] = writer.index_axis(axis, len(parameters.names))
-    scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions])
+    scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions.values()])
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
     children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
     if budget:
-        of_names = dict(zip(parameters.names, dimensions, strict=True))
-        children["budget"] = budget_group(budget, of_names)
+        children["budget"] = budget_group(budget, dimensions)
     return Group("NXcollection", children)
 
 
@@ -226,10 +219,8 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     """Read the parameters, in SI units."""
     names = tuple(text_list(file, f"{path}/names"))
     if not names or len(set(names)) != len(names):
-        raise FormatError(
-            f"{file.where(path)}/names is missing or names a parameter twice.",
-            why="It lists the parameters, in the order of their covariance.",
-        )
+        problem = f"{file.where(path)}/names is missing or names a parameter twice."
+        raise FormatError(problem, why="It lists the parameters, in the order of their covariance.")
     for name in names:  # their units are entered
         estimated_quantity(name).read_in(reading)
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
@@ -294,10 +285,8 @@ def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | Non
     """Read the film and the indenter of a scan or an artifact, where it states them."""
     film, indenter = "/entry/sample/film", "/entry/indenter"
     stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
-    return (
-        read_film(file, film) if file.has(film) else None,
-        read_round_indenter(file, indenter) if stated else None,
-    )
+    rod_or_sphere = read_round_indenter(file, indenter) if stated else None
+    return read_film(file, film) if file.has(film) else None, rod_or_sphere
 
 
 def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
@@ -340,11 +329,9 @@ def read_round_indenter(file: SafeFile, path: str) -> RoundIndenter:
     """Read a rod or a sphere, the indenters of a scan."""
     shape = _shape(file, path)
     if shape not in _ROUND:
-        raise FormatError(
-            f'{file.where(path)}/shape is "{shape}".',
-            why="A scan is made with a flat rod or with a sphere.",
-            cure='Write "rod" or "sphere".',
-        )
+        why = "A scan is made with a flat rod or with a sphere."
+        cure = 'Write "rod" or "sphere".'
+        raise FormatError(f'{file.where(path)}/shape is "{shape}".', why=why, cure=cure)
     return _ROUND[shape](**read_record(records.ROUND_INDENTER, file, path))
 
 
@@ -364,20 +351,15 @@ def read_sensor(file: SafeFile, path: str) -> StressSensor:
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
-    of: dict[str, Node] = {}
-    if profile.film is not None:
-        of["film"] = write_record(records.FILM, profile.film)
-    if profile.indenter is not None:
-        of["indenter"] = indenter_group(profile.indenter)
+    film, indenter = profile.film, profile.indenter
+    of = {"film": write_record(records.FILM, film)} if film else {}
+    of |= {"indenter": indenter_group(indenter)} if indenter else {}
     numerics = write_record(records.NUMERICS, profile)
     made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
     made |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
-    return (
-        data,
-        write_record(records.CONTACT, profile, **of),
-        write_record(records.SOLVER, profile, **made),
-    )
+    parameters = write_record(records.CONTACT, profile, **of)
+    return data, parameters, write_record(records.SOLVER, profile, **made)
 
 
 def _form(form: IdealReference | StressField) -> Group:
@@ -389,12 +371,6 @@ def _form(form: IdealReference | StressField) -> Group:
     if form.load is not None:
         axes["load"] = si(form.load, "force")
     return Group("NXdata", axes, {"signal": "field", "axes": ("y", "x")})
-
-
-def _read_form(file: SafeFile, path: str) -> IdealReference | StressField | None:
-    if file.has(f"{path}/shape"):
-        return IdealReference(**read_record(records.IDEAL_REFERENCE, file, path))
-    return read_field(file, path) if file.has(f"{path}/field") else None
 
 
 def read_field(file: SafeFile, path: str) -> StressField:
@@ -434,15 +410,18 @@ def read_profile(
     """Read a stress profile; the load is the one given where it names none."""
     film, indenter = f"{parameters}/film", f"{parameters}/indenter"
     defaults = {} if load is None else {"load": load}
-    if (form := _read_form(file, data)) is not None:
-        stated = read_record(records.CONTACT, file, parameters, defaults=defaults)
-        return replace(form.profile(), **stated)
+    contact = read_record(records.CONTACT, file, parameters, defaults=defaults)
+    if file.has(f"{data}/shape"):
+        ideal = IdealReference(**read_record(records.IDEAL_REFERENCE, file, data))
+        return replace(ideal.profile(), **contact)
+    if file.has(f"{data}/field"):
+        return replace(read_field(file, data).profile(), **contact)
     return StressProfile(
         film=read_film(file, film) if file.has(film) else None,
         indenter=read_indenter(file, indenter) if file.has(indenter) else None,
         source=file.source,
         **read_record(records.PROFILE, file, data),
-        **read_record(records.CONTACT, file, parameters, defaults=defaults),
+        **contact,
         **read_record(records.SOLVER, file, process),
         **read_record(records.NUMERICS, file, f"{process}/numerics"),
         **read_record(records.PROFILE_NOTES, file, process),
@@ -468,9 +447,9 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
 
 def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
-
-    def check(name: str) -> QualityCheck:
-        defaults = {"name": name, "meaning": ""}
-        return QualityCheck(**read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults))
-
-    return tuple(map(check, text_list(file, f"{path}/names")))
+    checks = []
+    for name in text_list(file, f"{path}/names"):
+        stated = {"name": name, "meaning": ""}
+        values = read_record(records.CHECK, file, f"{path}/{name}", defaults=stated)
+        checks.append(QualityCheck(**values))
+    return tuple(checks)

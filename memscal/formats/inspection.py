@@ -159,19 +159,14 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
-    text = file.is_text(path)
-    if text:
+    if text := file.is_text(path):
         value: Any = file.text(path)
     else:
         numbers = file.array(path)
         value = "inf" if np.all(numbers == np.inf) else _plain(numbers)
-    return {
-        "path": path,
-        "name": name,
-        "value": value,
-        "standard_uncertainty": _uncertainty(file, path),
-        "unit": None if text else units_of(file, path) or "1",
-    }
+    unit = None if text else units_of(file, path) or "1"
+    row = {"path": path, "name": name, "value": value}
+    return row | {"standard_uncertainty": _uncertainty(file, path), "unit": unit}
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:

@@ -68,8 +68,6 @@ def _listed(items: Any) -> list[Any]:
 
 def _required(item: Any) -> Scan:
     if not isinstance(item, Scan):
-        raise InputError(
-            f"There is a {type(item).__name__} where a Scan is needed.",
-            cure="Give a scan, or the path of its file.",
-        )
+        cure = "Give a scan, or the path of its file."
+        raise InputError(f"There is a {type(item).__name__} where a Scan is needed.", cure=cure)
     return item

@@ -103,11 +103,9 @@ def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> Stre
     """Read a field from a 2-D array or an image."""
     data, name = read_bytes(path), os.path.basename(os.fspath(path))
     if pixel_size is None:
-        raise InputError(
-            f"The size of the pixels of {name} is not given.",
-            why="An array or image does not state it.",
-            cure="Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line.",
-        )
+        why = "An array or image does not state it."
+        cure = "Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line."
+        raise InputError(f"The size of the pixels of {name} is not given.", why=why, cure=cure)
     require_positive("pixel size", pixel_size, "m")
     with damage_named(f"{name} cannot be read"):
         array = name.lower().endswith(".npy")

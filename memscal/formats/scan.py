@@ -2,10 +2,9 @@
 
 import contextlib
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from memscal.errors import FormatError, OutputError, placed
@@ -21,11 +20,10 @@ from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
-from memscal.model.scan import BRANCHES, Scan, branch_numbers, require_rod_friction
+from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
-_DATA = "/entry/data"
-_SAMPLE = "/entry/sample"
+_DATA, _SAMPLE = "/entry/data", "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 _DECLARED = by_name(records.SCAN_DATA.quantities)
@@ -158,12 +156,11 @@ def _entry(scan: Scan) -> Group:
     texts = dict(write_record(records.EXPERIMENT, scan).children)
     notes = {"notes": texts.pop("notes")} if scan.notes else {}
     children: dict[str, Node] = {"title": scan.title} if scan.title else {}
+    of_load = scan.load, scan.load_uncertainty, scan.rod_friction
     children |= {
         **texts,
         "data": _data_group(scan),
-        "indenter": groups.indenter_group(
-            scan.indenter, scan.load, scan.load_uncertainty, scan.rod_friction
-        ),
+        "indenter": groups.indenter_group(scan.indenter, *of_load),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
         "instrument": groups.instrument_group(scan.sensor),
         **notes,
@@ -194,9 +191,7 @@ def _data_group(scan: Scan) -> Group:
     if scan.u_zz_correlation is not None:
         data |= {axis: writer.index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
         data |= _nodes(scan, {"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
-    optional = {
-        name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
-    }
+    optional = {name: getattr(scan, name) for name in LIKE_SIGNAL}
     data |= _nodes(scan, optional | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
@@ -228,11 +223,9 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
         )
     if axes != _POINTS and ("y" in axes) != file.has(f"{_DATA}/y"):
         stated = "names y, but there is no" if "y" in axes else "does not name y, but there is a"
-        raise FormatError(
-            f"{file.where(_DATA)}@axes {stated} {_DATA}/y.",
-            why="Without it a raster and a repeated line scan look the same.",
-            cure="Add the missing axis, or correct the attribute.",
-        )
+        why = "Without it a raster and a repeated line scan look the same."
+        cure = "Add the missing axis, or correct the attribute."
+        raise FormatError(f"{file.where(_DATA)}@axes {stated} {_DATA}/y.", why=why, cure=cure)
     return axes
 
 
@@ -251,11 +244,11 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
     path = "/entry/synthetic"
     if not file.is_group(path):
         return None
-    items = {name: f"{path}/{name}" for name in text_list(file, f"{path}/names")}
-    return {
-        name: file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
-        for name, item in items.items()
-    }
+    truth: dict[str, Any] = {}
+    for name in text_list(file, f"{path}/names"):
+        item = f"{path}/{name}"
+        truth[name] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
+    return truth
 
 
 def ensure_folder_writable(
@@ -267,11 +260,9 @@ def ensure_folder_writable(
         ensure_writable(target)
         return
     if not target.is_dir():
-        raise OutputError(
-            f"The output {target} is not a folder.",
-            why="An experiment is several scans, each a file of its own.",
-            cure="Give the name of a folder; a new one is made.",
-        )
+        why = "An experiment is several scans, each a file of its own."
+        cure = "Give the name of a folder; a new one is made."
+        raise OutputError(f"The output {target} is not a folder.", why=why, cure=cure)
     for name in names:
         ensure_writable(target / name, overwrite=overwrite)
 
@@ -283,22 +274,17 @@ def write_scans(
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
     made = not target.exists()
-    staging: str | None = None
     try:
         target.mkdir(exist_ok=True)
-        staging = tempfile.mkdtemp(prefix=".memscal-", dir=target)
-        for name, scan in scans.items():
-            write_scan(scan, Path(staging, name))
-        for name in scans:
-            os.replace(Path(staging, name), target / name)
+        with TemporaryDirectory("", ".memscal-", target, ignore_cleanup_errors=True) as staging:
+            for name, scan in scans.items():
+                write_scan(scan, Path(staging, name))
+            for name in scans:
+                os.replace(Path(staging, name), target / name)
     except OSError as error:
-        raise OutputError(
-            f"The output {target} cannot be written: {error.strerror}.",
-            cure="Choose another folder.",
-        ) from error
+        problem = f"The output {target} cannot be written: {error.strerror}."
+        raise OutputError(problem, cure="Choose another folder.") from error
     finally:
-        if staging is not None:
-            shutil.rmtree(staging, ignore_errors=True)
         if made:
             # Of a folder that holds the scans this takes nothing away.
             with contextlib.suppress(OSError):

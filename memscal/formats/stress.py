@@ -32,12 +32,12 @@ _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 def _read_points(file: SafeFile, path: str, of: Reading) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
-    stored = {
-        channel: read_record(points_record(channel).read_in(of), file, f"{path}/points_{channel}")
-        for channel in _CHANNELS
-        if file.has(f"{path}/points_{channel}")
-    }
-    return {name: MeasuredPoints(**{"noise": None} | points) for name, points in stored.items()}
+    points: dict[str, MeasuredPoints] = {}
+    for channel in _CHANNELS:
+        if file.has(group := f"{path}/points_{channel}"):
+            stored = read_record(points_record(channel).read_in(of), file, group)
+            points[channel] = MeasuredPoints(**{"noise": None} | stored)
+    return points
 
 
 def _read_scans(
@@ -47,10 +47,8 @@ def _read_scans(
     stored = json_value(file, "/entry/scans/names", list, None)
     size = max(of) if stored is None else len(stored)
     if max(of) > size:
-        raise FormatError(
-            f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}.",
-            cure="Run memscal apply again.",
-        )
+        problem = f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}."
+        raise FormatError(problem, cure="Run memscal apply again.")
     scans = []
     for i, name in enumerate(stored or [f"scan_{i}" for i in range(1, size + 1)], start=1):
         path, source = f"/entry/scans/{name}", sources.get(str(name))
@@ -128,19 +126,15 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         )
     paths = profile_paths(file)
     if not paths:
-        raise FormatError(
-            f"{file.where('/entry/profiles')} names no profile.",
-            why="It lists the groups that hold one.",
-        )
+        why = "It lists the groups that hold one."
+        raise FormatError(f"{file.where('/entry/profiles')} names no profile.", why=why)
     inputs = text_list(file, "/entry/inputs/names")
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
+    of_scans = zip(paths, numbers, strict=True)
     return MeasuredStress(
-        profiles=tuple(
-            _read_profile(file, path, scans[number - 1])
-            for path, number in zip(paths, numbers, strict=True)
-        ),
+        profiles=tuple(_read_profile(file, path, scans[i - 1]) for path, i in of_scans),
         scans=scans,
         **read_record(records.CONVERSION.read_in(scans[0].reading), file, "/entry/sensor"),
         checks=groups.read_quality(file, "/entry/quality"),
@@ -155,9 +149,8 @@ def write_stress(
     measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
     """Write measured stress as a memscal-stress file, whole or not at all."""
-    writer.write_tree(
-        writer.file_tree(writer.STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite
-    )
+    root = writer.file_tree(writer.STRESS_SCHEMA, _entry(measured))
+    writer.write_tree(root, path, overwrite=overwrite)
 
 
 def profile_paths(file: SafeFile) -> list[str]:
@@ -166,13 +159,10 @@ def profile_paths(file: SafeFile) -> list[str]:
 
 
 def _entry(measured: MeasuredStress) -> Group:
-    profiles = {
-        f"profile_{i + 1}": _profile_group(profile, measured.scans)
-        for i, profile in enumerate(measured.profiles)
-    }
-    scans: dict[str, Node] = {
-        f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(measured.scans)
-    }
+    groups_of = [_profile_group(profile, measured.scans) for profile in measured.profiles]
+    profiles = {f"profile_{i}": group for i, group in enumerate(groups_of, 1)}
+    numbered = enumerate(measured.scans, 1)
+    scans: dict[str, Node] = {f"scan_{i}": _scan_group(scan) for i, scan in numbered}
     first = measured.scans[0]
     sensor, digest = first.sensor.name, measured.artifact_digest
     of_artifact = {"content_sha256": digest} if digest else {}
@@ -196,10 +186,8 @@ def _entry(measured: MeasuredStress) -> Group:
 
 def _inputs_group(measured: MeasuredStress) -> Group:
     sources = {"artifact": measured.artifact}
-    sources |= {f"scan_{i + 1}": scan.source for i, scan in enumerate(measured.scans)}
-    nodes: dict[str, Node] = {
-        name: write_source(source) for name, source in sources.items() if source is not None
-    }
+    sources |= {f"scan_{i}": scan.source for i, scan in enumerate(measured.scans, 1)}
+    nodes: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     return Group("NXcollection", {"names": to_json("inputs", list(nodes)), **nodes})
 
 
@@ -207,11 +195,9 @@ def _scan_number(file: SafeFile, path: str) -> int:
     """Which scan a profile comes from, counted from one."""
     number = values.require_scalar(file, f"{path}/scan", "dimensionless")
     if not 1 <= number <= _MOST_SCANS:
-        raise FormatError(
-            f"{file.where(path)}/scan is {number:g}.",
-            why=f"Scans are counted from 1 to {_MOST_SCANS} at most.",
-            cure="Run memscal apply again.",
-        )
+        why = f"Scans are counted from 1 to {_MOST_SCANS} at most."
+        cure = "Run memscal apply again."
+        raise FormatError(f"{file.where(path)}/scan is {number:g}.", why=why, cure=cure)
     return int(number)
 
 
@@ -223,10 +209,8 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     if profile.curve_r.size:
         optional["curve"] = write_record(records.STRESS_CURVE, profile)
-    covariances = {
-        _PREFIX + source: si(covariance, "stress squared", _AXES)
-        for source, covariance in profile.covariances.items()
-    }
+    by_source = profile.covariances.items()
+    covariances = {_PREFIX + source: si(c, "stress squared", _AXES) for source, c in by_source}
     points = {
         f"points_{channel}": write_record(points_record(channel).read_in(of), of_channel)
         for channel, of_channel in profile.points.items()
@@ -260,15 +244,14 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     arrays = read_record(records.STRESS_PROFILE, file, path)
     n = arrays["r"].size
     sources = text_list(file, f"{path}/sources")
-    kind = "stress squared"
-    declared = (Quantity(_PREFIX + name, kind, axes=_AXES, required=True) for name in sources)
-    stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
+    of_sources = [
+        Quantity(_PREFIX + name, "stress squared", axes=_AXES, required=True) for name in sources
+    ]
+    stored = read_record(record("NXdata", *of_sources), file, path, sizes={"r": n})
     budget = groups.read_budget(file, f"{path}/budget")
     if not sources or not budget.keys() >= _BUDGET.keys():
-        raise FormatError(
-            f"{file.where(path)} states no covariance of its stress, or no budget.",
-            why="Measured stress without uncertainty means little.",
-        )
+        problem = f"{file.where(path)} states no covariance of its stress, or no budget."
+        raise FormatError(problem, why="Measured stress without uncertainty means little.")
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
     profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
     if file.has(f"{path}/curve"):

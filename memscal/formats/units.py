@@ -60,11 +60,9 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
     if unit is None:
         if dimension == "dimensionless":
             return numbers
-        raise UnitError(
-            f"{where} has no unit.",
-            why=f"It is a {dimension}, and a bare number could be in any unit.",
-            cure=f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".',
-        )
+        why = f"It is a {dimension}, and a bare number could be in any unit."
+        cure = f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".'
+        raise UnitError(f"{where} has no unit.", why=why, cure=cure)
     power = _power(unit.strip(), dimension)
     if power is not None:
         return _scaled(numbers, power)
@@ -103,8 +101,7 @@ def reading_of(unit: str, where: str) -> Reading:
 
 def dimension_of(unit: str, where: str) -> str:
     """Return the dimension of a unit whose quantity is not known beforehand."""
-    canonical = _CANONICAL.get(unit.strip())
-    if canonical is not None:
+    if canonical := _CANONICAL.get(unit.strip()):
         return canonical[0]
     if entered := next((d for d, units in DIMENSIONS.items() if units.stored == unit), ""):
         return entered

@@ -35,16 +35,12 @@ def require_schema(file: SafeFile, schema: str) -> str:
         )
     newest = SCHEMA_VERSION.partition(".")[0]
     if int(major) > int(newest):
-        raise SchemaVersionError(
-            f"{file.name} was written by a newer memscal: {schema} version {version}.",
-            why=f"This memscal reads versions up to {newest}.x and would misread it.",
-            cure="Upgrade memscal.",
-        )
+        problem = f"{file.name} was written by a newer memscal: {schema} version {version}."
+        why = f"This memscal reads versions up to {newest}.x and would misread it."
+        raise SchemaVersionError(problem, why=why, cure="Upgrade memscal.")
     if int(major) < int(newest):
-        raise SchemaVersionError(
-            f"{file.name} has {schema} version {version}, which is not read any more.",
-            cure="Write it again with the current memscal.",
-        )
+        problem = f"{file.name} has {schema} version {version}, which is not read any more."
+        raise SchemaVersionError(problem, cure="Write it again with the current memscal.")
     return version
 
 
@@ -59,17 +55,13 @@ def require_array(
 ) -> FloatArray:
     """Return the array at a path in SI units."""
     if not file.has(path):
-        raise FormatError(
-            f"{file.where(path)} is missing.",
-            why=f"It should hold a {dimension}.",
-            cure=f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".',
-        )
+        why = f"It should hold a {dimension}."
+        cure = f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".'
+        raise FormatError(f"{file.where(path)} is missing.", why=why, cure=cure)
     values = file.array(path)
     if ndim is not None and values.ndim != ndim:
-        raise FormatError(
-            f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected.",
-            cure="Check the shape of the array.",
-        )
+        problem = f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected."
+        raise FormatError(problem, cure="Check the shape of the array.")
     return to_si(values, units_of(file, path), dimension, file.where(path))
 
 
@@ -77,9 +69,8 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
     """Return the one number at a path in SI units; an array of one is accepted."""
     values = require_array(file, path, dimension)
     if values.size != 1:
-        raise FormatError(
-            f"{file.where(path)} has {values.size} values, but one number is expected."
-        )
+        problem = f"{file.where(path)} has {values.size} values, but one number is expected."
+        raise FormatError(problem)
     return float(values.reshape(()))
 
 
@@ -108,9 +99,8 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     try:
         value = json.loads(file.text(path))
     except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{file.where(path)} is not JSON: {error}.", cure="Write the file again."
-        ) from error
+        problem = f"{file.where(path)} is not JSON: {error}."
+        raise InputError(problem, cure="Write the file again.") from error
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
     if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:
@@ -127,10 +117,7 @@ _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 
 def altered(file: SafeFile) -> str:
-    """Return how a file differs from what was written, or ``""`` where it does not.
-
-    From then on only what the file lists can be read from it.
-    """
+    """Return how a file differs from what was written, or ``""``; then only that can be read."""
     stated = file.attribute("/", writer.DIGEST_ATTRIBUTE)
     if stated is None:
         return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing."

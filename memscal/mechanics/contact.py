@@ -96,6 +96,7 @@ class Contact(Result):
     strain: str = "linear"
 
     unit: ClassVar[str] = "Pa"
+    form: ClassVar[None] = None
     _summary: ClassVar[str] = "contact"
     _figure: ClassVar[str] = "stress.contact_figure"
 

@@ -5,7 +5,7 @@ from memscal.model.quantities import Quantity, Record, measured, record
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
 _A, _W, _PER_AREA = "voltage per stress", "wavenumber", "per area"
 _OF_G = "standard uncertainty of G, with detail that the film hides"
-_R, _X, _YX, _K = ("r",), ("x",), ("y", "x"), ("k",)
+_R, _X, _YX, _K, _PER_LOAD = ("r",), ("x",), ("y", "x"), ("k",), ("load",)
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
 
@@ -77,9 +77,8 @@ SCAN_DATA = record(
     Quantity("u_yz_errors", _U, "noise of the channel yz", axes=_X),
     signal="u_zz",
 )
-SYNTHETIC = record(
-    "NXcollection", Quantity("description", "text", "what is synthetic", origin="synthetic")
-)
+_SYNTHETIC = Quantity("description", "text", "what is synthetic", origin="synthetic")
+SYNTHETIC = record("NXcollection", _SYNTHETIC)
 
 PROFILE = record(
     "NXdata",
@@ -112,9 +111,8 @@ CONTACT = record(
     Quantity("friction_coefficient", _ONE, "friction coefficient", "μ"),
     Quantity("loading", "text", "incremental or total loading"),
 )
-SOLVER = record(
-    "NXprocess", Quantity("solver", "text", "program", stored="program", origin="program")
-)
+_PROGRAM = Quantity("solver", "text", "program", stored="program", origin="program")
+SOLVER = record("NXprocess", _PROGRAM)
 NUMERICS = record(
     "NXparameters",
     Quantity("convergence", _ONE, "estimated relative error of the largest stress"),
@@ -225,16 +223,12 @@ STRESS_CURVE = record(
     Quantity("curve_s_zz", _P, "fitted stress", "S_zz", _R, required=True, stored="s_zz"),
     signal="s_zz",
 )
+_OF_SCALE = "relative uncertainty of all positions"
 MEASURED_SCAN = record(
     "NXcollection",
     Quantity("width", _L, "extent of the positions", required=True),
     Quantity("synthetic", "truth", "whether the scan is synthetic", required=True),
-    Quantity(
-        "position_scale_uncertainty",
-        _ONE,
-        "relative uncertainty of all positions",
-        stored="position_scale_errors",
-    ),
+    Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors"),
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 
@@ -265,8 +259,6 @@ FIT = (
     Quantity("degrees", _COUNT, "degrees of freedom", "ν"),
     Quantity("p_value", _COUNT, "chance of such a chi-square, or a larger one", "p"),
 )
-"""How data agree with what was calculated."""
-
 SOLUTION = (
     *CONTACT.quantities[:4],
     Quantity("max_interface_stress", _P, "interface peak", shown="Pa"),
@@ -284,8 +276,6 @@ SOLUTION = (
     Quantity("dissipated_energy", "energy", "energy that friction has taken"),
     Quantity("discretisation", "text", "mesh or quadrature"),
 )
-"""A contact that was solved."""
-
 PLAN = (
     Quantity("positions", _COUNT, "positions"),
     Quantity("step", _L, "step"),
@@ -295,8 +285,6 @@ PLAN = (
     Quantity("signal", _U, "largest signal", label="largest_signal"),
     Quantity("point_noise", _U, "noise of a voltage", label="noise"),
 )
-"""A planned scan."""
-
 EXPECTED = (*measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")), TRANSFER.quantities[-1])
 """What a planned scan is expected to give beside its parameters."""
 
@@ -306,8 +294,6 @@ APPLIED = (
     *measured(Quantity("conversion_constant", _A, "conversion constant A")),
     *measured(Quantity("force_over_load", _ONE, "total force over applied load")),
 )
-"""What holds for all measured profiles."""
-
 RESTORED = (
     LOAD.quantities[0],
     *measured(Quantity("force", "force", "total force", "F")),
@@ -327,8 +313,6 @@ RESTORED_AGAINST = (
     Quantity("difference", _COUNT, "largest difference", label="largest_difference"),
     Quantity("within", _COUNT, "share of the radii", label="share_within_95_percent"),
 )
-"""A restored stress beside a calculated one."""
-
 FRICTION = Quantity("friction", _ONE, "friction coefficient", "μ")
 SLIP_LENGTH = Quantity("length", _L, "slip length", shown="um")
 
@@ -337,8 +321,6 @@ ESTIMATE_FIT = (
     Quantity("least", _COUNT, "least chi-square", "χ²", label="chi2"),
     *FIT[1:],
 )
-"""How an estimate by profile likelihood fits."""
-
 COMPARED_LOAD = (
     Quantity("lubrication", "text", "dry or lubricated"),
     STRESS_NUMBERS.quantities[0],
@@ -358,8 +340,6 @@ CALCULATED = (
     FIT[0],
     FIT[2],
 )
-"""One load against the profile calculated with one friction coefficient."""
-
 DRY_AGAINST_LUBRICATED = (
     STRESS_NUMBERS.quantities[0],
     *measured(Quantity("maximum", _P, "on the axis", label="on_axis")),
@@ -384,15 +364,15 @@ BAYES_FACTOR = (
 PRIOR = (Quantity("prior", "text", "prior"), BAYES_FACTOR[2])
 COMPARED_LAWS = (
     Quantity("lubrication", "text", "dry or lubricated"),
-    Quantity("loads", "force", "loads", axes=("load",)),
+    Quantity("loads", "force", "loads", axes=_PER_LOAD),
 )
+_EFFECTIVE = "effective_friction_coefficient"
 IMPLIED = (
-    Quantity("load", "force", "load", axes=("load",)),
-    Quantity("friction", _ONE, "effective coefficient", axes=("load",),
-             label="effective_friction_coefficient"),
-    Quantity("pressure", _P, "mean pressure", axes=("load",), label="mean_pressure"),
-    Quantity("stiffness", "stress per length", "stiffness", axes=("load",)),
-)  # fmt: skip
+    Quantity("load", "force", "load", axes=_PER_LOAD),
+    Quantity("friction", _ONE, "effective coefficient", axes=_PER_LOAD, label=_EFFECTIVE),
+    Quantity("pressure", _P, "mean pressure", axes=_PER_LOAD, label="mean_pressure"),
+    Quantity("stiffness", "stress per length", "stiffness", axes=_PER_LOAD),
+)
 """What a slip length means at one load; coefficient and stiffness with the ends of intervals."""
 
 DRAWN = (

@@ -25,8 +25,7 @@ IntArray = NDArray[np.intp]
 
 #: Readings share a place where they are closer than this share of the distance that nine tenths
 #: of the readings of a pass keep from each other; a few may be read twice in one.
-_CLOSE = 0.1
-_TWICE = 0.1
+_CLOSE, _TWICE = 0.1, 0.1
 #: Distances below a nanometre are rounding.
 _ROUNDING = 1e-9
 #: Rows and columns make a raster if they cross at no more than this many nodes for each place.
@@ -38,14 +37,11 @@ _CANDIDATES = 200
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of the points of one scan.
+    """Places of the points of one scan."""
 
-    ``index`` (n,): the place of each point; ``row`` (n,): its row along y, 0 on a line; ``steps``
-    (2,): typical distance of neighbours along x and y, in m, 0 along an axis without spread.
-    """
-
-    index: IntArray
-    row: IntArray
+    index: IntArray  # (n,): the place of each point
+    row: IntArray  # (n,): its row along y, 0 on a line
+    # Typical distance of neighbours along x and y, in m, 0 along an axis without spread.
     steps: tuple[float, float]
 
     @property
@@ -104,28 +100,22 @@ def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, Ev
 def _even_axis(positions: FloatArray) -> EvenAxis | None:
     """Fit the coarsest even lattice through all positions; steps are counted between them."""
     order = np.argsort(positions, kind="stable")
-    gaps = np.diff(positions[order])
+    ordered = positions[order]
+    gaps = np.diff(ordered)
     # One of the gaps is about the step; the others are noise and missing rows.
     candidates = np.unique(gaps[gaps > max(_ROUNDING, 1e-9 * np.ptp(positions))])[::-1]
     if candidates.size > _CANDIDATES:
         candidates = candidates[np.geomspace(1, candidates.size, _CANDIDATES).astype(int) - 1]
-    for step in candidates:
-        number = np.concatenate([[0], np.cumsum(np.rint(gaps / step))])
-        axis = _fitted(positions[order], number)
-        if axis is not None:
+    for candidate in candidates:
+        number = np.concatenate([[0], np.cumsum(np.rint(gaps / candidate))])
+        centred = number - number.mean()
+        step = float(centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0))
+        start = float(ordered.mean() - step * number.mean())
+        if step > 0 and np.abs(ordered - start - step * number).max() <= _OFF_LATTICE * step:
             index = np.empty(positions.size, dtype=np.intp)
-            index[order] = axis.index
-            return replace(axis, index=index)
+            index[order] = number
+            return EvenAxis(start, step, index)
     return None
-
-
-def _fitted(ordered: FloatArray, number: FloatArray) -> EvenAxis | None:
-    centred = number - number.mean()
-    step = float(centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0))
-    start = float(ordered.mean() - step * number.mean())
-    if not step > 0 or np.abs(ordered - start - step * number).max() > _OFF_LATTICE * step:
-        return None
-    return EvenAxis(start, step, number.astype(np.intp))
 
 
 def _neighbours(positions: FloatArray, repeat: IntArray) -> tuple[float, IntArray]:
@@ -177,6 +167,9 @@ def _typical_step(values: FloatArray, cluster: IntArray) -> float:
     return float(np.median(np.diff(means))) if means.size > 1 else 0.0
 
 
+LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors")
+"""Arrays of a scan that have the shape of its readings, where they are stated."""
+
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
 
@@ -192,16 +185,12 @@ _LINE = 0.01
 def require_contacts(scan: Scan) -> None:
     """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
     if scan.normal_load_errors is not None and scan.normal_load is None:
-        raise InputError(
-            "normal_load_errors is given without normal_load.",
-            why="It is the standard uncertainty of the load at each point.",
-            cure="Give normal_load too, the load that was set at each point.",
-        )
+        why = "It is the standard uncertainty of the load at each point."
+        cure = "Give normal_load too, the load that was set at each point."
+        raise InputError("normal_load_errors is given without normal_load.", why=why, cure=cure)
     if scan.lubrication not in LUBRICATIONS:
-        raise InputError(
-            f"The lubrication of the scan is {scan.lubrication!r}.",
-            cure="Give 'dry' or 'lubricated', or leave it out.",
-        )
+        cure = "Give 'dry' or 'lubricated', or leave it out."
+        raise InputError(f"The lubrication of the scan is {scan.lubrication!r}.", cure=cure)
     if scan.lubricant and scan.lubrication != "lubricated":
         stated = scan.lubrication or "not stated"
         raise InputError(
@@ -213,11 +202,9 @@ def require_contacts(scan: Scan) -> None:
 def require_rod_friction(friction: float | None) -> None:
     """Refuse a friction of the rod that no film of rubber is solved with."""
     if friction not in (None, 0.0, math.inf):
-        raise InputError(
-            f"The rod's friction is {friction:g}.",
-            why="Only a rod that slides freely or sticks is solved at finite strain.",
-            cure="Give 0 or inf, or leave it out: the difference is then counted.",
-        )
+        why = "Only a rod that slides freely or sticks is solved at finite strain."
+        cure = "Give 0 or inf, or leave it out: the difference is then counted."
+        raise InputError(f"The rod's friction is {friction:g}.", why=why, cure=cure)
 
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
@@ -246,9 +233,8 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
             "and finite.",
             why="It correlates every point of one repeat with every other.",
         )
-    if not np.allclose(correlation, correlation.T, atol=1e-9) or not np.allclose(
-        np.diag(correlation), 1.0
-    ):
+    symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
+    if not (symmetric and np.allclose(np.diag(correlation), 1.0)):
         raise InputError(
             "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
             cure="Divide a covariance by the standard uncertainties of row and column, and "
@@ -415,7 +401,7 @@ class Scan:
             repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
             object.__setattr__(self, "repeat", repeat)
         self._check_signal_shape()
-        for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
+        for name in LIKE_SIGNAL:
             if (values := getattr(self, name)) is not None:
                 object.__setattr__(self, name, self._like_signal(name, values))
         if self.branch is not None:
@@ -516,7 +502,7 @@ class Scan:
                     changes[name] = values[keep]
             if self.u_zz_correlation is not None:
                 changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
-        for name in ("branch", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
+        for name in ("branch", "u_zz", *LIKE_SIGNAL):
             if (values := getattr(self, name)) is not None:
                 changes[name] = values[keep]
         channels = {name: values[keep] for name, values in self.channels.items()}
@@ -550,9 +536,8 @@ class Scan:
 
     def _check_values(self) -> None:
         if np.any(np.isinf(self.u_zz)):
-            raise InputError(
-                "u_zz holds an infinite voltage.", cure="Mark missing points with NaN."
-            )
+            problem = "u_zz holds an infinite voltage."
+            raise InputError(problem, cure="Mark missing points with NaN.")
         if self.load is not None and not (np.isfinite(self.load) and self.load > 0):
             raise InputError(
                 f"The load of the scan is {self.load:g} N, but it must be above zero.",
@@ -568,17 +553,13 @@ class Scan:
                 raise InputError(f"{name} {problem}")
         loads = self.normal_load
         if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
-            raise InputError(
-                "normal_load holds a load that is infinite or not above zero.",
-                cure="Mark points without contact as missing (NaN).",
-            )
+            problem = "normal_load holds a load that is infinite or not above zero."
+            raise InputError(problem, cure="Mark points without contact as missing (NaN).")
 
     def _check_positions(self) -> None:
         if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
-            raise InputError(
-                f"The direction of the scan is {self.direction!r}.",
-                cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
-            )
+            cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
+            raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
         arrays.require_non_negative(
             "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
         )

@@ -159,8 +159,7 @@ class StressField:
                 problem = f"{name} of the field has {axis.size} values, or uneven ones"
                 cure = "Cut out what is not zero, and interpolate it to even pixels."
                 raise InputError(f"{problem}: not {_FEWEST} to {_MOST} even ones.", cure=cure)
-        shape, expected = np.shape(self.values), (self.y.size, self.x.size)
-        if tuple(shape) != expected:
+        if (shape := np.shape(self.values)) != (expected := (self.y.size, self.x.size)):
             raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
         values = finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
@@ -300,22 +299,16 @@ class StressProfile:
     def __post_init__(self) -> None:
         require_positive("load of the stress profile", self.load, "N")
         for name in ("r", "sigma_zz", "sigma_rz", "sigma_zz_errors"):
-            values = getattr(self, name)
-            if values is not None:
-                values = finite_vector(f"{name} of the stress profile", values)
+            if (stated := getattr(self, name)) is not None:
+                values = finite_vector(f"{name} of the stress profile", stated)
                 object.__setattr__(self, name, values)
+                if values.size != self.r.size:
+                    count = f"{values.size} values for {self.r.size} radii"
+                    raise InputError(f"{name} of the stress profile has {count}.")
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
-            raise InputError(
-                "r of the stress profile is negative.", cure="Give radii, not positions."
-            )
-        for name in ("sigma_zz", "sigma_rz", "sigma_zz_errors"):
-            values = getattr(self, name)
-            if values is not None and values.shape != self.r.shape:
-                raise InputError(
-                    f"{name} of the stress profile has {values.size} values for {self.r.size} "
-                    "radii."
-                )
+            problem = "r of the stress profile is negative."
+            raise InputError(problem, cure="Give radii, not positions.")
 
     def __repr__(self) -> str:
         """Return what it is of in place of thousands of array elements."""
@@ -349,8 +342,6 @@ class StressProfile:
         # Three mirrored radii make the axis an inner point of the spline.
         inner = slice(1, 4) if self.r[0] == 0 else slice(0, 3)
         density = self.sigma_zz * self.r
-        spline, _ = table_spline(
-            np.concatenate([-self.r[inner][::-1], self.r]),
-            np.concatenate([-density[inner][::-1], density]),
-        )
+        radii, values = (np.concatenate([-v[inner][::-1], v]) for v in (self.r, density))
+        spline, _ = table_spline(radii, values)
         return float(2 * np.pi * spline.integrate(0.0, self.r[-1]))

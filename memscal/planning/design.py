@@ -74,13 +74,10 @@ class Plan:
         require_positive("half range of the scan", self.half_range, "m")
         require_positive("load", self.load, "N")
         require_positive("conversion constant", self.conversion_constant, "V/Pa")
-        if self.load_uncertainty is not None:
-            require_non_negative("relative standard uncertainty of the load", self.load_uncertainty)
+        require_non_negative("relative standard uncertainty of the load", self.load_uncertainty)
         if self.repeats < 1 or self.repeats != int(self.repeats):
-            raise InputError(
-                f"The scan would be repeated {self.repeats} times.",
-                cure="Give a whole number of repeats, one or more.",
-            )
+            cure = "Give a whole number of repeats, one or more."
+            raise InputError(f"The scan would be repeated {self.repeats} times.", cure=cure)
         noise = self.noise if self.noise_voltage is None else self.noise_voltage
         if not 0 < noise < math.inf:
             raise InputError(
@@ -274,23 +271,17 @@ def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, fl
     for name, value in want.items():
         full = TARGETS.get(name, name)
         if full not in TARGETS.values():
-            raise InputError(
-                f"The design is wanted to reach {name!r}, which is no known target.",
-                cure=f"Choose from {', '.join(TARGETS)}.",
-            )
+            problem = f"The design is wanted to reach {name!r}, which is no known target."
+            raise InputError(problem, cure=f"Choose from {', '.join(TARGETS)}.")
         if not 0 < value < np.inf:
             raise InputError(f"The {name} that is wanted is {value:g}, but it must be above zero.")
         named[full] = float(value)
     if vary is not None and vary not in VARIED:
-        raise InputError(
-            f"The design is to vary {vary!r}, which cannot be varied.",
-            cure=f"Choose from {', '.join(VARIED)}.",
-        )
+        cure = f"Choose from {', '.join(VARIED)}."
+        raise InputError(f"The design is to vary {vary!r}, which cannot be varied.", cure=cure)
     if bool(named) != (vary is not None):
-        raise InputError(
-            "want and vary go together: a target needs something to vary.",
-            cure=f"Give both want and vary (one of {', '.join(VARIED)}), or neither.",
-        )
+        cure = f"Give both want and vary (one of {', '.join(VARIED)}), or neither."
+        raise InputError("want and vary go together: a target needs something to vary.", cure=cure)
     return named
 
 
@@ -336,14 +327,12 @@ def _search(plan: Plan, vary: str) -> tuple[str, int, int, Callable[[int], Plan]
     # The sensor has to lie within.
     least = max(least, int(np.ceil(2 * off / step)) + 1)
     most = max(min(most, int(2 * (off + _FARTHEST * plan.film.thickness) / step) + 1), least)
-    name = "half range"
-    return name, least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
+    return "half range", least, most, lambda n: replace(plan, half_range=step * (n - 1) / 2)
 
 
 def _reached(design: Design, name: str) -> float:
-    if name == "resolved_wavenumber":
-        return design.resolved_wavenumber
-    return design.relative_uncertainty(name)
+    of_band = name == "resolved_wavenumber"
+    return design.resolved_wavenumber if of_band else design.relative_uncertainty(name)
 
 
 def _met(design: Design, name: str, value: float) -> bool:
@@ -361,10 +350,8 @@ def _in_words(name: str, value: float) -> str:
 def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) -> FitError:
     """Return the error with the best that can be reached, and its limiting source."""
     if not tried:
-        return FitError(
-            f"No {what} makes a scan that can be calibrated with.",
-            cure="Plan more repeats, less noise, a larger load or a larger half range.",
-        )
+        cure = "Plan more repeats, less noise, a larger load or a larger half range."
+        return FitError(f"No {what} makes a scan that can be calibrated with.", cure=cure)
     name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
@@ -388,11 +375,8 @@ def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) 
         )
     source = best.largest_source(name)
     share = best.budget[name][source] / abs(best.parameters[name])
-    return FitError(
-        problem,
-        why=f"{source} alone contributes {share * 100:.3g} %.",
-        cure=_CURES.get(source, "Reduce that contribution, or want less."),
-    )
+    cure = _CURES.get(source, "Reduce that contribution, or want less.")
+    return FitError(problem, why=f"{source} alone contributes {share * 100:.3g} %.", cure=cure)
 
 
 @single_threaded()

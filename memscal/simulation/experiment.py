@@ -21,8 +21,9 @@ from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, si
 
 # Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
 # its smallest value: closer ones would show the solver's own error.
-_SPREAD = 2.0
-_LEAST_SPREAD = 0.02
+_SPREAD, _LEAST_SPREAD = 2.0, 0.02
+# Beyond this scatter of the loads a parabola in ln P is no longer good to 1e-3.
+_MOST_SCATTER = 0.1
 
 
 def _pressed(
@@ -50,9 +51,6 @@ def _at_load(stresses: FloatArray, spread: float, ratio: FloatArray) -> FloatArr
 #: The paper's sphere and its loads in N; the uncertainty of the radius is a plausible one.
 PAPER_SPHERE = Sphere(radius=128.8e-3, radius_uncertainty=0.5e-3)
 PAPER_LOADS = (0.34, 0.69, 1.37, 2.75)
-
-# Beyond this scatter of the loads a parabola in ln P is no longer good to 1e-3.
-_MOST_SCATTER = 0.1
 
 
 def simulate_contacts(
@@ -90,10 +88,8 @@ def simulate_contacts(
     # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
     loads = checked_loads(load)
     if np.unique(loads).size != loads.size:
-        raise InputError(
-            f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",
-            cure="Give each load once, and the number of its repeats.",
-        )
+        problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
+        raise InputError(problem, cure="Give each load once, and the number of its repeats.")
     require_range("spacing", spacing, 1e-9, 0.1, "m")
     require_non_negative("noise", noise)
     require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)
@@ -123,38 +119,34 @@ def simulate_contacts(
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)
     # Standard normal numbers for each source of error, from streams of their own.
-    sources = ("noise", "load", "position", "reading")
-    streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(len(sources)))
-    normal = (stream.standard_normal((row.size, points)) for stream in streams)
-    draws = dict(zip(sources, normal, strict=True))
-    ratio = 1 + load_scatter * draws["load"]
-    along = x + position_error * draws["position"] - centre[0]
+    streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
+    of_noise, of_load, of_position, of_reading = (
+        stream.standard_normal((row.size, points)) for stream in streams
+    )
+    ratio = 1 + load_scatter * of_load
+    along = x + position_error * of_position - centre[0]
     away = np.hypot(along, centre[1])
 
     def blurred(kernel: RadialKernel, order: int = 0) -> FloatArray:
-        at_states = [
-            rod_scan.blurred_stress(states[j], kernel, away[i], order=order)
-            for i, j in enumerate(row)
-        ]
-        pairs = zip(at_states, ratio, strict=True)
-        return np.stack([_at_load(stresses, spread, of_row) for stresses, of_row in pairs])
+        of_rows = []
+        for j, distance, of_nominal in zip(row, away, ratio, strict=True):
+            stresses = rod_scan.blurred_stress(states[j], kernel, distance, order=order)
+            of_rows.append(_at_load(stresses, spread, of_nominal))
+        return np.stack(of_rows)
 
     at_nominal = [state[len(state) // 2] for state in states]
     nominal = rod_scan.blurred_stress(at_nominal, truth, np.hypot(x - centre[0], centre[1]))
     largest = conversion_constant * float(nominal.max())
-    added = rod_scan.disturbance(x, baseline, drift) + noise * draws["noise"]
+    added = rod_scan.disturbance(x, baseline, drift) + noise * of_noise
     u = conversion_constant * blurred(truth) + largest * added
     stated = np.broadcast_to(loads[row, None], u.shape)
     unsure = load_scatter
     if record_loads:
-        stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
+        stated, unsure = stated * ratio * (1 + load_reading * of_reading), load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
     disturbed = rod_scan.Disturbances(noise, baseline, drift, state_noise, seed)
-    channel_data: dict[str, FloatArray] = {}
-    shear_truth: dict[str, float | str] = {}
-    if shear is not None:
-        sheared = blurred(shear.kernel, order=1) * shear.side(along, away)
-        channel_data, shear_truth = shear.recorded(sheared.reshape(shape), x, disturbed)
+    offset = along, away
+    sheared, shear_truth = rod_scan.recorded_shear(shear, blurred, x, offset, shape, disturbed)
     return Scan(
         x=x,
         u_zz=u.reshape(shape),
@@ -162,7 +154,7 @@ def simulate_contacts(
         x_errors=np.full(points, position_error) if position_error > 0 else None,
         normal_load=stated.reshape(shape),
         normal_load_errors=(unsure * stated).reshape(shape) if unsure > 0 else None,
-        channels=channel_data,
+        channels=sheared,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=sphere,
@@ -240,10 +232,6 @@ def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
         rod_load_scale=around(1.0, load_uncertainty),
         load_scale=around(1.0, load_uncertainty),
     )
-
-
-# The streams of random numbers, in an order that is a promise: a new one goes to the end.
-_STREAMS = ("inputs", "rod", "dry", "lubricated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,14 +367,14 @@ def simulate_experiment(
     require_positive("gain", gain)
     require_positive("thickness_factor", thickness_factor)
     require_non_negative("seed", seed)
-    if load_uncertainty is not None:
-        require_non_negative("relative standard uncertainty of the load", load_uncertainty)
-    streams = np.random.SeedSequence(seed).spawn(len(_STREAMS))
-    states = (int(stream.generate_state(1)[0]) for stream in streams)
-    seeds = dict(zip(_STREAMS, states, strict=True))
+    require_non_negative("relative standard uncertainty of the load", load_uncertainty)
+    # The order of the streams of random numbers is a promise: a new one goes to the end.
+    inputs_seed, rod_seed, dry_seed, lubricated_seed = (
+        int(stream.generate_state(1)[0]) for stream in np.random.SeedSequence(seed).spawn(4)
+    )
     reality = Reality(film=film, rod=rod, sphere=sphere)
     if draw_inputs:
-        reality = drawn(reality, load_uncertainty or 0.0, seeds["inputs"])
+        reality = drawn(reality, load_uncertainty or 0.0, inputs_seed)
     thickness = thickness_factor * reality.film.thickness
     reality = replace(reality, film=replace(reality.film, thickness=thickness))
     shared: dict[str, Any] = {
@@ -425,18 +413,18 @@ def simulate_experiment(
         points=rod_points,
         repeats=rod_repeats,
         noise=noise if rod_noise is None else rod_noise,
-        seed=seeds["rod"],
+        seed=rod_seed,
         **shared,
     )
     dry = simulate_contacts(
-        load=loads, friction=friction, interface=interface, seed=seeds["dry"], **contacts
+        load=loads, friction=friction, interface=interface, seed=dry_seed, **contacts
     )
     lubricated = simulate_contacts(
         load=lubricated_loads,
         interface=Interface(normal=None if interface is None else interface.normal),
         lubrication="lubricated",
         lubricant=lubricant,
-        seed=seeds["lubricated"],
+        seed=lubricated_seed,
         **contacts,
     )
     film = film if state_law else without_law(film)

@@ -1,7 +1,7 @@
 """Synthetic sensor and its rod scans: base stress through a known G, disturbed; and the truth."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,11 +34,9 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
     # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
     integral = float(kernel.transform(np.array([1e-2]))[0])
     if not abs(integral - 1) <= 1e-6:
-        raise InputError(
-            f"The kernel's transform is {integral:g} at k = 0, not 1.",
-            why="An apparatus function has unit integral.",
-            cure="Divide the kernel by its integral; the conversion constant carries the size.",
-        )
+        problem = f"The kernel's transform is {integral:g} at k = 0, not 1."
+        cure = "Divide the kernel by its integral; the conversion constant carries the size."
+        raise InputError(problem, why="An apparatus function has unit integral.", cure=cure)
     return kernel
 
 
@@ -57,9 +55,6 @@ def disturbance(x: FloatArray, baseline: float, drift: float) -> FloatArray:
     """Return an offset and a linear drift over the positions, as shares of the largest signal."""
     half_range = 0.5 * float(np.ptp(x))
     return np.asarray(baseline + 0.5 * drift * (x - 0.5 * (x.min() + x.max())) / half_range)
-
-
-_CHANNELS = (("zz",), ("zz", "xz"))
 
 
 @dataclass(frozen=True)
@@ -81,47 +76,48 @@ class Disturbances:
         return np.full(shape, self.noise * largest) if self.state_noise and self.noise > 0 else None
 
 
-@dataclass(frozen=True)
-class ShearChannel:
-    """Apparatus function and conversion constant (V/Pa) of the tangential channel along x."""
+Shear = tuple[RadialKernel, float] | None
+"""Apparatus function and conversion constant (V/Pa) of the tangential channel along x."""
 
-    kernel: RadialKernel
-    conversion_constant: float
 
-    def side(self, x: FloatArray, away: FloatArray) -> FloatArray:
-        """Cosine of the angle from x to the indenter, ``away`` from the sensor (m); 0 on it."""
-        return np.asarray(np.divide(x, away, out=np.zeros_like(away + x), where=away > 0))
-
-    def recorded(
-        self, stress: FloatArray, x: FloatArray, disturbed: Disturbances
-    ) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
-        """Return voltages of the blurred shear along x (..., n), in Pa, and their truth (_xz)."""
-        clean = self.conversion_constant * stress
-        largest = float(np.abs(clean).max())
-        draws = np.random.default_rng([disturbed.seed, 1]).standard_normal(clean.shape)
-        level = disturbance(x, disturbed.baseline, disturbed.drift)
-        channels = {"u_xz": clean + largest * (level + disturbed.noise * draws)}
-        if (errors := disturbed.errors(clean.shape, largest)) is not None:
-            channels["u_xz_errors"] = errors
-        volts = {"conversion_constant": self.conversion_constant, **disturbed.in_volts(largest)}
-        truth = {**self.kernel.describe(), **volts}
-        return channels, {f"{name}_xz": value for name, value in truth.items()}
+def recorded_shear(
+    shear: Shear,
+    blurred: Callable[[RadialKernel, int], FloatArray],
+    x: FloatArray,
+    offset: tuple[FloatArray, FloatArray],
+    shape: tuple[int, ...],
+    disturbed: Disturbances,
+) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
+    """Return voltages of the shear along x, at offsets along x and in all (m), and their truth."""
+    if shear is None:
+        return {}, {}
+    (kernel, constant), (along, away) = shear, offset
+    # Cosine of the angle from x to the indenter; 0 right on the sensor.
+    side = np.divide(along, away, out=np.zeros_like(away + along), where=away > 0)
+    clean = constant * (blurred(kernel, 1) * side).reshape(shape)
+    largest = float(np.abs(clean).max())
+    draws = np.random.default_rng([disturbed.seed, 1]).standard_normal(shape)
+    level = disturbance(x, disturbed.baseline, disturbed.drift)
+    channels = {"u_xz": clean + largest * (level + disturbed.noise * draws)}
+    if (errors := disturbed.errors(shape, largest)) is not None:
+        channels["u_xz_errors"] = errors
+    volts = {"conversion_constant": constant, **disturbed.in_volts(largest)}
+    truth = {**kernel.describe(), **volts}
+    return channels, {f"{name}_xz": value for name, value in truth.items()}
 
 
 def shear_channel(
     channels: Sequence[str], kernel: RadialKernel | None, conversion_constant: float
-) -> ShearChannel | None:
+) -> Shear:
     """Return the tangential channel if it is among the channels of a scan."""
-    if tuple(channels) not in _CHANNELS:
-        raise InputError(
-            f"The channels are {tuple(channels)}.",
-            why="A line scan along x has the normal channel, and may have the shear's along x.",
-            cure='Give ("zz",) or ("zz", "xz").',
-        )
+    if tuple(channels) not in (("zz",), ("zz", "xz")):
+        why = "A line scan along x has the normal channel, and may have the shear's along x."
+        cure = 'Give ("zz",) or ("zz", "xz").'
+        raise InputError(f"The channels are {tuple(channels)}.", why=why, cure=cure)
     if len(channels) == 1:
         return None
     require_positive("conversion_constant of the channel xz", conversion_constant, "V/Pa")
-    return ShearChannel(apparatus_function(kernel), conversion_constant)
+    return apparatus_function(kernel), conversion_constant
 
 
 #: The paper's film, with its uncertainties where it gives them and modest ones elsewhere.
@@ -258,11 +254,8 @@ def simulate(
     if not raster and row_loads.size == 1:
         u = u[0]
     disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
-    channel_data: dict[str, FloatArray] = {}
-    shear_truth: dict[str, float | str] = {}
-    if shear is not None:
-        sheared = blurred(shear.kernel, order=1) * shear.side(x - centre[0], radius)
-        channel_data, shear_truth = shear.recorded(sheared.reshape(u.shape), x, disturbed)
+    offset = x - centre[0], radius
+    sheared, shear_truth = recorded_shear(shear, blurred, x, offset, u.shape, disturbed)
     of_law = {"mooney_rivlin_ratio": film.mooney_rivlin_ratio, "rod_friction": rod_friction}
     return Scan(
         x=x,
@@ -270,7 +263,7 @@ def simulate(
         u_zz=u,
         u_zz_errors=disturbed.errors(u.shape, largest),
         normal_load=np.broadcast_to(row_loads[:, None], u.shape) if loads.size > 1 else None,
-        channels=channel_data,
+        channels=sheared,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=rod,

@@ -99,10 +99,9 @@ def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
         names = other.parameters.names
         estimates[other.method] = {name: parameter_json(other.parameters, name) for name in names}
     if "conversion_constant_gaussian" in parameters:
-        estimates["gaussian"] = {
-            "conversion_constant": parameter_json(parameters, "conversion_constant_gaussian"),
-            "gaussian_sigma": parameter_json(parameters, "gaussian_sigma"),
-        }
+        names = ("conversion_constant_gaussian", "gaussian_sigma")
+        a, sigma = (parameter_json(parameters, name) for name in names)
+        estimates["gaussian"] = {"conversion_constant": a, "gaussian_sigma": sigma}
     return estimates
 
 
@@ -116,13 +115,13 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **{name: parameter_json(parameters, name) for name in _IN_JSON if name in parameters},
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
+        "film_law": (apparatus.film and apparatus.film.law) or None,
     }
-    values["film_law"] = (apparatus.film and apparatus.film.law) or None
-    choice = apparatus.process.configuration.get("centre")
+    configuration = apparatus.process.configuration
+    choice = configuration.get("centre")
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
         values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
-    configuration = apparatus.process.configuration
     values |= {name: configuration[name] for name in _OF_FILM if name in configuration}
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
@@ -224,11 +223,8 @@ def rehearsal_table(
         elasticity = f"E = {film.young_modulus / 1e6:.4g} MPa"
         elasticity += f", Poisson's ratio {film.poisson_ratio:.4g}, {film.law_text}"
         rows.append(("film", f"{film.thickness / MM:.4g} mm, {elasticity}"))
-    rows += [
-        ("reference", _origin(stress)),
-        ("method", method),
-        *(("would write", str(path)) for path in outputs),
-    ]
+    rows += [("reference", _origin(stress)), ("method", method)]
+    rows += [("would write", str(path)) for path in outputs]
     return Table("A calibration would use", ("", ""), rows)
 
 

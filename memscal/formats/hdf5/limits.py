@@ -14,8 +14,7 @@ import h5py
 
 from memscal.errors import UnsafeFileError
 
-_DESCRIPTOR = 16
-_OBJECT = 16  # header of an object in a global heap
+_DESCRIPTOR, _OBJECT = 16, 16  # _OBJECT: header of an object in a global heap
 _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
 _SHARED = 0x02
 _VARIABLE_LENGTH = 9  # class of the datatype
@@ -128,22 +127,16 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
             position += prefix + length
 
 
-MAX_DATASET_BYTES = 128 * 2**20
-MAX_TEXT_BYTES = 4 * 2**20
-_MAX_RANK = 4
-_MAX_CHUNKS = 2**16
-_MIN_CHUNK_LIMIT = 2**20
-_MAX_NUMBER_BYTES = 16
+MAX_DATASET_BYTES, MAX_TEXT_BYTES = 128 * 2**20, 4 * 2**20
+_MAX_RANK, _MAX_NUMBER_BYTES = 4, 16
+_MAX_CHUNKS, _MIN_CHUNK_LIMIT = 2**16, 2**20
 _UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
 
 
 def refuse(where: str, problem: str, why: str) -> UnsafeFileError:
     """Return the error for a dataset that is not read."""
-    return UnsafeFileError(
-        f"{where} {problem}.",
-        why=why,
-        cure="Copy the data into a plain file: contiguous, or with gzip, shuffle and fletcher32.",
-    )
+    cure = "Copy the data into a plain file: contiguous, or with gzip, shuffle and fletcher32."
+    return UnsafeFileError(f"{where} {problem}.", why=why, cure=cure)
 
 
 def claimed_bytes(dataset: Any) -> int:
@@ -159,11 +152,8 @@ def check_type(where: str, kind: Any, *, text: bool) -> None:
             raise refuse(where, "does not hold text", "Text is expected here.")
         return
     if type_class not in (h5py.h5t.INTEGER, h5py.h5t.FLOAT):
-        raise refuse(
-            where,
-            "holds neither integers nor floating-point numbers",
-            "Objects, references, compounds and strings are not read where numbers belong.",
-        )
+        why = "Objects, references, compounds and strings are not read where numbers belong."
+        raise refuse(where, "holds neither integers nor floating-point numbers", why)
     if kind.get_size() > _MAX_NUMBER_BYTES:
         raise refuse(where, f"has numbers of {kind.get_size()} bytes", "No number is that long.")
 
@@ -179,11 +169,8 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> None:
         raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
     limit = MAX_TEXT_BYTES if text else MAX_DATASET_BYTES
     if claimed_bytes(dataset) > limit:
-        raise refuse(
-            where,
-            f"claims {claimed_bytes(dataset):,} bytes",
-            f"More than {limit:,} bytes are not read, however small the file is.",
-        )
+        why = f"More than {limit:,} bytes are not read, however small the file is."
+        raise refuse(where, f"claims {claimed_bytes(dataset):,} bytes", why)
     plist = dataset.get_create_plist()
     layout = plist.get_layout()
     if layout == h5py.h5d.VIRTUAL:
@@ -206,17 +193,11 @@ def _check_filters(where: str, plist: Any) -> None:
     codes = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
     for code in codes:
         if code not in filters:
-            raise refuse(
-                where,
-                f"uses the HDF5 filter {code}",
-                "Only gzip, shuffle and fletcher32 are read: others may load foreign code.",
-            )
+            why = "Only gzip, shuffle and fletcher32 are read: others may load foreign code."
+            raise refuse(where, f"uses the HDF5 filter {code}", why)
         if codes.count(code) > 1:
-            raise refuse(
-                where,
-                f"uses the filter {filters[code]} more than once",
-                "Filters on filters can blow a small file up without limit.",
-            )
+            why = "Filters on filters can blow a small file up without limit."
+            raise refuse(where, f"uses the filter {filters[code]} more than once", why)
 
 
 def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
@@ -225,11 +206,8 @@ def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
     size = int(math.prod(chunk)) * int(dataset.get_type().get_size())
     limit = max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset))
     if size > limit or size > MAX_DATASET_BYTES:
-        raise refuse(
-            where,
-            f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data",
-            "A whole chunk is held in memory to read one number.",
-        )
+        problem = f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data"
+        raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
     number = math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True))
     if number > _MAX_CHUNKS:
         raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")

@@ -45,8 +45,7 @@ def damage_named(
 
 
 _MAX_TOTAL_BYTES = 512 * 2**20
-_MAX_ATTRIBUTE_BYTES = 2**16
-_MAX_ATTRIBUTE_ITEMS = 64
+_MAX_ATTRIBUTE_BYTES, _MAX_ATTRIBUTE_ITEMS = 2**16, 64
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -56,11 +55,9 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
     if not data.startswith(_SIGNATURE):
-        raise FormatError(
-            f"{name} is not an HDF5 file.",
-            why="It does not begin with HDF5's signature.",
-            cure="Convert a table with `memscal import`.",
-        )
+        why = "It does not begin with HDF5's signature."
+        cure = "Convert a table with `memscal import`."
+        raise FormatError(f"{name} is not an HDF5 file.", why=why, cure=cure)
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
@@ -148,11 +145,9 @@ class SafeFile:
             self._opened[path] = self._follow(self._open(folder or "/"), path, name)
         item = self._opened[path]
         if item is not None and self._listed is not None and path not in self._listed:
-            raise FormatError(
-                f"{self.where(path)} was added after the file was written.",
-                why="The list of its contents lacks it, so that no digest covers it.",
-                cure="Remove it, or make the file again.",
-            )
+            problem = f"{self.where(path)} was added after the file was written."
+            why = "The list of its contents lacks it, so that no digest covers it."
+            raise FormatError(problem, why=why, cure="Remove it, or make the file again.")
         return item
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
@@ -160,11 +155,9 @@ class SafeFile:
         if not isinstance(folder, h5py.h5g.GroupID) or not folder.links.exists(key):
             return None
         if folder.links.get_info(key).type != h5py.h5l.TYPE_HARD:
-            raise UnsafeFileError(
-                f"{self.where(path)} is reached through a soft, external or other link.",
-                why="A link can lead to another file, to a pipe, or round in a circle.",
-                cure="Copy the linked data into the file.",
-            )
+            problem = f"{self.where(path)} is reached through a soft, external or other link."
+            why = "A link can lead to another file, to a pipe, or round in a circle."
+            raise UnsafeFileError(problem, why=why, cure="Copy the linked data into the file.")
         return h5py.h5o.open(folder, key)
 
     def _dataset(self, path: str) -> Any:
@@ -178,19 +171,13 @@ class SafeFile:
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size
         if self._budget < 0:
-            raise refuse(
-                self.where(path),
-                "brings the data of this file over the limit",
-                f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file.",
-            )
+            why = f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file."
+            raise refuse(self.where(path), "brings the data of this file over the limit", why)
 
     def _check_length(self, path: str, length: int) -> None:
         if length > MAX_TEXT_BYTES:
-            raise refuse(
-                self.where(path),
-                f"claims a text of {length:,} bytes",
-                f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is.",
-            )
+            why = f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is."
+            raise refuse(self.where(path), f"claims a text of {length:,} bytes", why)
         self._spend(path, length)
 
     def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:

@@ -100,20 +100,16 @@ def to_json(subject: str, value: Any) -> str:
 def _json_value(subject: str, value: Any) -> Any:
     if value is None or isinstance(value, (str, bool, int)):
         return value
-    if isinstance(value, np.generic):
-        return _json_value(subject, value.item())
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _json_value(subject, value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
-    if isinstance(value, np.ndarray):
-        return _json_value(subject, value.tolist())
     if isinstance(value, Mapping):
         return {str(key): _json_value(subject, item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_json_value(subject, item) for item in value]
-    raise InputError(
-        f"{subject} holds a {type(value).__name__}, which JSON cannot hold.",
-        cure="Give numbers, text, truth values, lists and mappings.",
-    )
+    problem = f"{subject} holds a {type(value).__name__}, which JSON cannot hold."
+    raise InputError(problem, cure="Give numbers, text, truth values, lists and mappings.")
 
 
 def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
@@ -135,10 +131,8 @@ def content_digest(items: Iterable[DigestItem]) -> str:
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
-        plain = {
-            name: printable(value, len(value)) if isinstance(value, str) else value
-            for name, value in attributes.items()
-        }
+        plain = dict(attributes)
+        plain |= {n: printable(v, len(v)) for n, v in plain.items() if isinstance(v, str)}
         item = [path, kind, shape, plain, hashlib.sha256(data).hexdigest()]
         line = json.dumps(item, sort_keys=True, separators=(",", ":"))
         total.update(line.encode("ascii") + b"\n")
@@ -148,9 +142,7 @@ def content_digest(items: Iterable[DigestItem]) -> str:
 def _attributes(node: Node) -> dict[str, Any]:
     if isinstance(node, Group):
         return node.all_attributes
-    if isinstance(node, Number):
-        return {"units": node.units, **node.attributes}
-    return {}
+    return {"units": node.units, **node.attributes} if isinstance(node, Number) else {}
 
 
 def _canonical(value: Any) -> tuple[str, list[int], bytes]:
@@ -198,10 +190,9 @@ def tree_to_bytes(root: Group) -> bytes:
         for path, node in walk(root):
             if isinstance(node, Group):
                 if wrong := [name for name in node.children if not _NAME.fullmatch(name)]:
-                    raise InputError(
-                        f"{wrong[0]!r} cannot be written into {path}: a name is lower-case ASCII.",
-                        cure="Use the letters a to z, digits and underscores.",
-                    )
+                    problem = f"{wrong[0]!r} cannot be written into {path}"
+                    cure = "Use the letters a to z, digits and underscores."
+                    raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
                 group = file if path == "/" else file.create_group(path)
                 for name, value in node.all_attributes.items():
                     _write_attribute(group, name, value)
@@ -245,13 +236,10 @@ def _plain_text(text: str) -> bytes:
 
 def _attach_scales(file: Any, root: Group) -> None:
     """Make every axis an HDF5 dimension scale and attach it to the arrays that run along it."""
-    arrays = [(p, n) for p, n in walk(root) if isinstance(n, Number) and n.axes]
-    for path, node in arrays:
-        folder, _, name = path.rpartition("/")
-        if node.axes == (name,):
-            file[path].make_scale(name)
-    for path, node in arrays:
-        folder, _, name = path.rpartition("/")
-        if node.axes != (name,):
-            for i, axis in enumerate(node.axes):
-                file[path].dims[i].attach_scale(file[f"{folder}/{axis}"])
+    numbers = [(path.rpartition("/"), n.axes) for path, n in walk(root) if isinstance(n, Number)]
+    for (folder, _, name), axes in numbers:
+        if axes == (name,):
+            file[f"{folder}/{name}"].make_scale(name)
+    for (folder, _, name), axes in numbers:
+        for i, axis in enumerate(axes if axes != (name,) else ()):
+            file[f"{folder}/{name}"].dims[i].attach_scale(file[f"{folder}/{axis}"])

@@ -40,8 +40,7 @@ _MEMORY, _MEMORY_PER_BYTE = 2**30, 20
 _SECONDS, _BYTES_PER_SECOND = 60.0, 2**20
 # Whatever else is in the environment is not for a process that reads files of others.
 _ENVIRONMENT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PATH", "SYSTEMROOT")
-_MAX_REASON = 400
-_MAX_SHOWN = 80
+_MAX_REASON, _MAX_SHOWN = 400, 80
 _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 # The address of an array in another file, such as film.h5:/data0, where XDMF has numbers.
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
@@ -103,11 +102,8 @@ def run_meshio(
     header = json.loads(np.load(answer, allow_pickle=False).tobytes())
     if "error" in header:
         kind_of_error = UnsafeFileError if header["unsafe"] else FormatError
-        raise kind_of_error(
-            f"{name} cannot be read as a mesh.",
-            why=f"The reader says: {printable(header['error'], _MAX_REASON)}.",
-            cure=_AS_VTU,
-        )
+        why = f"The reader says: {printable(header['error'], _MAX_REASON)}."
+        raise kind_of_error(f"{name} cannot be read as a mesh.", why=why, cure=_AS_VTU)
     numbers = []
     while answer.tell() < len(answer.getbuffer()):
         numbers.append(np.load(answer, allow_pickle=False))
@@ -140,15 +136,12 @@ def _run(request: str, folder: str, seconds: float, name: str) -> None:
             cure="Run memscal where Python may start itself.",
         ) from error
     if late:
-        raise UnsafeFileError(
-            f"Reading {name} takes longer than {seconds:.3g} s.", why="It was ended.", cure=_AS_VTU
-        )
+        problem = f"Reading {name} takes longer than {seconds:.3g} s."
+        raise UnsafeFileError(problem, why="It was ended.", cure=_AS_VTU)
     if done.returncode:
-        raise UnsafeFileError(
-            f"The process that read {name} was ended by an error ({done.returncode}).",
-            why="The mesh is damaged, or larger than the memory that its file's size allows.",
-            cure=_AS_VTU,
-        )
+        problem = f"The process that read {name} was ended by an error ({done.returncode})."
+        why = "The mesh is damaged, or larger than the memory that its file's size allows."
+        raise UnsafeFileError(problem, why=why, cure=_AS_VTU)
 
 
 _KINDS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".xmf": "xdmf"}
@@ -158,8 +151,7 @@ _OTHERS = {
     *(".exo", ".e", ".bdf", ".unv", ".odb", ".rst", ".mph", ".ply", ".stl", ".obj"),
 }
 _CELLS = {3: "triangle", 6: "triangle6"}
-_MAX_NAME = 80
-_MAX_NOTES = 4000
+_MAX_NAME, _MAX_NOTES = 80, 4000
 
 
 def is_mesh(path: str | os.PathLike[str]) -> bool:
@@ -232,10 +224,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
 def _require_meshio() -> None:
     if importlib.util.find_spec("meshio") is None:
-        raise InputError(
-            "Meshes are read and written with meshio, which is not installed.",
-            cure='Install it with: pip install "memscal[fem-io]"',
-        )
+        problem = "Meshes are read and written with meshio, which is not installed."
+        raise InputError(problem, cure='Install it with: pip install "memscal[fem-io]"')
 
 
 def _checked(
@@ -300,11 +290,9 @@ def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, Fl
 
 
 def _unusable(source: SourceFile, content: str) -> FormatError:
-    return FormatError(
-        f"{source.file_name} has {content}.",
-        why="A stress at the base cannot be found in it.",
-        cure="Save the mesh again, as an unstructured grid (.vtu).",
-    )
+    why = "A stress at the base cannot be found in it."
+    cure = "Save the mesh again, as an unstructured grid (.vtu)."
+    return FormatError(f"{source.file_name} has {content}.", why=why, cure=cure)
 
 
 def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -316,17 +304,14 @@ def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool
     points, unit = from_si(np.pad(mesh.points, ((0, 0), (0, 1))), "length")
     moved, _ = from_si(np.pad(mesh.displacement, ((0, 0), (0, 1))), "length")
     stress = np.pad(mesh.stress, ((0, 0), (0, 2)))
-    written = meshio.Mesh(
-        points,
-        [(_CELLS[mesh.triangles.shape[1]], mesh.triangles)],
-        point_data={f"displacement_{unit}": moved, "stress_Pa": stress},
-    )
+    cells = [(_CELLS[mesh.triangles.shape[1]], mesh.triangles)]
+    fields = {f"displacement_{unit}": moved, "stress_Pa": stress}
+    written = meshio.Mesh(points, cells, point_data=fields)
     with tempfile.TemporaryDirectory(prefix="memscal-") as folder:
-        plain = os.path.join(folder, "mesh.vtu")
+        plain = Path(folder, "mesh.vtu")
         # Not Mesh.write, which finds the format by the name, in any of forty.
-        meshio.vtu.write(plain, written)
-        with open(plain, "rb") as file:
-            data = file.read()
+        meshio.vtu.write(str(plain), written)
+        data = plain.read_bytes()
     head, grid, body = data.partition(b"<UnstructuredGrid>")
     atomic_write_bytes(path, head + _comment(mesh) + grid + body, overwrite=overwrite)
 

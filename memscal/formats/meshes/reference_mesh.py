@@ -18,9 +18,7 @@ from memscal.model.notation import printable
 AXES = "xyz"
 # Of the largest coordinate: meshes are often stored in single precision.
 _TOLERANCE = 1e-6
-_FEWEST = 4
-_CIRCLES = 501
-_DIRECTIONS = 72
+_FEWEST, _CIRCLES, _DIRECTIONS = 4, 501, 72
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +44,7 @@ class Base:
     nodes: NDArray[np.int64]
     cells: tuple[tuple[Cells, NDArray[np.int64], FloatArray], ...]
     outward: int
-    notes: tuple[str, ...]
+    note: str
 
 
 def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
@@ -56,10 +54,8 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     tolerance = _TOLERANCE * float(np.abs(inside).max())
     varying = [i for i in range(3) if np.ptp(inside[:, i]) > tolerance]
     if len(varying) < 2:
-        raise InputError(
-            f"{name} holds a mesh that is a line or a point.",
-            cure="Give a section of the film from the axis outward, or the film in 3-D.",
-        )
+        cure = "Give a section of the film from the axis outward, or the film in 3-D."
+        raise InputError(f"{name} holds a mesh that is a line or a point.", cure=cure)
     up = varying[-1] if vertical is None else [*AXES, vertical].index(vertical)
     if up not in varying:
         raise InputError(
@@ -118,7 +114,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
         )
     which = ", its lowest level" if level is None else ""
     note = f"The base was taken at {level_text}{which}: {base_nodes.size} nodes."
-    return Base(base_nodes, tuple(sides), outward, (note,))
+    return Base(base_nodes, tuple(sides), outward, note)
 
 
 def average_over_circles(
@@ -140,10 +136,8 @@ def average_over_circles(
         nodes = {name: np.bincount(index.ravel(), v) / number for name, v in columns.items()}
         fields = {n: LinearNDInterpolator(distinct * reach, v)(points) for n, v in nodes.items()}
     except QhullError as error:
-        raise InputError(
-            "The nodes on the base of the film lie on one line.",
-            cure="Name the axis across the film (vertical; --vertical).",
-        ) from error
+        cure = "Name the axis across the film (vertical; --vertical)."
+        raise InputError("The nodes on the base of the film lie on one line.", cure=cure) from error
     # Circles of which less than half as much is inside as of others are left out: the corners.
     inside = np.isfinite(next(iter(fields.values())))
     share = inside.sum(axis=1)
@@ -187,10 +181,8 @@ def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
     name, _, number = field.rpartition(":")
     if field not in counts and name in counts and number.isdecimal():
         if not 1 <= int(number) <= counts[name]:
-            raise InputError(
-                f"The field {name!r} in {mesh.source.file_name} has no component {number}.",
-                why=f"It has {counts[name]}, counted from 1.",
-            )
+            problem = f"The field {name!r} in {mesh.source.file_name} has no component {number}."
+            raise InputError(problem, why=f"It has {counts[name]}, counted from 1.")
         return Component(name, name in at_points, int(number) - 1, f"component {number}")
     if field not in counts:
         raise _no_such_field(mesh, field, at_points, in_cells)
@@ -243,11 +235,9 @@ def _no_such_field(
     places = {"at the nodes": points, "in the cells": cells}
     lists = "; ".join(listed(fields, where) for where, fields in places.items() if fields)
     has = f"has, with their numbers of components, {lists}" if lists else "has no fields at all"
-    return InputError(
-        f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
-        why=f"It {has}.",
-        cure="Give the name of the stress among them, or save the mesh with its stress.",
-    )
+    problem = f"{mesh.source.file_name} has no field {printable(field, 80)!r}."
+    cure = "Give the name of the stress among them, or save the mesh with its stress."
+    return InputError(problem, why=f"It {has}.", cure=cure)
 
 
 _FEWEST_RADII = 3
@@ -267,13 +257,10 @@ def read_reference_mesh(
     centre: tuple[float, float] | None = None,
     **stated: Any,
 ) -> reference.ImportedProfile:
-    """Read the stress at the base of the film from a mesh: a section, or a film in 3-D.
-
-    ``sigma`` is a field of the normal stress or of a tensor of 4, 6 or 9 components, ``"name:2"``
-    component 2.  ``base`` and ``centre`` are in m.  Without ``shear_sign`` the shear is taken for
-    the stress component rz; with 1, for the radial traction of the base on the film.  ``stated``
-    are the profile's ``load`` in N and, where they are known, ``film``, ``indenter``, ``solver``.
-    """
+    """Read the stress at the base of the film from a mesh; ``stated`` are the profile's fields."""
+    # sigma is a field of the normal stress or of a tensor of 4, 6 or 9 components, "name:2" its
+    # component 2. Base and centre are in m. Without shear_sign the shear is taken for the stress
+    # component rz; with 1, for the radial traction of the base on the film.
     reference.require_sign("sign", sign)
     if shear_sign is not None:
         reference.require_sign("shear sign", shear_sign)
@@ -291,7 +278,7 @@ def read_reference_mesh(
     notes = [
         *import_notes([f"Imported from {name} (sha256 {mesh.source.sha256}).", *mesh.notes]),
         *frame.notes,
-        *import_notes(footing.notes),
+        *import_notes([footing.note]),
         _component_note(normal, "Normal stress", treatment),
     ]
     if tangential is not None:
@@ -338,17 +325,13 @@ def _require_meaning(
 ) -> None:
     """Refuse an option that the mesh gives no meaning to."""
     if section and centre is not None:
-        raise InputError(
-            f"A centre was given, but the mesh in {name} is a section.",
-            why="The axis of a section is at radius 0.",
-            cure="Leave out the centre (--centre), or shift the mesh.",
-        )
+        problem = f"A centre was given, but the mesh in {name} is a section."
+        cure = "Leave out the centre (--centre), or shift the mesh."
+        raise InputError(problem, why="The axis of a section is at radius 0.", cure=cure)
     if not section and shear is not None:
-        raise InputError(
-            f"A shear field was given, but the mesh in {name} is a body in 3-D.",
-            why="The radial shear is read from sections only.",
-            cure="Leave it out (shear; --shear), or give a section of the film.",
-        )
+        problem = f"A shear field was given, but the mesh in {name} is a body in 3-D."
+        cure = "Leave it out (shear; --shear), or give a section of the film."
+        raise InputError(problem, why="The radial shear is read from sections only.", cure=cure)
 
 
 def _shear_component(

@@ -22,8 +22,7 @@ _SECTIONS = ("Points", "Cells", "PointData", "CellData")
 _NUMBERS = re.compile("U?Int(8|16|32|64)|Float(32|64)")
 # Bytes that are not XML follow the first underscore of a raw section.
 _RAW = re.compile(rb"""<AppendedData[^>]*encoding\s*=\s*["']raw["'][^>]*>\s*_""")
-_MOST_FILES = 32
-_MOST_PRINTED = 300
+_MOST_FILES, _MOST_PRINTED = 32, 300
 _FORBIDDEN = {"ctypes", "ftplib", "pickle", "pty", "shutil", "socket", "subprocess", "urllib"}
 # What an import does: modules that are needed late, such as an encoding, may still be loaded.
 _ALLOWED_OF_OS = {"os.listdir", "os.scandir"}

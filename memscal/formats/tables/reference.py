@@ -15,8 +15,7 @@ from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
 # A larger difference between force and load is warned of, one beyond a factor is refused.
-_WARNED = 0.03
-_REFUSED = 2.0
+_WARNED, _REFUSED = 0.03, 2.0
 # Samples whose stress has not decayed to this share of its maximum end early.
 _DECAYED = 0.01
 # In SI; a force calculated from larger numbers would overflow.
@@ -33,19 +32,16 @@ class ImportedProfile:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """Stress at the base as a file states it, in SI, and the words for it in messages.
+    """Stress at the base as a file states it, in SI, and the words for it in messages."""
 
-    ``columns`` (n,) are ``r``, ``sigma_zz`` and perhaps ``sigma_rz``; ``spacing`` is in m.
-    """
-
-    columns: dict[str, FloatArray]
+    columns: dict[str, FloatArray]  # (n,): r, sigma_zz and perhaps sigma_rz
     source: SourceFile
     notes: Sequence[Message]
     kind: str
     item: str
     units: tuple[str, str]
     sign: int
-    spacing: float
+    spacing: float  # in m
     discretisation: str = ""
 
     @property
@@ -79,21 +75,13 @@ def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
     require_numbers(samples)
     lowest = float(samples.columns["r"].min())
     if lowest < 0:
-        raise InputError(
-            f"{name} has a negative radius ({lowest * 1e3:g} mm).",
-            why="A reference is a profile against the distance from the axis.",
-            cure="Give one half of a section through the axis, with r from 0.",
-        )
+        why = "A reference is a profile against the distance from the axis."
+        cure = "Give one half of a section through the axis, with r from 0."
+        raise InputError(f"{name} has a negative radius ({lowest * 1e3:g} mm).", why=why, cure=cure)
     notes = list(samples.notes)
-    columns = _sorted_by_radius(samples, notes)
-    profile = StressProfile(
-        r=columns["r"],
-        sigma_zz=columns["sigma_zz"],
-        sigma_rz=columns.get("sigma_rz"),
-        **stated,  # what no table or mesh holds: load, film, indenter
-        discretisation=samples.discretisation,
-        source=samples.source,
-    )
+    # Stated is what no table or mesh holds: load, film, indenter.
+    fields: dict[str, Any] = {**_sorted_by_radius(samples, notes), **stated}
+    profile = StressProfile(**fields, discretisation=samples.discretisation, source=samples.source)
     notes += _compare_with_load(profile, samples)
     return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
 
@@ -187,19 +175,14 @@ def read_reference_table(
     decimal: str | None = None,
     **stated: Any,
 ) -> ImportedProfile:
-    """Read the stress at the base of the film from a table with one row per radius.
-
-    ``sign`` is -1 where compression is negative, and turns the normal stress; ``shear_sign`` is -1
-    where the shear is S13 with axis 3 from the base to the surface.  ``stated`` are the profile's
-    ``load`` in N and, where they are known, ``film``, ``indenter`` and ``solver``.
-    """
+    """Read the stress at the base of the film from a table; ``stated`` are the profile's fields."""
+    # sign is -1 where compression is negative, and turns the normal stress; shear_sign is -1 where
+    # the shear is S13 with axis 3 from the base to the surface.
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
-    columns = {
-        "r": table.quantity(r, r_unit, "length"),
-        "sigma_zz": sign * table.quantity(sigma, sigma_unit, "stress"),
-    }
+    columns = {"r": table.quantity(r, r_unit, "length")}
+    columns["sigma_zz"] = sign * table.quantity(sigma, sigma_unit, "stress")
     if shear is not None:
         columns["sigma_rz"] = shear_sign * table.quantity(shear, sigma_unit, "stress")
     samples = Samples(

@@ -56,27 +56,19 @@ def read_scan_table(
     decimal: str | None = None,
     **stated: Any,
 ) -> ImportedScan:
-    """Read a scan from a table with one row per reading, in the order of the file.
-
-    Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit``, of any
-    kind, for all channels; by default they are those of the columns' heads (``x/mm``).
-    ``load_scatter``, relative, and ``x_error``, in m, are independent from point to point.
-    ``stated`` are the scan's ``film``, ``indenter`` and other fields of :class:`Scan` that no table
-    holds, such as ``load_uncertainty``.
-    """
+    """Read a scan from a table with one row per reading; ``stated`` are further fields of it."""
+    # Columns are names, or numbers counted from 1; x_unit holds for y too, u_unit for all channels;
+    # by default they are those of the columns' heads (x/mm). load_scatter, relative, and x_error,
+    # in m, are independent from point to point.
     require_sign("sign of the voltage", u_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     notes = [*table.notes]
-    channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
+    channels = {n: c for n, c in (("u_zz", u), ("u_xz", u_xz), ("u_yz", u_yz)) if c is not None}
     u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
     x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
     reading = reading_of(u_unit, table.where(u))
     of_unit = dimension_in("voltage", reading)
-    columns = {
-        name: table.quantity(column, u_unit, of_unit)
-        for name, column in channels.items()
-        if column is not None
-    }
+    columns = {n: table.quantity(c, u_unit, of_unit) for n, c in channels.items()}
     columns["u_zz"] = u_sign * columns["u_zz"]
     notes += ["The sign of u_zz was changed."] if u_sign < 0 else []
     if reading.si != "V":
@@ -172,10 +164,9 @@ def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
         counts = [int((columns["branch"] == number).sum()) for number in (1, 2, 0)]
         words = "{} readings on approach, {} on retreat, {} of neither branch."
         notes.append(words.format(*counts))
-    missing = {name: int(np.isnan(values).sum()) for name, values in columns.items()}
-    notes += [
-        f"{count} values of {name} are missing (NaN)." for name, count in missing.items() if count
-    ]
+    for name, values in columns.items():
+        if missing := int(np.isnan(values).sum()):
+            notes.append(f"{missing} values of {name} are missing (NaN).")
     full = number * places.count - x.size
     if number > 1 and full > 0:
         notes.append(f"{full} more would make every repeat complete.")

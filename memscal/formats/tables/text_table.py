@@ -5,7 +5,7 @@ import hashlib
 import itertools
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,9 +25,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 # A name and its unit: x/mm, x (mm) or x [mm].
 _HEAD = re.compile(r"([^/(\[]+?)\s*(?:/(.+)|\((.+)\)|\[(.+)\])")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
-_MAX_NAME = 80
-_MAX_COMMENTS = 20
-_MAX_COMMENT = 300
+_MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT = 80, 20, 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +67,8 @@ class Table:
     def _index(self, column_name: str | int) -> int:
         if isinstance(column_name, str) and column_name in self.names:
             if self.names.count(column_name) > 1:
-                raise InputError(
-                    f"{self.source.file_name} has several columns named {column_name!r}.",
-                    cure="Give the number of the column, counted from 1.",
-                )
+                problem = f"{self.source.file_name} has several columns named {column_name!r}."
+                raise InputError(problem, cure="Give the number of the column, counted from 1.")
             return self.names.index(column_name)
         heads = [match and match[1] for match in map(_HEAD.fullmatch, self.names)]
         if heads.count(str(column_name)) == 1:
@@ -107,10 +103,8 @@ class Table:
 def read_table(
     path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None
 ) -> Table:
-    """Read a delimited text file; ``#`` or ``%`` begin a comment.
-
-    The first line with a cell that is no number is the header.
-    """
+    """Read a delimited text file; ``#`` or ``%`` begin a comment."""
+    # The first line is the header where one of its cells is no number.
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
@@ -141,13 +135,8 @@ def read_table(
         f"Read {len(body)} rows of {width} columns separated by a "
         f"{_DELIMITERS.get(delimiter, repr(delimiter))}, with a decimal {mark}."
     )
-    return Table(
-        source=source,
-        names=tuple(printable(cell, _MAX_NAME) for cell in header),
-        rows=body,
-        decimal=decimal,
-        notes=tuple(notes),
-    )
+    names = tuple(printable(cell, _MAX_NAME) for cell in header)
+    return Table(source, names, rows=body, decimal=decimal, notes=tuple(notes))
 
 
 def _is_comment(line: str) -> bool:
@@ -156,7 +145,7 @@ def _is_comment(line: str) -> bool:
 
 def _head_comments(lines: list[str]) -> list[str]:
     """Return what is written above the table: it may say that the data are synthetic."""
-    head = list(itertools.takewhile(_is_comment, lines))
+    head = itertools.takewhile(_is_comment, lines)
     shown = [printable(line.lstrip(" \t#%"), _MAX_COMMENT).strip() for line in head]
     notes = [f"The table says: {line}" for line in shown[:_MAX_COMMENTS] if line]
     if len(shown) > _MAX_COMMENTS:
@@ -169,26 +158,20 @@ def _find_delimiter(lines: list[str]) -> str:
     sample = lines[:50]
     best, score = " ", 0.0
     for delimiter in _DELIMITERS:
-        widths = [len(_cells(line, delimiter)) for line in sample]
+        widths = [len(line.split(None if delimiter == " " else delimiter)) for line in sample]
         common = max(set(widths), key=widths.count)
         if common > 1 and widths.count(common) > score:
             best, score = delimiter, widths.count(common)
     return best
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return line.split() if delimiter == " " else line.split(delimiter)
-
-
 def _split(name: str, lines: list[str], delimiter: str) -> list[tuple[str, ...]]:
-    rows: Iterable[list[str]]
-    try:
-        if delimiter == " ":
-            rows = [line.split() for line in lines]
-        else:
+    rows = [line.split() for line in lines]
+    if delimiter != " ":
+        try:
             rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True))
-    except (csv.Error, TypeError) as error:
-        raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
+        except (csv.Error, TypeError) as error:
+            raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
     cut = [tuple(cell.strip() for cell in row) for row in rows]
     if max(len(row) for row in cut) > _MAX_COLUMNS:
         raise FormatError(f"{name} has more than {_MAX_COLUMNS} columns.")
