@@ -67,10 +67,8 @@ _MOST_WORKERS = 61
 def require_workers(workers: Any) -> None:
     """Refuse a number of processes that is not whole, or out of range."""
     if not isinstance(workers, Integral) or not 1 <= int(workers) <= _MOST_WORKERS:
-        raise InputError(
-            f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}.",
-            cure="Give one process per core, at the most.",
-        )
+        problem = f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}."
+        raise InputError(problem, cure="Give one process per core, at the most.")
 
 
 @contextmanager

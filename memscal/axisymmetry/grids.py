@@ -116,10 +116,8 @@ class Lattice:
 
     def __post_init__(self) -> None:
         if self.x.size % 2 == 0 or self.y.size % 2 == 0:
-            raise InputError(
-                f"A lattice of {self.y.size} by {self.x.size} points has no central point.",
-                cure="Use odd numbers of points.",
-            )
+            problem = f"A lattice of {self.y.size} by {self.x.size} points has no central point."
+            raise InputError(problem, cure="Use odd numbers of points.")
 
     @property
     def axes(self) -> tuple[FloatArray, FloatArray]:

@@ -230,10 +230,8 @@ def require_free(
             "stated law.",
         )
     if (count := len({scan.film for scan in scans})) > len(_NODES):
-        raise InputError(
-            f"The scans have {count} films of unknown thickness.",
-            cure=f"Give scans on at most {len(_NODES)} films.",
-        )
+        problem = f"The scans have {count} films of unknown thickness."
+        raise InputError(problem, cure=f"Give scans on at most {len(_NODES)} films.")
     if not all(scan.set_up.film.thickness_uncertainty for scan in scans):
         raise InputError(
             "A film states no uncertainty of its thickness.",
@@ -242,11 +240,10 @@ def require_free(
             "/entry/sample/film/thickness_uncertainty).",
         )
     if any(reference is not None for reference in [*stated, *(scan.reference for scan in scans)]):
-        raise InputError(
-            "A reference is given, of one thickness.",
-            why="To estimate the thickness the rod is solved on films of others.",
-            cure="Leave the reference out, of the scan's file as well.",
-        )
+        problem = "A reference is given, of one thickness."
+        why = "To estimate the thickness the rod is solved on films of others."
+        cure = "Leave the reference out, of the scan's file as well."
+        raise InputError(problem, why=why, cure=cure)
 
 
 def free_thickness(solution: Solution) -> FreeThickness:

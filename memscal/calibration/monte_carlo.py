@@ -350,11 +350,10 @@ def monte_carlo(
         if progress is not None:
             progress(done, draws)
     if len(rows) < 2:
-        raise FitError(
-            f"{len(failures)} of {draws} draws could not be calibrated.",
-            why=f"The first one: {failures[0]}",
-            cure="The scan is close to failing, too; measure with less noise.",
-        )
+        problem = f"{len(failures)} of {draws} draws could not be calibrated."
+        why = f"The first one: {failures[0]}"
+        cure = "The scan is close to failing, too; measure with less noise."
+        raise FitError(problem, why=why, cure=cure)
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
     expected, deconvolution = uncertainty.expected_values(solution), solution.deconvolution
     comparisons = tuple(

@@ -170,11 +170,10 @@ def prepare_fields(
     if smoothed is not None and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
     if divided and not _of_round_fields(estimate):
-        raise InputError(
-            "The reference is a field that is not round, which a line does not show.",
-            why="A division needs the voltage over the plane, as one raster has it.",
-            cure='Use method="bayesian" (--method bayesian), or scan one raster.',
-        )
+        problem = "The reference is a field that is not round, which a line does not show."
+        why = "A division needs the voltage over the plane, as one raster has it."
+        cure = 'Use method="bayesian" (--method bayesian), or scan one raster.'
+        raise InputError(problem, why=why, cure=cure)
     return LineFields.lift(estimate, (smoothed or estimate).spectrum, choice)
 
 

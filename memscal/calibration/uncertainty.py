@@ -180,11 +180,9 @@ def correlation_matrix(
     for pair, coefficient in correlations.items():
         unknown = [name for name in pair if name not in sources]
         if unknown or len(set(pair)) != 2:
-            raise InputError(
-                f"A correlation is given for {' and '.join(map(repr, pair))}.",
-                why="It must be between two inputs whose uncertainty is stated.",
-                cure=f"Choose from {', '.join(sources) or 'none'}.",
-            )
+            problem = f"A correlation is given for {' and '.join(map(repr, pair))}."
+            why = "It must be between two inputs whose uncertainty is stated."
+            raise InputError(problem, why=why, cure=f"Choose from {', '.join(sources) or 'none'}.")
         if not -1 <= coefficient <= 1:
             names = " and ".join(pair)
             raise InputError(f"The correlation of {names} is {coefficient:g}, outside -1 to 1.")

@@ -307,10 +307,8 @@ def create_regulariser(name: str, /, **options: Any) -> Method:
         options = {key: value for key, value in options.items() if key != "seed"}
     unknown = sorted(set(options) - set(accepted))
     if unknown and not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
-        raise InputError(
-            f"Method {name} has no option {', '.join(unknown)}.",
-            cure=f"Its options are: {', '.join(accepted) or 'none'}.",
-        )
+        problem = f"Method {name} has no option {', '.join(unknown)}."
+        raise InputError(problem, cure=f"Its options are: {', '.join(accepted) or 'none'}.")
     method: Method = factory(**options)
     return method
 
@@ -321,10 +319,9 @@ def chosen_method(method: str | Method, options: Mapping[str, Any], **seed: int)
         return create_regulariser(method, **seed, **options)
     divides = isinstance(method, Bayesian) or callable(getattr(method, "divide", None))
     if isinstance(method, type) or not divides:
-        raise InputError(
-            f"The method is {method!r}, which cannot divide fields.",
-            cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",
-        )
+        problem = f"The method is {method!r}, which cannot divide fields."
+        cure = "Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov."
+        raise InputError(problem, cure=cure)
     if options:
         raise InputError(
             f"Options {', '.join(options)} were given beside a regulariser that is set up already.",
@@ -338,10 +335,8 @@ def _factory(name: str) -> Any:
         return _OWN[name]
     points = [point for point in _plug_ins() if point.name == name]
     if not points:
-        raise InputError(
-            f"There is no method named {name}.",
-            cure=f"Choose from {', '.join(regulariser_names())}.",
-        )
+        problem = f"There is no method named {name}."
+        raise InputError(problem, cure=f"Choose from {', '.join(regulariser_names())}.")
     try:
         return points[0].load()
     except Exception as error:

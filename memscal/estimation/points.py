@@ -65,11 +65,10 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
             "channel zz.",
         )
     if scan.planar:
-        raise InputError(
-            f"Channel {channel} cannot be calibrated with a raster.",
-            why="A raster is used as a field, and the shear's has a line of zeros through it.",
-            cure=f"Calibrate with lines along {along} through the sensor; cut one from the raster.",
-        )
+        problem = f"Channel {channel} cannot be calibrated with a raster."
+        why = "A raster is used as a field, and the shear's has a line of zeros through it."
+        cure = f"Calibrate with lines along {along} through the sensor; cut one from the raster."
+        raise InputError(problem, why=why, cure=cure)
     if scan.direction != along:
         raise InputError(
             f"The scan runs along {scan.direction}, and channel {channel} measures the shear "
@@ -189,17 +188,14 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     x, y = scan.positions
     keep = measured_mask(scan, channel)
     if not keep.any():
-        raise InputError(
-            f"Every point of u_{channel} is missing (NaN).",
-            why="There is nothing to calibrate with.",
-            cure="Check the voltage column and its import.",
-        )
+        problem = f"Every point of u_{channel} is missing (NaN)."
+        why = "There is nothing to calibrate with."
+        raise InputError(problem, why=why, cure="Check the voltage column and its import.")
     if errors is not None and np.any(errors[keep] <= 0):
-        raise InputError(
-            f"u_{channel}_errors holds a standard uncertainty of zero.",
-            why="A point without noise would outweigh every other point.",
-            cure="Give the electronic noise, or leave it out to have it estimated.",
-        )
+        problem = f"u_{channel}_errors holds a standard uncertainty of zero."
+        why = "A point without noise would outweigh every other point."
+        cure = "Give the electronic noise, or leave it out to have it estimated."
+        raise InputError(problem, why=why, cure=cure)
     arrays = {"x": x, "y": y, "u": u, "load": load, "repeat": scan.passes}
     x_errors = np.zeros(()) if scan.x_errors is None else scan.x_errors
     arrays["x_errors"] = np.broadcast_to(x_errors, u.shape)
@@ -241,11 +237,10 @@ def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], t
             )
         between = scan.u_zz_correlation if scan.kind == "points" else None
         if between is not None and between[np.not_equal.outer(passes, passes)].any():
-            raise InputError(
-                "u_zz_correlation correlates the noise of one repeat with that of another.",
-                why="Repeats with centres of their own are fitted as separate measurements.",
-                cure='Take one centre for all (centre="common", --centre common).',
-            )
+            problem = "u_zz_correlation correlates the noise of one repeat with that of another."
+            why = "Repeats with centres of their own are fitted as separate measurements."
+            cure = 'Take one centre for all (centre="common", --centre common).'
+            raise InputError(problem, why=why, cure=cure)
         separate += [scan.only_passes(number) for number in measured]
         owners += [i] * measured.size
     if len(separate) <= len(scans):
@@ -303,11 +298,10 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
         return scans[0]
     stated = [points.u_errors for points in scans if points.u_errors is not None]
     if len(stated) not in (0, len(scans)):
-        raise InputError(
-            "Some of the scans state their noise (u_zz_errors) and others do not.",
-            why="It determines their relative weights.",
-            cure="State it in every scan, or leave it out of every one.",
-        )
+        problem = "Some of the scans state their noise (u_zz_errors) and others do not."
+        why = "It determines their relative weights."
+        cure = "State it in every scan, or leave it out of every one."
+        raise InputError(problem, why=why, cure=cure)
     first_repeat = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans[:-1])])
     repeats = [points.repeat + first for points, first in zip(scans, first_repeat, strict=True)]
     numbers = [np.full(points.u.size, i, dtype=np.intp) for i, points in enumerate(scans)]
@@ -350,17 +344,13 @@ def _require_usable(points: ScanPoints) -> None:
     positions = points.places[0].count
     needed = MINIMUM_POSITIONS + 2 * points.planar
     if positions < needed:
-        raise FitError(
-            f"The scan has {positions} measured positions; at least {needed} are needed.",
-            why="Conversion constant, width, centre, baseline and noise are estimated from them.",
-            cure="Scan more positions.",
-        )
+        problem = f"The scan has {positions} measured positions; at least {needed} are needed."
+        why = "Conversion constant, width, centre, baseline and noise are estimated from them."
+        raise FitError(problem, why=why, cure="Scan more positions.")
     if np.ptp(points.u) == 0:
-        raise InputError(
-            f"Every voltage of the scan is {points.u[0]:g} {points.reading.si}.",
-            why="A calibration needs a voltage that follows the indenter.",
-            cure="Check the channel.",
-        )
+        problem = f"Every voltage of the scan is {points.u[0]:g} {points.reading.si}."
+        why = "A calibration needs a voltage that follows the indenter."
+        raise InputError(problem, why=why, cure="Check the channel.")
     # The parity of a shear is tested later, by estimation.gaussian.
     if points.order:
         return

@@ -446,11 +446,10 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
     dual, _ = nnls(np.vstack([matrix.T, bound]), target, maxiter=50 * bound.size)
     residual = np.vstack([matrix.T, bound]) @ dual - target
     if not residual[-1] < -1e-12:
-        raise FitError(
-            "No apparatus function that meets the constraint comes near the scan.",
-            why="It would have to be negative, or to rise, somewhere.",
-            cure="Leave out the constraint: nonnegative=false, monotone=false.",
-        )
+        problem = "No apparatus function that meets the constraint comes near the scan."
+        why = "It would have to be negative, or to rise, somewhere."
+        cure = "Leave out the constraint: nonnegative=false, monotone=false."
+        raise FitError(problem, why=why, cure=cure)
     return np.asarray(-residual[:-1] / residual[-1])
 
 

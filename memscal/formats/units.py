@@ -111,10 +111,9 @@ def dimension_of(unit: str, where: str) -> str:
         except UnitError:
             continue
         return dimension
-    raise UnitError(
-        f'{where} has the unit "{_shown(unit)}", which memscal does not work with.',
-        cure="Use one of: " + ", ".join(u for u in _CANONICAL if u.isascii() and u) + ".",
-    )
+    problem = f'{where} has the unit "{_shown(unit)}", which memscal does not work with.'
+    cure = "Use one of: " + ", ".join(u for u in _CANONICAL if u.isascii() and u) + "."
+    raise UnitError(problem, cure=cure)
 
 
 def _scaled(numbers: FloatArray, power: int) -> FloatArray:

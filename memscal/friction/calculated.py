@@ -235,11 +235,9 @@ def external_family(
         raise InputError("No table of a calculated stress was given.")
     loadings = {profile.loading for mu, profile in tables if profile.loading and mu > 0}
     if len(loadings) > 1:
-        raise InputError(
-            "Some of the tables are for incremental loading and some for total loading.",
-            why="A family holds one loading.",
-            cure="Give the tables of one loading at a time.",
-        )
+        problem = "Some of the tables are for incremental loading and some for total loading."
+        why = "A family holds one loading."
+        raise InputError(problem, why=why, cure="Give the tables of one loading at a time.")
     loading = "".join(loadings)
     frictions = np.array(sorted({mu for mu, _ in tables}))
     grid = _grid(tables, frictions, nominal)
@@ -308,10 +306,8 @@ def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile 
 def _checked_friction(profile: StressProfile, reach: float) -> float:
     """Return a table's friction coefficient; refuse a table that cannot be compared."""
     if profile.friction_coefficient is None:
-        raise InputError(
-            f"{_name(profile)} does not say its friction coefficient.",
-            cure="State it when the table is imported (--friction).",
-        )
+        problem = f"{_name(profile)} does not say its friction coefficient."
+        raise InputError(problem, cure="State it when the table is imported (--friction).")
     tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
     if profile.r[-1] < reach and tail > _DECAYED:
         raise InputError(

@@ -58,11 +58,10 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",
             )
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
-            raise InputError(
-                f"{place} states another film or sphere than the first scan.",
-                why="Scans that are compared together share the calculated contacts.",
-                cure="Compare them one by one, or correct /entry/sample/film and /entry/indenter.",
-            )
+            problem = f"{place} states another film or sphere than the first scan."
+            why = "Scans that are compared together share the calculated contacts."
+            cure = "Compare them one by one, or correct /entry/sample/film and /entry/indenter."
+            raise InputError(problem, why=why, cure=cure)
 
 
 def same_apparatus(
@@ -276,10 +275,8 @@ def _families(
     """Return the calculated profiles at every load that was measured, by loading."""
     values = FRICTIONS if friction is None else tuple(float(mu) for mu in friction)
     if len(values) < 2:
-        raise InputError(
-            "One friction coefficient is nothing to choose from.",
-            cure="Give several, such as 0, 0.1, 0.3 and infinity.",
-        )
+        problem = "One friction coefficient is nothing to choose from."
+        raise InputError(problem, cure="Give several, such as 0, 0.1, 0.3 and infinity.")
     loadings = (loading,) if isinstance(loading, str) else tuple(dict.fromkeys(loading))
     if not loadings:
         raise InputError('No loading was given: "incremental", "total", or both.')

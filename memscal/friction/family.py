@@ -319,11 +319,9 @@ class FamilySetup:
         # Refused is what is no sphere, no positive load or reach (m), or no number of workers.
         require_workers(workers)
         if not isinstance(indenter, Sphere):
-            raise InputError(
-                f"Profiles were asked for under a {indenter.shape}, but a sphere is needed.",
-                why="Friction shows under an indenter whose contact grows with the load.",
-                cure="Give the sphere of the contact scan.",
-            )
+            problem = f"Profiles were asked for under a {indenter.shape}, but a sphere is needed."
+            why = "Friction shows under an indenter whose contact grows with the load."
+            raise InputError(problem, why=why, cure="Give the sphere of the contact scan.")
         self.film, self.indenter = film, indenter
         self.wavenumbers = base_wavenumbers(film.thickness, reach)
         self.loads = require_loads(loads)
@@ -441,10 +439,8 @@ def parameter_values(what: str, values: Sequence[float]) -> FloatArray:
     if checked.ndim != 1 or checked.size == 0 or np.any(np.isnan(checked)) or np.any(checked < 0):
         raise InputError(f"The {what} are {values!r}, but they are a list, none of them negative.")
     if np.any(np.diff(checked) <= 0):
-        raise InputError(
-            f"The {what} {', '.join(f'{value:g}' for value in checked)} do not increase.",
-            cure="Sort them, and give each once.",
-        )
+        problem = f"The {what} {', '.join(f'{value:g}' for value in checked)} do not increase."
+        raise InputError(problem, cure="Sort them, and give each once.")
     return checked
 
 

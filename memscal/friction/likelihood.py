@@ -87,11 +87,10 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     """Return the points of a measured profile, with the noise that is stated, or was estimated."""
     points = profile.points.get(channel)
     if not profile.points:
-        raise InputError(
-            f"{profile.label}: the measured stress holds no measured points.",
-            why="Its file is of version 1.0, which kept the profiles alone.",
-            cure="Make it again with memscal apply, or give the scans.",
-        )
+        problem = f"{profile.label}: the measured stress holds no measured points."
+        why = "Its file is of version 1.0, which kept the profiles alone."
+        cure = "Make it again with memscal apply, or give the scans."
+        raise InputError(problem, why=why, cure=cure)
     if points is None:
         raise InputError(
             f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
@@ -100,11 +99,9 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
             cure=f"Give a line scan along {channel[0]} through the sensor, with u_{channel}.",
         )
     if points.noise is None:
-        raise InputError(
-            f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing.",
-            why="Contacts are told apart by a chi-square.",
-            cure=f"State the electronic noise of u_{channel}.",
-        )
+        problem = f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing."
+        why = "Contacts are told apart by a chi-square."
+        raise InputError(problem, why=why, cure=f"State the electronic noise of u_{channel}.")
     position = (points.x, points.y)[profile.axis]
     drift = (position - (position.max() + position.min()) / 2) / (np.ptp(position) / 2)
     return LoadPoints(

@@ -71,11 +71,10 @@ def load_of(scan: Scan) -> str:
 def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
     recorded = loads[np.isfinite(loads)]
     if not recorded.size:
-        raise InputError(
-            f"{place_of(scan)}{line}: every load is missing (NaN in normal_load).",
-            why="The stress under a curved indenter depends on its load.",
-            cure="State the loads, or leave normal_load out where there is one nominal load only.",
-        )
+        problem = f"{place_of(scan)}{line}: every load is missing (NaN in normal_load)."
+        why = "The stress under a curved indenter depends on its load."
+        cure = "State the loads, or leave normal_load out where there is one nominal load only."
+        raise InputError(problem, why=why, cure=cure)
     load = float(np.median(recorded))
     if np.abs(recorded - load).max() > _SCATTER * load:
         raise InputError(
@@ -153,11 +152,10 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
     if scan.normal_load is not None:
         complete &= np.isfinite(scan.normal_load)
     if not complete.any():
-        raise InputError(
-            f"{load_of(scan)}: all {complete.size} points are missing (NaN).",
-            why="A load without voltages has no profile.",
-            cure="Check the import, or leave the lines of that load out.",
-        )
+        problem = f"{load_of(scan)}: all {complete.size} points are missing (NaN)."
+        why = "A load without voltages has no profile."
+        cure = "Check the import, or leave the lines of that load out."
+        raise InputError(problem, why=why, cure=cure)
     if scan.y is not None:
         return
     order = np.argsort(scan.x)

@@ -86,10 +86,9 @@ def accept_other_sensor(
     apparatus.require_pascals()
     unit, si = scan.unit or "V", apparatus.reading.si
     if unit != si:
-        raise InputError(
-            f"The readings of {places[0]} are in {unit}, those of the artifact in {si}.",
-            cure="Give the artifact of this sensor, or correct the units of /entry/data/u_zz.",
-        )
+        problem = f"The readings of {places[0]} are in {unit}, those of the artifact in {si}."
+        cure = "Give the artifact of this sensor, or correct the units of /entry/data/u_zz."
+        raise InputError(problem, cure=cure)
     sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
     return scan_points.accepted_differences(
         [

@@ -193,10 +193,8 @@ def _targets(
 ) -> tuple[tuple[Target, ...], bool]:
     """Return what is to be reached, and whether a list was asked for."""
     if (load is None) == (depth is None):
-        raise InputError(
-            "Give either a load or a depth" + (", not both." if load is not None else "."),
-            why="One follows from the other.",
-        )
+        problem = "Give either a load or a depth" + (", not both." if load is not None else ".")
+        raise InputError(problem, why="One follows from the other.")
     values = np.asarray(load if depth is None else depth, dtype=np.float64)
     if values.ndim > 1 or values.size == 0:
         raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
@@ -256,7 +254,6 @@ def _check_request(
             cure="Leave them out.",
         )
     if rings is not None and rings < _FEWEST_RINGS:
-        raise InputError(
-            f"rings is {rings}, but a contact takes at least {_FEWEST_RINGS}.",
-            cure="Leave it out: rings are then doubled until the contact has converged.",
-        )
+        problem = f"rings is {rings}, but a contact takes at least {_FEWEST_RINGS}."
+        cure = "Leave it out: rings are then doubled until the contact has converged."
+        raise InputError(problem, cure=cure)

@@ -214,11 +214,10 @@ class ApparatusData(Checked):
         """Refuse to state pascals by a conversion constant that is not per pascal."""
         if (per := self.reading.per) != "Pa":
             whose = "relative" if per == "relative" else "per unit of a reference that is no stress"
-            raise InputError(
-                f"The conversion constant of the artifact is {whose}.",
-                why="The stress of its calibration was not known, and no reading tells another.",
-                cure="Calibrate with a known load and a stress in Pa, without --relative.",
-            )
+            problem = f"The conversion constant of the artifact is {whose}."
+            why = "The stress of its calibration was not known, and no reading tells another."
+            cure = "Calibrate with a known load and a stress in Pa, without --relative."
+            raise InputError(problem, why=why, cure=cure)
 
     @property
     def conversion_constant(self) -> float:

@@ -16,10 +16,8 @@ FloatArray = NDArray[np.float64]
 def require_positive(name: str, value: float, unit: str = "") -> None:
     """Refuse a value that is not a finite number above zero."""
     if not (math.isfinite(value) and value > 0):
-        raise InputError(
-            f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero.",
-            cure="Check the value and its unit.",
-        )
+        problem = f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero."
+        raise InputError(problem, cure="Check the value and its unit.")
 
 
 def require_non_negative(name: str, value: float | None) -> None:
@@ -95,10 +93,8 @@ def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Return a read-only copy of a vector of whole numbers."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
-        raise InputError(
-            f"{name} has shape {array.shape}, or holds values that are no whole numbers.",
-            cure="Give one whole number for each point.",
-        )
+        problem = f"{name} has shape {array.shape}, or holds values that are no whole numbers."
+        raise InputError(problem, cure="Give one whole number for each point.")
     numbers = array.astype(np.int64)
     numbers.setflags(write=False)
     return numbers

@@ -79,10 +79,8 @@ class Result:
         """Call a function of the result's summary, by its name."""
         function = getattr(import_module(f"memscal.summaries.{self._summary}"), form, None)
         if function is None:
-            raise InputError(
-                f"A {type(self).__name__} has no {_FORMS[form]}.",
-                cure="Use summary() or to_dict().",
-            )
+            problem = f"A {type(self).__name__} has no {_FORMS[form]}."
+            raise InputError(problem, cure="Use summary() or to_dict().")
         try:
             return function(self)
         except ModuleNotFoundError as error:

@@ -216,11 +216,10 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     ).reshape(values.shape)
     known = np.isin(numbers, list(named.values()))
     if not known.all():
-        raise InputError(
-            f"{name} holds {values[~known][0]}, which names no branch.",
-            why="It says whether the indenter approached (was loaded) or retreated (was unloaded).",
-            cure="Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known.",
-        )
+        problem = f"{name} holds {values[~known][0]}, which names no branch."
+        why = "It says whether the indenter approached (was loaded) or retreated (was unloaded)."
+        cure = "Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known."
+        raise InputError(problem, why=why, cure=cure)
     return numbers.astype(np.int64)
 
 
@@ -242,11 +241,10 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
         )
     least = float(np.linalg.eigvalsh(correlation)[0])
     if least <= _LEAST_EIGENVALUE:
-        raise InputError(
-            f"u_zz_correlation is not positive definite: it has the eigenvalue {least:.3g}.",
-            why="Some combination of the voltages would have no noise, or less than none.",
-            cure="Add the electronic noise, which is independent from point to point.",
-        )
+        problem = f"u_zz_correlation is not positive definite: it has the eigenvalue {least:.3g}."
+        why = "Some combination of the voltages would have no noise, or less than none."
+        cure = "Add the electronic noise, which is independent from point to point."
+        raise InputError(problem, why=why, cure=cure)
     return correlation
 
 
@@ -441,11 +439,10 @@ class Scan:
         names = {"sample/film": film, "indenter": indenter, "indenter/load": load}
         absent = [name for name, value in names.items() if value is None]
         missing = " and no ".join(f"{n.rpartition('/')[2]} (/entry/{n})" for n in absent)
-        raise InputError(
-            f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
-            why="The stress that an indenter makes at the base of a film is calculated from them.",
-            cure="State them (memscal import --thickness, --radius, --load), or give --reference.",
-        )
+        problem = f"{self.source.file_name if self.source else 'The scan'} states no {missing}."
+        why = "The stress that an indenter makes at the base of a film is calculated from them."
+        cure = "State them (memscal import --thickness, --radius, --load), or give --reference."
+        raise InputError(problem, why=why, cure=cure)
 
     @property
     def stated_load(self) -> float:

@@ -114,11 +114,10 @@ def correlated(comparison: FrictionComparison | ShearComparison) -> dict[str, An
     # is common to them; each source moves all coefficients to the same side.
     joint = [entry for entry in _joint(comparison) if entry[2].standard_uncertainty is not None]
     if not joint:
-        raise InputError(
-            "No friction coefficient of all loads has a standard uncertainty.",
-            why="; ".join(estimate.reason for *_, estimate in _joint(comparison)),
-            cure="Use summary() or to_dict(), which give its bounds.",
-        )
+        problem = "No friction coefficient of all loads has a standard uncertainty."
+        why = "; ".join(estimate.reason for *_, estimate in _joint(comparison))
+        cure = "Use summary() or to_dict(), which give its bounds."
+        raise InputError(problem, why=why, cure=cure)
     budgets = [
         {(name, lubrication if name in _OF_ONE_SCAN else ""): u for name, u in of.budget.items()}
         for lubrication, _, of in joint

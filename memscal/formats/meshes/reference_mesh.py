@@ -310,10 +310,9 @@ def _along_radius(
         r = np.where(np.abs(places[:, 0]) <= frame.tolerance, 0.0, places[:, 0])
         distinct = 1 + np.count_nonzero(np.diff(np.sort(r)) > frame.tolerance)
         if distinct < _FEWEST_RADII:
-            raise InputError(
-                f"The base in {samples.source.file_name} has values at {distinct} radii only.",
-                cure="Name the axis across the film (vertical; --vertical), or give a finer mesh.",
-            )
+            problem = f"The base in {samples.source.file_name} has values at {distinct} radii only."
+            cure = "Name the axis across the film (vertical; --vertical), or give a finer mesh."
+            raise InputError(problem, cure=cure)
         return replace(samples, columns={"r": r, **samples.columns})
     reference.require_numbers(samples)  # a mean would leave out what is missing
     columns, note = average_over_circles(places - np.array(centre), samples.columns)
