@@ -131,10 +131,7 @@ def _joined(
 
 
 def _fitted(
-    estimate: ProfileEstimate,
-    signal: FloatArray,
-    reference: RadialSpectrum,
-    rows: NDArray[np.intp],
+    estimate: ProfileEstimate, signal: FloatArray, reference: RadialSpectrum, rows: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
