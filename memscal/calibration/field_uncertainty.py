@@ -25,10 +25,8 @@ from typing import Any
 import numpy as np
 from scipy.fft import fftshift, ifftshift, irfft2, rfft2
 
-from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix, square_root
-from memscal.estimation.profile import ProfileEstimate
 from memscal.model.arrays import FloatArray
 
 #: Windows below this have closed.
@@ -42,7 +40,7 @@ def field_errors(
     correlations: Mapping[tuple[str, str], float],
 ) -> FloatArray:
     """Standard uncertainties of G on its grid (2, m, n), in 1/m^2: of noise alone, and in all."""
-    from scipy.interpolate import RectBivariateSpline
+    from scipy.interpolate import CubicSpline, RectBivariateSpline
 
     fields: Any = solution.fields
     estimate, g = solution.estimate, deconvolution.g
@@ -51,7 +49,11 @@ def field_errors(
     if effects:
         inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
     x, y = fields.central.axes
-    kernels = _kernels(estimate, fields)
+    # Kernels of all parameters about the centre on the lattice, (nodes, p).
+    radius = fields.central.radius
+    table = np.arange(0.0, float(radius.max()) + 4 * fields.step, fields.step)
+    kernels = CubicSpline(table, estimate.basis.radial(table))(radius.ravel())
+    kernels = kernels + estimate.oval_columns(x, y)
     on_lattice = RectBivariateSpline(g.y, g.x, g.image)(
         np.clip(y, g.y[0], g.y[-1]), np.clip(x, g.x[0], g.x[-1])
     )
@@ -63,16 +65,6 @@ def field_errors(
     return np.maximum.accumulate(np.maximum(planes, 0.0))
 
 
-def _kernels(estimate: ProfileEstimate, fields: RasterFields) -> FloatArray:
-    """Kernels of all parameters about the centre on the lattice, (nodes, p)."""
-    from scipy.interpolate import CubicSpline
-
-    grid = fields.central
-    table = np.arange(0.0, float(grid.radius.max()) + 4 * fields.step, fields.step)
-    radial = CubicSpline(table, estimate.basis.radial(table))(grid.radius.ravel())
-    return np.asarray(radial + estimate.oval_columns(*grid.axes))
-
-
 def _of_posterior(
     solution: Solution,
     deconvolution: Deconvolution,
@@ -82,9 +74,8 @@ def _of_posterior(
 ) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate, a = solution.estimate, deconvolution.conversion_constant
-    gain = estimate.weighed.gain
     rows = (kernels - np.outer(g, estimate.basis.integrals)) / a
-    scattered = estimate.scattered(gain)
+    gain, scattered = estimate.weighed.gain, estimate.scattered(estimate.weighed.gain)
     random = scattered @ scattered.T
     scatter = np.sum((rows @ random) * rows, axis=1)
     rest = np.sum((rows @ (estimate.covariance - random)) * rows, axis=1)

@@ -105,14 +105,12 @@ def angular_departures(
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
     axis = np.nonzero(model.points.free)[1]
     shifts = flat[:, 2 : 2 + axis.size] @ np.eye(2)[axis]
-    moved, kept = [*shifts.T, *flat[:, flat.shape[1] - 2 :].T], []
-    for column, block in zip(moved, np.split(columns, 2 * len(ORDERS), axis=1), strict=False):
-        kept.append(np.linalg.svd((column @ block)[None, :])[2][1:].T)
-    kept += [np.eye(radius.size)] * (2 * len(ORDERS) - len(kept))
+    moved, blocks = [*shifts.T, *flat[:, -2:].T], np.split(columns, 2 * len(ORDERS), axis=1)
+    kept = [np.linalg.svd((c @ b)[None, :])[2][1:].T for c, b in zip(moved, blocks, strict=False)]
+    kept += [np.eye(radius.size)] * (len(blocks) - len(kept))
     left, singular, _ = np.linalg.svd(standardised(radial), full_matrices=False)
     base = left[:, singular > _RESOLVED]
     data = standardised(model.points.u - fit.predicted)
-    blocks = np.split(columns, 2 * len(ORDERS), axis=1)
     free = np.hstack([block @ keep for block, keep in zip(blocks, kept, strict=True)])
     data, free = (values - base @ (base.T @ values) for values in (data, free))
     strengths = np.repeat(_expected_strengths(free, data, [keep.shape[1] for keep in kept]), 2)
@@ -161,38 +159,30 @@ _NEIGHBOURS = 8
 
 
 def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
-    """Noise of one reading (V) by its repeats, or by third differences of residuals (n,) in V.
-
-    Both leave out what is smooth over the plane: a sensor that is not round adds nothing.
-    ``None`` where there are too few of either.
-    """
+    """Noise of one reading (V) by its repeats, or by third differences of residuals (n,) in V."""
+    # Both leave out what is smooth over the plane: a sensor that is not round adds nothing.
+    # ``None`` where noise is stated, or where there are too few of either.
     if points.u_errors is not None or not points.planar:
         return None
     groups = np.stack([points.scan, points.of_places("index"), points.load])
     group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
-    degrees = group.size - int(group.max()) - 1
-    if degrees >= _FEWEST_DIFFERENCES:
-        left = residual - (np.bincount(group, residual) / np.bincount(group))[group]
-        # Of pairs every deviation from the mean is one of two: the median is of those that vary.
-        scale = np.sqrt(group.size / degrees)
-        return float(_spread(left[np.bincount(group)[group] > 1]) * scale)
-    return third_difference_noise(points, residual)
+    readings, degrees = np.bincount(group), group.size - int(group.max()) - 1
+    if degrees < _FEWEST_DIFFERENCES:
+        return _third_difference_noise(points, residual)
+    left = (residual - (np.bincount(group, residual) / readings)[group])[readings[group] > 1]
+    # Deviations from a mean of few are smaller than the noise.
+    return _spread(left) * float(np.sqrt(left.size / degrees))
 
 
-def third_difference_noise(points: ScanPoints, residual: FloatArray) -> float | None:
-    r"""Noise of one reading by divided third differences along the rows of a raster.
-
-    :math:`\sum_i c_i r_i / (\sum_i c_i^2)^{1/2}` with :math:`c_i^{-1} = \prod_{j \ne i} (x_i -
-    x_j)` is zero for every parabola, and has the variance of the noise.
-    """
+def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float | None:
+    """Noise of one reading by divided third differences along the rows of a raster."""
+    # sum c_i r_i / (sum c_i^2)^(1/2), 1/c_i the product of all x_i - x_j, is zero for every
+    # parabola, and has the variance of the noise.
     keys = np.stack([points.x, points.of_places("row"), points.repeat, points.scan])
-    order = np.lexsort(keys)
-    four = np.lib.stride_tricks.sliding_window_view(order, 4)
-    x = points.x[four]
-    gaps = np.diff(x, axis=1)
+    four = np.lib.stride_tricks.sliding_window_view(np.lexsort(keys), 4)
+    gaps = np.diff(points.x[four], axis=1)
     together = np.all(keys[1:, four[:, :1]] == keys[1:, four], axis=(0, 2))
-    even = gaps.max(axis=1) < _UNEVEN * gaps.min(axis=1)
-    four = four[together & even]
+    four = four[together & (gaps.max(axis=1) < _UNEVEN * gaps.min(axis=1))]
     if len(four) < _FEWEST_DIFFERENCES:
         return None
     apart = points.x[four][:, :, None] - points.x[four][:, None, :] + np.eye(4)
@@ -202,10 +192,8 @@ def third_difference_noise(points: ScanPoints, residual: FloatArray) -> float | 
 
 
 def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
-    """What of each residual (n,) its neighbours in the plane do not share, (n,).
-
-    An outlier stands alone; where a model misses a sensor's shape, neighbours depart together.
-    """
+    """What of each residual (n,) its neighbours in the plane do not share, (n,)."""
+    # An outlier stands alone; where a model misses a sensor's shape, neighbours depart together.
     from scipy.spatial import KDTree
 
     if not points.planar:
@@ -216,10 +204,10 @@ def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
         places = np.stack([points.x[rows], points.y[rows]], axis=1)
         count = min(_NEIGHBOURS + 1, rows.size)
         nearest = np.asarray(KDTree(places).query(places, k=count)[1])[:, 1:]
-        around = np.median(residual[rows][nearest], axis=1)
-        left = residual[rows] - around
-        same = left * residual[rows] > 0
-        alone[rows] = np.where(same, np.sign(left) * np.minimum(abs(left), abs(residual[rows])), 0)
+        whole = residual[rows]
+        left = whole - np.median(whole[nearest], axis=1)
+        least = np.sign(left) * np.minimum(abs(left), abs(whole))
+        alone[rows] = np.where(left * whole > 0, least, 0.0)
     return alone
 
 
