@@ -283,7 +283,6 @@ def command(
 def _read(
     paths: tuple[Path, ...], reference: Path | None, pixel_size: str | None
 ) -> tuple[list[Scan], StressProfile | None]:
-    """Read the inputs, and refuse an indenter that cannot calibrate."""
     from memscal.estimation.reference import require_calibration_rod
     from memscal.formats.scan import read_scan
 
@@ -356,7 +355,6 @@ def _show(
     outputs: Sequence[Path],
     as_json: bool,
 ) -> int:
-    """Print the results and the messages; return the exit code."""
     if as_json:
         files = {"schema_version": "1", "artifact": str(outputs[0])}
         values = {name: result.to_dict() for name, result in further.items()}

@@ -179,7 +179,6 @@ def command(
 
 
 def _check_usage(options: Mapping[str, Any]) -> None:
-    """Refuse options that do not go together, before anything is read."""
     friction, loadings, macroscopic = (
         options[name] for name in ("friction", "loadings", "macroscopic")
     )

@@ -96,8 +96,7 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     settings |= {name: options[name] for name in ("load", "repeats", "method")}
     settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
     planned = design(kernel=common.kernel_from(options), want=dict(targets), vary=vary, **settings)
-    drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
-    out.write_files(drawn, force=force)
+    out.write_files(out.rendered(partial(planned.plot, vary=vary or "step"), figures), force=force)
 
     if as_json:
         out.emit_json({"schema_version": "1", **planned.to_dict()})

@@ -240,10 +240,8 @@ def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
 
 
 def _set_up(options: dict[str, Any]) -> dict[str, Any]:
-    """Return film and indenter, where options describe them."""
     stated: dict[str, Any] = {}
-    of_film = [name for name in options if name.startswith((*common.FILM, *common.LAW))]
-    if _stated(options, of_film):
+    if _stated(options, [name for name in options if name.startswith((*common.FILM, *common.LAW))]):
         stated["film"] = common.film_from(options)
     if _stated(options, ("radius", "radius_uncertainty", "rod_friction")):
         stated["indenter"] = common.indenter_from(options["indenter"], options)

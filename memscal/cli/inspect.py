@@ -58,8 +58,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     for item in contents["arrays"]:
         shape = " x ".join(str(n) for n in item["shape"]) or "one"
         low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
-        missing = str(item["missing"] or "-")
-        arrays.append((item["path"], shape, low, high, item["unit"], missing))
+        arrays.append((item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")))
     yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
     checks, failed, meanings = [], set(), []
     for i, check in enumerate(contents["checks"]):

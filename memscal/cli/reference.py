@@ -233,7 +233,6 @@ def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) 
 
 
 def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> None:
-    """Print the contacts as a table or as one JSON object; notes go to stderr."""
     from memscal.summaries.contact import contacts_table, depth_messages
 
     messages, warnings = depth_messages(contacts)

@@ -111,13 +111,12 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
 
 
 def _described(scan: Scan, path: Path) -> dict[str, Any]:
-    truth = {k: "inf" if v == math.inf else v for k, v in (scan.synthetic or {}).items()}
     return {
         "scan": str(path),
         "synthetic": True,
         "kind": scan.kind,
         "shape": list(scan.u_zz.shape),
-        "truth_si": truth,
+        "truth_si": {k: "inf" if v == math.inf else v for k, v in (scan.synthetic or {}).items()},
     }
 
 
@@ -242,7 +241,6 @@ def command(
 
 
 def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
-    """Refuse options that contradict each other, or belong to the other experiment."""
     context = click.get_current_context()
     typed = ParameterSource.COMMANDLINE
     others = _SPHERE_NAMES if experiment == "rod" else _ROD_NAMES

@@ -134,8 +134,7 @@ def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         order = np.argsort(x, kind="stable")
         return x[order], u[order]
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)
-    alike = np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
-    return (places, mean) if alike else (x, u)
+    return (places, mean) if np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u) else (x, u)
 
 
 def _joint(data: ApparatusData) -> bool:

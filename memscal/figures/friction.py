@@ -57,8 +57,7 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
         place = bounded(compared.length.values, _MIDDLE)
         label = f"{direction}, {lubricated_words(compared.lubrication)}"
-        colour = COLOURS[_COLOURS[direction]]
-        axes.plot(place, _rise(compared.length), color=colour, label=label)
+        axes.plot(place, _rise(compared.length), color=COLOURS[_COLOURS[direction]], label=label)
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(list(bounded(np.array(_TICKS) * _UM, _MIDDLE)), names)
@@ -118,14 +117,12 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
 
 
 def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> None:
-    """Draw the ratios of one definition of the loading, and the calculated curves."""
     by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
     loads = sorted(by_load)
     curves = np.array([by_load[load] for load in loads])
     ends = []
     ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
-    usual = {float(mu) for mu in comparison.friction if mu in _SHOWN}
-    for mu in sorted(usual.union(ends_of_all)):
+    for mu in sorted({float(mu) for mu in comparison.friction if mu in _SHOWN}.union(ends_of_all)):
         curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
         (line,) = axes.plot(loads, curve, color=profiles.friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
@@ -309,7 +306,6 @@ def likelihood_figure(comparison: FrictionComparison) -> Figure:
 def _draw_likelihood(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
-    """Draw chi-square above its least value of each load and of all loads together."""
     looks = profiles.load_looks(comparison)
     joint = comparison.joint[loads[0].lubrication][loads[0].loading]
     curves = [(at_load.by_profile, *looks[at_load.load], 1.0) for at_load in loads]

@@ -45,7 +45,6 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
 
 
 def _coloured(measured: MeasuredStress) -> Iterator[tuple[MeasuredProfile, str]]:
-    """Yield each profile with the colour of its load."""
     levels: list[float] = []
     for load in sorted(profile.load for profile in measured.profiles):
         if not levels or load > levels[-1] * (1 + _SAME_LOAD):

@@ -33,12 +33,11 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
     of_scan = records.RECONVOLUTION.read_in(reading)
-    reconvolution = read_record(of_scan, file, "/entry/reconvolution")
     return ApparatusData(
         field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
         transfer=apparatus.TransferFunction(**transfer),
-        reconvolution=apparatus.Reconvolution(**reconvolution),
+        reconvolution=apparatus.Reconvolution(**read_record(of_scan, file, "/entry/reconvolution")),
         parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file, "/entry/quality"),
@@ -84,8 +83,7 @@ def artifact_tree(data: ApparatusData) -> Group:
             f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
-    entry = Group("NXentry", children, {"default": "apparatus_function"})
-    return file_tree(ARTIFACT_SCHEMA, entry)
+    return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": "apparatus_function"}))
 
 
 def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:

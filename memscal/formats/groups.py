@@ -241,8 +241,7 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
 
 def estimated_record(file: SafeFile, path: str) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
-    names = text_list(file, f"{path}/names")
-    return Record("NXcollection", tuple(map(estimated_quantity, names)))
+    return Record("NXcollection", tuple(map(estimated_quantity, text_list(file, f"{path}/names"))))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
@@ -267,7 +266,6 @@ def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
 
 
 def _unit_scale(file: SafeFile, path: str) -> float:
-    """How many SI units the unit at a path is."""
     unit = units_of(file, path) or "1"
     return float(to_si(1.0, unit, dimension_of(unit, file.where(path)), file.where(path)))
 

@@ -201,6 +201,5 @@ def _check_row(check: QualityCheck) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> float | int | None:
-    """Return a number, or ``None`` where it is not finite, for standard JSON."""
     number = np.asarray(value).reshape(-1)[0].item()
     return number if np.isfinite(number) else None

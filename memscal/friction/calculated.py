@@ -114,8 +114,7 @@ def normal_compliance_family(
     if law not in ("exponential", "greenwood-tripp"):
         raise InputError(f'law is {law!r}, but it is "exponential" or "greenwood-tripp".')
     if lengths is None:
-        unit = film.roughness_rms or _USUAL_ROUGHNESS
-        lengths = [share * unit for share in _LENGTHS]
+        lengths = [share * (film.roughness_rms or _USUAL_ROUGHNESS) for share in _LENGTHS]
     values = parameter_values("lengths of the normal compliance", lengths)
     if math.isinf(values[-1]):
         raise InputError(
@@ -330,5 +329,4 @@ def _name(profile: StressProfile) -> str:
 
 
 def _numbers(grid: Sequence[Sequence[StressProfile]], name: str) -> FloatArray:
-    """Return a number that tables may state, NaN where they do not."""
     return np.array([[getattr(cell, name) for cell in row] for row in grid], dtype=np.float64)

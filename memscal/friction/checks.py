@@ -166,7 +166,6 @@ def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
 
 
 def _unstated(measured: MeasuredStress) -> list[Message]:
-    """Name what no uncertainty is stated for: the intervals count nothing for it."""
     unstated: dict[str, float | None] = {}
     for profile in measured.profiles:
         film, indenter = profile.scan.film, profile.scan.indenter

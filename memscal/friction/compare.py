@@ -72,9 +72,8 @@ def same_apparatus(
         return measured
     name = f" ({measured.artifact.file_name})" if measured.artifact else ""
     other = f" ({apparatus.source.file_name})" if apparatus.source else ""
-    text = f"the stress was measured with another apparatus function{name} than the given{other}"
     differences = accepted_differences(
-        [text],
+        [f"the stress was measured with another apparatus function{name} than the given{other}"],
         override=override,
         problem="Measured stress and artifact do not belong together",
         why="The stress on the axis, centres and noise are those of the calibration by which "
@@ -213,7 +212,6 @@ def compare(
 def _measured(
     contacts: Sequence[Scan | MeasuredStress], apparatus: ApparatusFunction, override: bool
 ) -> MeasuredStress:
-    """Return the stress of all contacts, measured here where it was not before."""
     require_contacts(scans_of(contacts))
     scans = [item for item in contacts if isinstance(item, Scan)]
     if len(scans) == len(contacts):

@@ -37,8 +37,7 @@ def bracketed_share(
     ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
     allowed = EXPANDED * np.hypot(errors, end_errors)
     above = (ends + allowed).max(axis=0)
-    below = (ends - allowed).min(axis=0)
-    return float(np.mean((below <= measured) & (measured <= above)))
+    return float(np.mean(((ends - allowed).min(axis=0) <= measured) & (measured <= above)))
 
 
 #: Level of one standard deviation of a normal distribution.

@@ -250,9 +250,7 @@ def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
 
 
 def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
-    """Solve the contacts; an error names the loads and the interface that it was about."""
-    rigid = path.interface.rigid
-    usual = _RINGS_OF_A_RIGID_CONTACT if rigid else _RINGS_OF_A_COMPLIANT_CONTACT
+    usual = _RINGS_OF_A_RIGID_CONTACT if path.interface.rigid else _RINGS_OF_A_COMPLIANT_CONTACT
     for rings in (usual, *_OTHER_RINGS):
         try:
             return indent(

@@ -100,8 +100,7 @@ def evidence_of_each(
         taken = Tables(*(array[np.arange(paths), drawn] for array in both))
         before = log_likelihood(taken)[0]
     mean = float(logsumexp(logs)) - math.log(paths)
-    spread = np.std(np.exp(logs - mean)) / np.sqrt(paths)
-    return mean, float(spread)
+    return mean, float(np.std(np.exp(logs - mean)) / np.sqrt(paths))
 
 
 def _compressed(tables: Sequence[Tables]) -> list[Tables]:

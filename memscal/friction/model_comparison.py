@@ -144,7 +144,6 @@ def _other_priors(
 
 
 def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
-    """Weigh the last law against each of the others."""
     *others, last = laws
     return tuple(
         BayesFactor.between(last.name, law.name, last.log_evidence - law.log_evidence)

@@ -191,7 +191,6 @@ class DryAgainstLubricated:
 
 
 def _joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
-    """Return the coefficients of all loads together on one line."""
     return "; ".join(
         f"{lubrication or 'not stated'}, {loading or 'given'}: {estimate}"
         for lubrication, by_loading in joint.items()

@@ -135,8 +135,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     reference.require_calibration_rod(scan, None)
     stress = reference.reference_profile(scan, None)
     points = measured_points(scan)
-    references = reference.reference_spectra([stress], [points])
-    model = ForwardModel(points, references)
+    model = ForwardModel(points, reference.reference_spectra([stress], [points]))
     assert points.u_errors is not None  # the plan's: the voltages themselves have none
     weights = np.asarray(1 / points.u_errors**2)
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))

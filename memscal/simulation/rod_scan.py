@@ -102,8 +102,7 @@ def recorded_shear(
     if (errors := disturbed.errors(shape, largest)) is not None:
         channels["u_xz_errors"] = errors
     volts = {"conversion_constant": constant, **disturbed.in_volts(largest)}
-    truth = {**kernel.describe(), **volts}
-    return channels, {f"{name}_xz": value for name, value in truth.items()}
+    return channels, {f"{name}_xz": value for name, value in {**kernel.describe(), **volts}.items()}
 
 
 def shear_channel(

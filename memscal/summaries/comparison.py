@@ -158,7 +158,6 @@ def _sliding(value: float, uncertainty: float | None) -> dict[str, Any]:
 
 
 def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
-    """Return what was measured at one load, and what each loading makes of it."""
     return {
         "scan": getattr(load.profile.scan.source, "file_name", None),
         **members(records.COMPARED_LOAD, load.profile),
@@ -173,7 +172,6 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
     names = [quantity.name for quantity in records.CALCULATED]
     mu, sticking = comparison.friction, np.isinf(comparison.friction).tolist()
-    calculated = zip(mu, sticking, load.p_max, load.chi_square, load.p_values, strict=True)
     return {
         "effective_friction_coefficient": {
             "by_maximum": _estimate(load.by_maximum),
@@ -183,13 +181,12 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "degrees": load.degrees,
         "profiles": [
             members(records.CALCULATED, None, **dict(zip(names, row, strict=True)))
-            for row in calculated
+            for row in zip(mu, sticking, load.p_max, load.chi_square, load.p_values, strict=True)
         ],
     }
 
 
 def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
-    """Return a coefficient with its interval, how it fits, and its likelihood."""
     return {
         **interface_laws.bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate),
@@ -224,7 +221,6 @@ def notes(comparison: FrictionComparison) -> Iterator[Message]:
 
 
 def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
-    """Say what the calculated profiles do not cover."""
     friction = comparison.friction
     if friction[0] > 0:
         yield Message(
@@ -265,7 +261,6 @@ def _failed(comparison: FrictionComparison) -> Iterator[Message]:
 
 
 def _which(lubrication: str, loading: str) -> str:
-    """Return lubrication and definition of the loading in words."""
     words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
     return ", ".join(word for word in words if word)
 
@@ -295,7 +290,6 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
 
 
 def _maxima_table(comparison: FrictionComparison) -> Table:
-    """Return the measured force and maximum of each load, beside the frictionless maximum."""
     sphere = comparison.measured.profiles[0].scan.indenter
     title = (
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
@@ -320,7 +314,6 @@ def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
 
 
 def _friction_table(comparison: FrictionComparison | ShearComparison, loading: str) -> Table:
-    """Return the effective coefficient of each load by each reading, and of all together."""
     level = next((percent(joint.interval.level) for *_, joint in _joint(comparison)), "95 %")
     way = f"{loading} loading" if loading else "profiles as given"
     title = f"Effective friction coefficient, {way} [{level} interval]"
@@ -395,16 +388,14 @@ def _short(chi_square: float) -> str:
 
 
 def _budget_table(comparison: FrictionComparison | ShearComparison) -> Table:
-    """Return what each source adds to the uncertainty of the coefficient of all loads."""
     columns = {
         _which(lubrication, loading).removesuffix(" loading"): joint
         for lubrication, loading, joint in _joint(comparison)
         if joint.value is not None and joint.budget
     }
-    sources = dict.fromkeys(name for joint in columns.values() for name in joint.budget)
     rows = [
         [name.replace("_", " "), *(_share(joint.budget.get(name)) for joint in columns.values())]
-        for name in sources
+        for name in dict.fromkeys(name for joint in columns.values() for name in joint.budget)
     ]
     if rows:
         totals = [joint.standard_uncertainty for joint in columns.values()]
@@ -420,7 +411,6 @@ def _share(value: float | None) -> str:
 
 
 def _macroscopic_table(comparison: FrictionComparison) -> Table:
-    """Return where the macroscopic coefficient stands beside the effective ones."""
     if comparison.macroscopic is None:
         return Table("", ("", ""), [])
     value, u = comparison.macroscopic
@@ -448,7 +438,6 @@ def _checks_table(checks: Sequence[QualityCheck]) -> Table:
 
 
 def _lubrication_table(comparison: FrictionComparison) -> Table:
-    """Return how far dry and lubricated stress differ at each load."""
     load, maximum, _, relative, *_ = records.DRY_AGAINST_LUBRICATED
     rows = [
         [

@@ -47,7 +47,6 @@ def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str
 
 
 def _deep(contact: Contact) -> str:
-    """Say where linear elasticity is formal."""
     share = contact.depth / contact.film.thickness
     if share <= _SHALLOW or contact.strain == "finite":
         return ""
@@ -106,7 +105,6 @@ def _numbers(name: str, contacts: Sequence[Contact], form: str = ".4g") -> dict[
 
 
 def _title(contact: Contact) -> str:
-    """Say in one line what was pressed on what, and how it was solved."""
     film = contact.film
     friction = "sticking" if math.isinf(contact.friction) else f"friction {contact.friction:.4g}"
     friction = friction if contact.friction else "frictionless"

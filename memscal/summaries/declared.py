@@ -79,8 +79,7 @@ def cell(quantity: Quantity, holder: object, /, *, unit: str | None = None, **va
     names = (quantity.name, quantity.name + _UNCERTAINTY)
     value, u = (_value(name, holder, values) for name in names)
     spread = None if u is None else u / quantity.scale
-    shown = quantity.unit if unit is None else unit
-    return format_measured(value / quantity.scale, spread, shown)
+    return format_measured(value / quantity.scale, spread, quantity.unit if unit is None else unit)
 
 
 def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:

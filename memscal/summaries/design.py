@@ -75,7 +75,6 @@ def _percent(share: float) -> str:
 
 
 def _contributions_table(planned: Design) -> Table:
-    """Return the share of each source in the uncertainties of A and both widths."""
     shares = {
         name: {s: u / abs(planned.parameters[name]) for s, u in planned.budget[name].items()}
         for name in _SHOWN

@@ -59,7 +59,6 @@ def _best(compared: results.LawComparison, law: results.InterfaceLaw) -> str:
 
 
 def _length_table(direction: str, compared: results.LawComparison) -> Table:
-    """Return the length by which the interface yields, and how the evidence stands."""
     words = "slip length" if direction == "tangential" else "length"
     length = str(compared.length)
     rows = []

@@ -56,5 +56,4 @@ def frame(result: MonteCarlo) -> DataFrame:
 
     names = [comparison.name for comparison in result.comparisons]
     quantities = [estimated_quantity(name).read_in(result.reading) for name in names]
-    columns = [f"{q.name} ({q.si_unit})" for q in quantities]
-    return pd.DataFrame(result.samples, columns=columns)
+    return pd.DataFrame(result.samples, columns=[f"{q.name} ({q.si_unit})" for q in quantities])

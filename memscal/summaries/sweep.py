@@ -24,8 +24,7 @@ def tables(result: Sweep) -> list[Table]:
     scales, forms = (constant.scale * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
     for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
-        values = getattr(result, quantity.name) / scale
-        columns.append([_number(value, form) for value in values])
+        columns.append([_number(value, form) for value in getattr(result, quantity.name) / scale])
     for (_, name), scale, form in zip(_RESULTS, scales, forms, strict=True):
         drawn = (draws[np.isfinite(draws)] for draws in getattr(result, name))
         medians = [float(np.median(draws)) if draws.size else np.nan for draws in drawn]

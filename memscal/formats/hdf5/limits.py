@@ -204,8 +204,7 @@ def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
     chunk = plist.get_chunk()
     shape = dataset.shape
     size = int(math.prod(chunk)) * int(dataset.get_type().get_size())
-    limit = max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset))
-    if size > limit or size > MAX_DATASET_BYTES:
+    if size > max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset)) or size > MAX_DATASET_BYTES:
         problem = f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data"
         raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
     number = math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True))

@@ -199,8 +199,7 @@ def tree_to_bytes(root: Group) -> bytes:
             elif isinstance(node, Number):
                 _write_number(file, path, node)
             else:
-                text = _plain_text(node)
-                file.create_dataset(path, data=text, dtype=_TEXT, track_times=False)
+                file.create_dataset(path, data=_plain_text(node), dtype=_TEXT, track_times=False)
         _attach_scales(file, root)
     return memory.getvalue()
 

@@ -235,7 +235,6 @@ def _checked(
     *,
     tensor_order: bool,
 ) -> Mesh:
-    """Return the mesh that meshio read, if it can be worked with."""
     points = np.asarray(arrays[header["points"]], dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
         raise _unusable(sources[0], f"points of shape {points.shape}")
@@ -252,8 +251,7 @@ def _checked(
         notes.append(f"meshio says: {words}")
     if not header["limited"]:
         notes.append("It was read without a limit of memory, which this system does not offer.")
-    fields = {key: arrays[i] for key, i in header["point_data"].items()}
-    point_data = _fields(fields, len(points))
+    point_data = _fields({key: arrays[i] for key, i in header["point_data"].items()}, len(points))
     return Mesh(points, cells, point_data, sources, tuple(notes), tensor_order)
 
 

@@ -139,8 +139,7 @@ def average_over_circles(
         cure = "Name the axis across the film (vertical; --vertical)."
         raise InputError("The nodes on the base of the film lie on one line.", cure=cure) from error
     # Circles of which less than half as much is inside as of others are left out: the corners.
-    inside = np.isfinite(next(iter(fields.values())))
-    share = inside.sum(axis=1)
+    share = np.isfinite(next(iter(fields.values()))).sum(axis=1)
     kept = share >= max(1, share.max() / 2)
     means = {name: np.nansum(values[kept], axis=1) / share[kept] for name, values in fields.items()}
     first = next(iter(columns))
