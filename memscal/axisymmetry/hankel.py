@@ -160,7 +160,6 @@ def _panel_edges(knots: FloatArray, end: float, fastest: float) -> FloatArray:
     """Ends of panels between knots from the axis to ``end`` that hold little of a phase."""
     knots = np.unique(np.concatenate([[0.0], knots, [end]]))
     pieces = np.maximum(np.ceil(np.diff(knots) * fastest / _TABLE_PHASE), 1).astype(int)
-    starts = np.repeat(knots[:-1], pieces)
     widths = np.repeat(np.diff(knots) / pieces, pieces)
     within = np.concatenate([np.arange(count) for count in pieces])
-    return np.append(starts + within * widths, knots[-1])
+    return np.append(np.repeat(knots[:-1], pieces) + within * widths, knots[-1])

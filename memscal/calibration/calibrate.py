@@ -506,9 +506,8 @@ def _effects(
         # Two laws differ by too much for the first order: calibrated by the other one, too.
         with suppress(MemscalError):
             others = others or [press_neo_hookean(scan) for scan in scans]
-            channel = estimate.points.channel
             both = solution.other is not None
-            exact = solve(scans, others, solution.method, channel, both=both)
+            exact = solve(scans, others, solution.method, estimate.points.channel, both=both)
             effects["model_form"] = replace(effects["model_form"], exact=exact)
     return effects
 

@@ -383,10 +383,9 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     change = 2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal
     force = abs(carried_force(solution.stress, estimate.model.reference) - 1.0)
     outliers = float(np.mean(estimate.outlier_weight < quality.OUTLIER_WEIGHT))
-    transfer = float(gaussian_transfer(np.array(resolved), sigma))
     tail = _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT
     values = {
-        "resolved_band": (transfer, _BAND_LIMIT),
+        "resolved_band": (float(gaussian_transfer(np.array(resolved), sigma)), _BAND_LIMIT),
         "tail_share": (solution.tail_share, tail),
         "baseline_drift": (change, _BASELINE_DRIFT_LIMIT),
         "reference_force": (force, _FORCE_LIMIT),

@@ -260,8 +260,7 @@ def free_thickness(solution: Solution) -> FreeThickness:
         pairs = zip(films, stated + z * u, strict=True)
         at = {film: replace(film, thickness=float(h)) for film, h in pairs}
         rods = [press_rod(at[s.set_up.film], *s.set_up[1:], s.rod_friction) for s in scans]
-        references = reference_spectra(rods, points, nodes)
-        model = ForwardModel(estimate.points, references)
+        model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
         both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
         return np.asarray(both - z @ z / 2)
 

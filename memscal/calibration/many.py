@@ -103,9 +103,8 @@ def calibrate_many(
     """
     require_workers(workers)
     if isinstance(scans, Scan | str | PathLike):
-        problem = "calibrate_many() was given one scan."
         cure = "Give a list of scans; calibrate one with memscal.calibrate(scan)."
-        raise InputError(problem, cure=cure)
+        raise InputError("calibrate_many() was given one scan.", cure=cure)
     method, seed = options.get("method", "white-noise"), options.get("seed", 0)
     others = ("reference", "alternative", "channel", "method", "correlations", "seed", "relative")
     of_method = {name: value for name, value in options.items() if name not in others}

@@ -351,9 +351,8 @@ def monte_carlo(
             progress(done, draws)
     if len(rows) < 2:
         problem = f"{len(failures)} of {draws} draws could not be calibrated."
-        why = f"The first one: {failures[0]}"
         cure = "The scan is close to failing, too; measure with less noise."
-        raise FitError(problem, why=why, cure=cure)
+        raise FitError(problem, why=f"The first one: {failures[0]}", cure=cure)
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
     expected, deconvolution = uncertainty.expected_values(solution), solution.deconvolution
     comparisons = tuple(
@@ -396,9 +395,8 @@ def _compared(
     kurtosis = float(np.mean(square**2) / np.mean(square) ** 2) if spread > 0 else 1.0
     error = spread * float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * column.size)))
     # Beyond what the number of draws allows: two standard errors.
-    same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
-    agrees = same_spread and same_mean
+    agrees = abs(spread - u) <= _TOLERANCE * u + 2 * error and same_mean
     low, high = np.quantile(column, _TAILS)
     first, last = shortest_interval(column)
     return BudgetComparison(

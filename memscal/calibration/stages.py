@@ -85,10 +85,9 @@ def solved(
     other: Method = WhiteNoise() if isinstance(method, Bayesian) else Bayesian()
     divisible = smoothed is not None and fields.even and _of_round_fields(estimate)
     beside = deconvolve(estimate, band, fields, other) if both and divisible else None
-    result = deconvolve(estimate, band, fields, method)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
-    return Solution(*steps, result, beside, gaussian)
+    return Solution(*steps, deconvolve(estimate, band, fields, method), beside, gaussian)
 
 
 def require_profile(

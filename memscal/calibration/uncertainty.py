@@ -178,8 +178,7 @@ def correlation_matrix(
     """Return the correlation matrix of inputs, the identity but for the stated pairs."""
     matrix = np.eye(len(sources))
     for pair, coefficient in correlations.items():
-        unknown = [name for name in pair if name not in sources]
-        if unknown or len(set(pair)) != 2:
+        if any(name not in sources for name in pair) or len(set(pair)) != 2:
             problem = f"A correlation is given for {' and '.join(map(repr, pair))}."
             why = "It must be between two inputs whose uncertainty is stated."
             raise InputError(problem, why=why, cure=f"Choose from {', '.join(sources) or 'none'}.")
@@ -504,9 +503,8 @@ def route_difference(solution: Solution) -> float | None:
     difference = linear.direct @ (estimate.points.u - estimate.predicted)
     variance = np.sum(np.hstack([noise, moved @ _fixed_root(estimate)]) ** 2, axis=1)
     rings = ring_areas(division.g.r)
-    of_a = abs(difference[0]) / np.sqrt(variance[0])
     of_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
-    return float(max(of_a, of_g))
+    return float(max(abs(difference[0]) / np.sqrt(variance[0]), of_g))
 
 
 def _drawn_columns(

@@ -319,9 +319,8 @@ def chosen_method(method: str | Method, options: Mapping[str, Any], **seed: int)
         return create_regulariser(method, **seed, **options)
     divides = isinstance(method, Bayesian) or callable(getattr(method, "divide", None))
     if isinstance(method, type) or not divides:
-        problem = f"The method is {method!r}, which cannot divide fields."
         cure = "Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov."
-        raise InputError(problem, cure=cure)
+        raise InputError(f"The method is {method!r}, which cannot divide fields.", cure=cure)
     if options:
         raise InputError(
             f"Options {', '.join(options)} were given beside a regulariser that is set up already.",

@@ -253,9 +253,8 @@ def normalise(quotient: Field) -> tuple[float, Field]:
     a = quotient.integral
     if not a > 0:
         problem = f"The quotient of the fields adds up to {a:.3g} V/Pa."
-        why = "A conversion constant is positive."
         cure = "Look at the deconvolved field; choose another method or less regularisation."
-        raise FitError(problem, why=why, cure=cure)
+        raise FitError(problem, why="A conversion constant is positive.", cure=cure)
     return a, Field(quotient.grid, quotient.values / a)
 
 

@@ -104,9 +104,8 @@ class ForwardModel:
 
     def table(self, order: int) -> tuple[FloatArray, FloatArray]:
         """Radii (t,) that reach beyond the scans, and a Bessel function there, (t, nodes)."""
-        span = np.hypot(np.ptp(self.points.x), np.ptp(self.points.y))
         # Rounded up, so that parts of one raster share their tables.
-        reach = 1.25e-3 * np.ceil(1e3 * span)
+        reach = 1.25e-3 * np.ceil(1e3 * np.hypot(np.ptp(self.points.x), np.ptp(self.points.y)))
         return bessel_table(order, float(reach), self.k.tobytes())
 
     def geometry(self, centres: FloatArray) -> Geometry:

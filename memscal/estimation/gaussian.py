@@ -69,9 +69,8 @@ def _require_parity(
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
-    same = float(even[1].min())
     name, along = f"u_{points.channel}", points.channel[0]
-    if same < _CLEARLY * min(right, turned):
+    if float(even[1].min()) < _CLEARLY * min(right, turned):
         raise InputError(
             f"{name} is the same on both sides of the sensor.",
             why="A shear changes its sign where the indenter passes the sensor; a normal stress "
@@ -272,10 +271,9 @@ def _solve(
         return last[key]
 
     # Typical size of each parameter, so that the solver sees numbers near one.
-    width = max(abs(start[1]), 0.05 * _smoothing_length(model))
     centres, ellipse = int(model.points.free.sum()), model.points.ellipse
     scale = np.full(start.size, np.ptp(model.points.u))
-    scale[: 2 + centres] = width
+    scale[: 2 + centres] = max(abs(start[1]), 0.05 * _smoothing_length(model))
     scale[0] = abs(start[0])
     scale[start.size - ellipse :] = _TYPICAL_ELLIPTICITY
     unexplained = model.points.u - evaluate(start / scale).predicted

@@ -299,9 +299,8 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     stated = [points.u_errors for points in scans if points.u_errors is not None]
     if len(stated) not in (0, len(scans)):
         problem = "Some of the scans state their noise (u_zz_errors) and others do not."
-        why = "It determines their relative weights."
         cure = "State it in every scan, or leave it out of every one."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(problem, why="It determines their relative weights.", cure=cure)
     first_repeat = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans[:-1])])
     repeats = [points.repeat + first for points, first in zip(scans, first_repeat, strict=True)]
     numbers = [np.full(points.u.size, i, dtype=np.intp) for i, points in enumerate(scans)]

@@ -200,8 +200,7 @@ def runs_test(residuals: Residuals) -> TestOutcome:
     # 11, 1940, count runs for an unknown median).  One-sided, for too few; the p-value is discrete.
     values, rest = residuals.independent
     same_pass = np.diff(residuals.sequence[rest]) == 0
-    changed = np.diff(values > 0) & same_pass
-    pairs, changes = int(same_pass.sum()), int(changed.sum())
+    pairs, changes = int(same_pass.sum()), int((np.diff(values > 0) & same_pass).sum())
     # The fewest changes that chance allows.
     fewest = int(np.argmax(bdtr(np.arange(pairs + 1.0), pairs, 0.5) > FALSE_ALARM))
     share = (pairs - changes) / max(pairs, 1)
@@ -249,7 +248,6 @@ def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
     moved = matrix @ basis
     within = basis.T @ moved
     squared = matrix @ matrix
-    first = -np.trace(within)
     second = squared.trace() - 2 * np.sum(moved**2) + np.trace(within @ within)
     third = (
         (matrix * squared).sum()
@@ -257,7 +255,7 @@ def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
         + 3 * np.sum(within * (moved.T @ moved))
         - np.trace(within @ within @ within)
     )
-    return float(first), float(second), float(third)
+    return float(-np.trace(within)), float(second), float(third)
 
 
 def orthonormal(design: FloatArray) -> FloatArray:

@@ -225,8 +225,7 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
 
     def loss(log_smoothing: float) -> float:
         smoothing = squares[0] * np.exp(log_smoothing)
-        kept = squares / (squares + smoothing)
-        misfit = max(total - float(power @ kept), _LEAST * total)
+        misfit = max(total - float(power @ (squares / (squares + smoothing))), _LEAST * total)
         return float(count * np.log(misfit) + np.log1p(squares / smoothing).sum())
 
     grid = np.arange(-80.0, 11.0, 1.0)
@@ -239,9 +238,8 @@ def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
     """Return even B-splines on even knots from zero: their derivatives at radii, (n, m)."""
     from scipy.interpolate import BSpline
 
-    step = knots[1] - knots[0]
     both = np.concatenate([-knots[:0:-1], knots])
-    outside = step * np.arange(_DEGREE, 0, -1)
+    outside = (knots[1] - knots[0]) * np.arange(_DEGREE, 0, -1)
     extended = np.concatenate([both[0] - outside, both, both[-1] + outside[::-1]])
     count = extended.size - _DEGREE - 1
     spline = BSpline(extended, np.eye(count), _DEGREE)

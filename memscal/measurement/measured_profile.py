@@ -52,8 +52,7 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     for group in np.split(order, starts):
         load = float(np.nanmedian(scan.normal_load[np.isin(passes, group)]))
         u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
-        only = scan.only_passes(np.sort(group))
-        singles.append(replace(only, load=load, load_uncertainty=u))
+        singles.append(replace(scan.only_passes(np.sort(group)), load=load, load_uncertainty=u))
     return tuple(singles)
 
 
@@ -153,9 +152,8 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
         complete &= np.isfinite(scan.normal_load)
     if not complete.any():
         problem = f"{load_of(scan)}: all {complete.size} points are missing (NaN)."
-        why = "A load without voltages has no profile."
         cure = "Check the import, or leave the lines of that load out."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(problem, why="A load without voltages has no profile.", cure=cure)
     if scan.y is not None:
         return
     order = np.argsort(scan.x)

@@ -330,8 +330,7 @@ def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
             more, less = (film_transfer(replace(scan, film=film), wavenumbers) for film in films)
             columns.append(share * (more - less))
     film = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    rubber = replace(scan, film=film)
-    if law_at_once(rubber) != LINEAR:
+    if law_at_once(replace(scan, film=film)) != LINEAR:
         changes = law_sensitivities(scan, linear).values()
         columns += [_per_pressure(scan, linear, change * scan.stated_load) for change in changes]
     return np.stack(columns, axis=1) if columns else np.zeros((wavenumbers.k.size, 0))

@@ -118,9 +118,8 @@ def read_expected(expected: Expected) -> StressProfile | Contact:
         return read_reference(expected)
     if isinstance(expected, StressProfile | Contact):
         return expected
-    problem = f"The expected stress is a {type(expected).__name__}."
     cure = "Give a contact from memscal.indent(), a StressProfile, or the path of a file."
-    raise InputError(problem, cure=cure)
+    raise InputError(f"The expected stress is a {type(expected).__name__}.", cure=cure)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -345,9 +344,8 @@ class Restoration(Result, Checked):
         """Matrix from the transform at the nodes to values at radii."""
         radii, reach = np.abs(np.asarray(r, dtype=np.float64)), reach_of(self.points)
         if not np.all(radii <= reach):
-            problem = f"A radius is {np.max(radii) * 1e3:.4g} mm."
             why = f"The stress was restored out to {reach * 1e3:.4g} mm."
             cure = "Give radii in metres, within 1.5 times the scan's width."
-            raise InputError(problem, why=why, cure=cure)
+            raise InputError(f"A radius is {np.max(radii) * 1e3:.4g} mm.", why=why, cure=cure)
         wavenumbers = self.posterior.estimate.model.reference.wavenumbers
         return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)

@@ -90,8 +90,7 @@ def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
         context.prec = 800  # the widest span of two doubles
         number, spread = Decimal(repr(float(value))), Decimal(repr(float(uncertainty)))
         for _ in range(2):  # 0.0996 gives 0.10, not 0.100
-            place = Decimal(1).scaleb(spread.adjusted() - 1)
-            spread = spread.quantize(place)
+            spread = spread.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
         number = number.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
         exponent = max(number.adjusted() if number else spread.adjusted(), spread.adjusted())
         if exponent in _PLAIN_EXPONENTS:

@@ -132,8 +132,7 @@ def _neighbours(positions: FloatArray, repeat: IntArray) -> tuple[float, IntArra
             distances = KDTree(places).query(places, k=[2])[0]
             usual.append(float(np.quantile(distances, _TWICE, method="lower")))
     close = max(_CLOSE * min(usual, default=0.0), _ROUNDING)
-    distinct = np.unique(positions, axis=0)
-    pairs = KDTree(distinct).query_pairs(close, output_type="ndarray")
+    pairs = KDTree(np.unique(positions, axis=0)).query_pairs(close, output_type="ndarray")
     return close, np.asarray(pairs, dtype=np.intp)
 
 
