@@ -35,10 +35,8 @@ def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
     if isinstance(measured, str | PathLike):
         return read_stress(measured)
     if not isinstance(measured, MeasuredStress):
-        raise InputError(
-            f"There is a {type(measured).__name__} where measured stress is needed.",
-            cure="Give what measure_stress returns, or the path of its file.",
-        )
+        problem = f"There is a {type(measured).__name__} where measured stress is needed."
+        raise InputError(problem, cure="Give what measure_stress returns, or the path of its file.")
     return measured
 
 
