@@ -35,8 +35,10 @@ def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
     if isinstance(measured, str | PathLike):
         return read_stress(measured)
     if not isinstance(measured, MeasuredStress):
-        problem = f"There is a {type(measured).__name__} where measured stress is needed."
-        raise InputError(problem, cure="Give what measure_stress returns, or the path of its file.")
+        raise InputError(
+            f"There is a {type(measured).__name__} where measured stress is needed.",
+            cure="Give what measure_stress returns, or the path of its file.",
+        )
     return measured
 
 
