@@ -339,7 +339,6 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     transfer = data.transfer
     k, limit = transfer.k / PER_MM, transfer.resolved_wavenumber / PER_MM
     end = min(float(k[-1]), 2.0 * limit if np.isfinite(limit) and limit > 0 else np.inf)
-    shown = k <= end
     band = _EXPANDED * transfer.modulus_errors
     blue = COLOURS["deconvolved"]
     low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
@@ -353,7 +352,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
         hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
         hatched.set(zorder=0, label="extrapolated")
         axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
-    top = max(1.1, min(1.1 * _largest(transfer.modulus[shown]), 3.0))
+    top = max(1.1, min(1.1 * _largest(transfer.modulus[k <= end]), 3.0))
     axes.set(xlim=(0.0, end), ylim=(0.0, top))
     axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)")
     legend_above(axes)

@@ -39,9 +39,8 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
     if isinstance(comparison, FrictionComparison):
         loads = comparison.loads[comparison.loadings[0]]
     if laws is None:
-        problem = "There is no law of the interface to draw."
         cure = "Compare with interface=True and a macroscopic friction coefficient."
-        raise InputError(problem, cure=cure)
+        raise InputError("There is no law of the interface to draw.", cure=cure)
     slip = laws.tangential
     implied = None if slip is None else slip.implied
     with panels_of(3.0, 1, 2 if implied is None else 3) as (figure, panels):
