@@ -197,10 +197,7 @@ def tree_to_bytes(root: Group) -> bytes:
                 for name, value in node.all_attributes.items():
                     _write_attribute(group, name, value)
             elif isinstance(node, Number):
-                compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
-                item = file.create_dataset(path, data=node.values, track_times=False, **compressed)
-                for name, value in _attributes(node).items():
-                    _write_attribute(item, name, value)
+                _write_number(file, path, node)
             else:
                 file.create_dataset(path, data=_plain_text(node), dtype=_TEXT, track_times=False)
         _attach_scales(file, root)
@@ -213,6 +210,14 @@ def _with_contents(root: Group, text: str) -> Group:
     listing = note(text, media_type="application/json", description=_CONTENTS)
     entry = replace(entry, children={**entry.children, "contents": listing})
     return replace(root, children={**root.children, "entry": entry})
+
+
+def _write_number(file: Any, path: str, node: Number) -> None:
+    # The dataset is closed on return: while it is open HDF5 lays the next ones out otherwise.
+    compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
+    dataset = file.create_dataset(path, data=node.values, track_times=False, **compressed)
+    for name, value in _attributes(node).items():
+        _write_attribute(dataset, name, value)
 
 
 def _write_attribute(item: Any, name: str, value: Attribute) -> None:
