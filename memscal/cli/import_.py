@@ -229,9 +229,8 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
     unused = _stated(options, (*_OF_TABLES, *_READING) if mesh else _OF_MESHES)
     if unused and kind == "reference":
-        raise click.UsageError(
-            f"A {'mesh' if mesh else 'table'} has no use for {common.named(unused)}."
-        )
+        problem = f"A {'mesh' if mesh else 'table'} has no use for {common.named(unused)}."
+        raise click.UsageError(problem)
 
 
 def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:

@@ -32,11 +32,9 @@ def emit(text: str) -> None:
         _discard_stdout()
     except OSError as failure:
         _discard_stdout()
-        raise OutputError(
-            f"The results cannot be printed: {failure.strerror}.",
-            why="They go to standard output.",
-            cure="Free some space, or send standard output elsewhere.",
-        ) from failure
+        problem = f"The results cannot be printed: {failure.strerror}."
+        cure = "Free some space, or send standard output elsewhere."
+        raise OutputError(problem, why="They go to standard output.", cure=cure) from failure
 
 
 def _write_all(stream: TextIO, text: str) -> None:

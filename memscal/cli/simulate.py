@@ -259,9 +259,8 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
         if experiment == "sphere" and len(set(options[name])) < len(options[name]):
-            raise click.UsageError(
-                "A load of the sphere is given twice: give it once, and --repeats."
-            )
+            problem = "A load of the sphere is given twice: give it once, and --repeats."
+            raise click.UsageError(problem)
 
 
 def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:

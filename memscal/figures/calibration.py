@@ -282,7 +282,11 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: _Loads) -> None:
         rms = np.sqrt(np.mean(z**2))
         points.set(color=colour, markerfacecolor=face, label=f"{name}: rms {rms:.2f}")
         points.set(rasterized=many, markeredgewidth=0.3 if many else 0.7)
-        _mark_beyond(axes, x, z, limit, colour)
+        for side, mark in ((1, "^"), (-1, "v")):
+            beyond = side * z > limit
+            if np.any(beyond):
+                edge = np.full(int(np.sum(beyond)), 0.93 * side * limit)
+                axes.plot(x[beyond] / MM, edge, mark, color=colour, ms=4, label="_beyond the axis")
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
     limit_to_scan(axes, scan.x)
@@ -297,14 +301,6 @@ def _standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
         rms = float(np.sqrt(np.mean(scan.residual**2)))
         errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
     return scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors, scale
-
-
-def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour: str) -> None:
-    for side, marker in ((1, "^"), (-1, "v")):
-        beyond = side * z > limit
-        if np.any(beyond):
-            edge = np.full(int(np.sum(beyond)), 0.93 * side * limit)
-            axes.plot(x[beyond] / MM, edge, marker, color=colour, ms=4, label="_beyond the axis")
 
 
 _LOG_DECADES = 4.0
@@ -342,10 +338,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     """Draw the transfer function's modulus, the window, and the resolved band."""
     transfer = data.transfer
     k, limit = transfer.k / PER_MM, transfer.resolved_wavenumber / PER_MM
-    end = float(k[-1])
-    if np.isfinite(limit) and limit > 0:
-        end = min(end, 2.0 * limit)
-    shown = k <= end
+    end = min(float(k[-1]), 2.0 * limit if np.isfinite(limit) and limit > 0 else np.inf)
     band = _EXPANDED * transfer.modulus_errors
     blue = COLOURS["deconvolved"]
     low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
@@ -359,7 +352,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
         hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
         hatched.set(zorder=0, label="extrapolated")
         axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
-    top = max(1.1, min(1.1 * _largest(transfer.modulus[shown]), 3.0))
+    top = max(1.1, min(1.1 * _largest(transfer.modulus[k <= end]), 3.0))
     axes.set(xlim=(0.0, end), ylim=(0.0, top))
     axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)")
     legend_above(axes)

@@ -72,7 +72,6 @@ def _draw_transfer(axes: Axes, planned: Design) -> None:
 
 def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
     label, scale = _AXES[vary]
-    number = getattr(planned.plan, vary)
     designs = varied_designs(planned, vary, _values(planned, vary))
     along = np.array([getattr(varied.plan, vary) for varied in designs]) / scale
     for name, symbol, colour, marker in _CURVES:
@@ -82,7 +81,7 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
         axes.plot(along, 100 * share, label=symbol, **shown)
         axes.plot(along, 100 * np.array(noise), ls="--", mfc="none", **shown)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
-    axes.axvline(number / scale, color=COLOURS["muted"], ls=":", lw=0.8)
+    axes.axvline(getattr(planned.plan, vary) / scale, color=COLOURS["muted"], ls=":", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty (%)")
     # 0.5 and 20 in place of powers of ten: the axes span a decade or two.
     for axis in (axes.xaxis, axes.yaxis):

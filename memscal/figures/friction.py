@@ -39,9 +39,8 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
     if isinstance(comparison, FrictionComparison):
         loads = comparison.loads[comparison.loadings[0]]
     if laws is None:
-        problem = "There is no law of the interface to draw."
         cure = "Compare with interface=True and a macroscopic friction coefficient."
-        raise InputError(problem, cure=cure)
+        raise InputError("There is no law of the interface to draw.", cure=cure)
     slip = laws.tangential
     implied = None if slip is None else slip.implied
     with panels_of(3.0, 1, 2 if implied is None else 3) as (figure, panels):
@@ -203,8 +202,6 @@ _ASIDE = 0.008
 #: Differences of chi-square that bound 68.3 % and 95 % of one parameter.
 _LEVELS = ((1.0, "68 %"), (3.84, "95 %"))
 _HIGHEST = 12.0
-#: Entries in one line of a legend.
-_ENTRIES = 7
 
 
 def effective_friction_figure(comparison: FrictionComparison) -> Figure:
@@ -295,7 +292,7 @@ def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
     loads = sorted(of_loads, key=lambda label: float(label.removesuffix(" N")))
     order = [*loads, *(label for label in shown if label not in loads)]
     handles = [shown[label] for label in order]
-    figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), _ENTRIES))
+    figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), 7))
 
 
 def likelihood_figure(comparison: FrictionComparison) -> Figure:

@@ -205,8 +205,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     for name, dimension in dimensions.items():
         children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
-    for axis in _AXES:
-        children[axis] = writer.index_axis(axis, len(parameters.names))
+    children |= {axis: writer.index_axis(axis, len(parameters.names)) for axis in _AXES}
     scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions.values()])
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
     children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
@@ -250,8 +249,7 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
     for quantity, sources in budget.items():
         dimension = dimensions.get(quantity) or parameter_dimension(quantity)
         group: dict[str, Node] = {"names": to_json(f"budget of {quantity}", list(sources))}
-        for source, value in sources.items():
-            group[source] = si(float(value), dimension)
+        group |= {source: si(float(value), dimension) for source, value in sources.items()}
         children[quantity] = Group("NXcollection", group)
     return Group("NXcollection", children)
 
@@ -445,9 +443,8 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
 
 def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
-    checks = []
-    for name in text_list(file, f"{path}/names"):
-        stated = {"name": name, "meaning": ""}
-        values = read_record(records.CHECK, file, f"{path}/{name}", defaults=stated)
-        checks.append(QualityCheck(**values))
-    return tuple(checks)
+    stated = {name: {"name": name, "meaning": ""} for name in text_list(file, f"{path}/names")}
+    return tuple(
+        QualityCheck(**read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults))
+        for name, defaults in stated.items()
+    )

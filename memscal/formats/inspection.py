@@ -150,7 +150,6 @@ def _schema(file: SafeFile) -> str:
 
 
 def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
-    """Yield the groups that such a file may hold, with what is declared for each."""
     yield "/entry/parameters", estimated_record(file, "/entry/parameters")
     yield from _LAYOUTS[schema].items()
     for path in profile_paths(file):

@@ -30,7 +30,6 @@ _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OF_ONE_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _POINTS = ("point",)
-# One name for each axis of the correlation: netCDF tools need each dimension once.
 _PAIRS = ("point", "point_prime")
 _BRANCHES = ", ".join(["0 not stated", *(f"{i} {name}" for name, i in BRANCHES.items())])
 _SYNTHETIC = (
@@ -199,7 +198,6 @@ def _data_group(scan: Scan) -> Group:
 def _nodes(
     scan: Scan, arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]
 ) -> dict[str, Node]:
-    """Return the arrays that there are, along the axes of this scan."""
     return {
         name: si(array, _DECLARED[name].read_in(scan.reading).dimension, axes)
         for name, array in arrays.items()
@@ -231,11 +229,10 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
 
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
     children: dict[str, Node] = {"description": _SYNTHETIC}
-    for name, value in truth.items():
-        if isinstance(value, str):
-            children[name] = value
-        else:
-            children[name] = si(value, groups.parameter_dimension(name))
+    children |= {
+        name: value if isinstance(value, str) else si(value, groups.parameter_dimension(name))
+        for name, value in truth.items()
+    }
     children["names"] = writer.to_json("names of the synthetic truth", list(truth))
     return Group("NXcollection", children)
 

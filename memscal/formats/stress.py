@@ -88,7 +88,6 @@ def _scan_group(scan: MeasuredScan) -> Group:
 _BUDGET = {"force": "force", "maximum": "stress"}
 _PREFIX = "covariance_"
 _MOST_SCANS = 10_000
-# The covariance's second axis has its own name: netCDF tools need each dimension once.
 _AXES = ("r", "r_prime")
 
 
@@ -163,6 +162,9 @@ def _entry(measured: MeasuredStress) -> Group:
     profiles = {f"profile_{i}": group for i, group in enumerate(groups_of, 1)}
     numbered = enumerate(measured.scans, 1)
     scans: dict[str, Node] = {f"scan_{i}": _scan_group(scan) for i, scan in numbered}
+    sources = {"artifact": measured.artifact}
+    sources |= {f"scan_{i}": scan.source for i, scan in enumerate(measured.scans, 1)}
+    inputs: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     first = measured.scans[0]
     sensor, digest = first.sensor.name, measured.artifact_digest
     of_artifact = {"content_sha256": digest} if digest else {}
@@ -178,17 +180,10 @@ def _entry(measured: MeasuredStress) -> Group:
         "instrument": groups.instrument_group(first.sensor),
         "indenter": groups.indenter_group(first.indenter),
         "scans": Group("NXcollection", {"names": to_json("scans", list(scans)), **scans}),
-        "inputs": _inputs_group(measured),
+        "inputs": Group("NXcollection", {"names": to_json("inputs", list(inputs)), **inputs}),
         "process": write_record(records.PROCESS, measured.process),
     }
     return Group("NXentry", children, {"default": [*profiles][-1]})
-
-
-def _inputs_group(measured: MeasuredStress) -> Group:
-    sources = {"artifact": measured.artifact}
-    sources |= {f"scan_{i}": scan.source for i, scan in enumerate(measured.scans, 1)}
-    nodes: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
-    return Group("NXcollection", {"names": to_json("inputs", list(nodes)), **nodes})
 
 
 def _scan_number(file: SafeFile, path: str) -> int:

@@ -142,11 +142,10 @@ def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
         quantity = _registry().Quantity(1.0, _registry().parse_units(unit))
         return quantity + 0 * quantity  # no sum of degrees above another zero, or of logarithms
     except Exception as error:  # pint raises what its parser happens to meet
-        raise UnitError(
-            f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.',
-            why=f"It is a {dimension}.",
-            cure=cure,
-        ) from error
+        problem = (
+            f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.'
+        )
+        raise UnitError(problem, why=f"It is a {dimension}.", cure=cure) from error
 
 
 @functools.cache

@@ -21,18 +21,16 @@ def require_schema(file: SafeFile, schema: str) -> str:
     stored = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
     if stored != schema:
         held = "no memscal schema" if stored is None else f'the schema "{stored}"'
-        raise FormatError(
-            f'{file.name} has {held}, but "{schema}" is needed here.',
-            why=f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds.",
-            cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
-        )
+        problem = f'{file.name} has {held}, but "{schema}" is needed here.'
+        why = f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds."
+        cure = "Give the right file, or make one with `memscal import` or `memscal calibrate`."
+        raise FormatError(problem, why=why, cure=cure)
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
     major = version.partition(".")[0]
     if not (major.isascii() and major.isdigit()):
-        raise FormatError(
-            f'{file.name} has the schema version "{version}", which is not a version.',
-            cure=f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".',
-        )
+        problem = f'{file.name} has the schema version "{version}", which is not a version.'
+        cure = f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".'
+        raise FormatError(problem, cure=cure)
     newest = SCHEMA_VERSION.partition(".")[0]
     if int(major) > int(newest):
         problem = f"{file.name} was written by a newer memscal: {schema} version {version}."

@@ -117,9 +117,8 @@ def normal_compliance_family(
         lengths = [share * (film.roughness_rms or _USUAL_ROUGHNESS) for share in _LENGTHS]
     values = parameter_values("lengths of the normal compliance", lengths)
     if math.isinf(values[-1]):
-        raise InputError(
-            "A length of the normal compliance is infinite: such a film bears no load."
-        )
+        problem = "A length of the normal compliance is infinite: such a film bears no load."
+        raise InputError(problem)
     paths, stronger = (
         [setup.path(friction=0.0, interface=_normal(law, film, float(v), s)) for v in values]
         for s in (1.0, STRONGER)
@@ -303,7 +302,6 @@ def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile 
 
 
 def _checked_friction(profile: StressProfile, reach: float) -> float:
-    """Return a table's friction coefficient; refuse a table that cannot be compared."""
     if profile.friction_coefficient is None:
         problem = f"{_name(profile)} does not say its friction coefficient."
         raise InputError(problem, cure="State it when the table is imported (--friction).")

@@ -150,9 +150,8 @@ def _against_macroscopic(
             else:
                 verdict = "agrees with the macroscopic one"
             words = f" ({loading} loading)" if loading else ""
-            yield Message(
-                "macroscopic", f"The effective friction coefficient{words} {verdict}, {value:.3g}."
-            )
+            text = f"The effective friction coefficient{words} {verdict}, {value:.3g}."
+            yield Message("macroscopic", text)
 
 
 def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:

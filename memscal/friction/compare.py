@@ -270,7 +270,6 @@ def _families(
     loading: str | Sequence[str],
     order: int = 0,
 ) -> dict[str, ProfileFamily]:
-    """Return the calculated profiles at every load that was measured, by loading."""
     values = FRICTIONS if friction is None else tuple(float(mu) for mu in friction)
     if len(values) < 2:
         problem = "One friction coefficient is nothing to choose from."
@@ -290,7 +289,6 @@ def _confronted(
     families: Mapping[str, ProfileFamily],
     channel: str = "zz",
 ) -> dict[str, effective.Confrontation]:
-    """Hold the points of every profile against each family."""
     points = [load_points(profile, channel) for profile in measured.profiles]
     reach = float(max(of_load.radius.max() for of_load in points))
     return {
@@ -307,7 +305,6 @@ def _confronted(
 def _joint(
     measured: MeasuredStress, confronted: Mapping[str, effective.Confrontation]
 ) -> dict[str, dict[str, BoundedEstimate]]:
-    """Return the coefficient of all loads together, for each state of lubrication."""
     by_lubrication: dict[str, list[int]] = {}
     for i, profile in enumerate(measured.profiles):
         by_lubrication.setdefault(profile.lubrication, []).append(i)

@@ -167,9 +167,8 @@ def compare_interface(
 ) -> InterfaceComparison:
     """Weigh laws of the interface; a family without a load within 1 % of each is calculated."""
     if not profiles:
-        raise InputError(
-            "Laws of the interface are compared with measured profiles, but none is given."
-        )
+        problem = "Laws of the interface are compared with measured profiles, but none is given."
+        raise InputError(problem)
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)
@@ -214,9 +213,8 @@ def _messages(
     dry: Sequence[MeasuredProfile],
 ) -> Iterator[Message]:
     if any(not profile.lubrication for profile in dry):
-        yield Message(
-            "lubrication_unstated", "Scans that do not state their lubrication were taken as dry."
-        )
+        text = "Scans that do not state their lubrication were taken as dry."
+        yield Message("lubrication_unstated", text)
     if tangential is not None and uncertainty is None:
         yield Message(
             "uncertainty_unstated",

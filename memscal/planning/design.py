@@ -347,7 +347,6 @@ def _in_words(name: str, value: float) -> str:
 
 
 def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) -> FitError:
-    """Return the error with the best that can be reached, and its limiting source."""
     if not tried:
         cure = "Plan more repeats, less noise, a larger load or a larger half range."
         return FitError(f"No {what} makes a scan that can be calibrated with.", cure=cure)
@@ -356,9 +355,8 @@ def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) 
     best = min(tried, key=lambda design: sign * _reached(design, name))
     goal, reached = (_in_words(name, value) for value in (targets[name], _reached(best, name)))
     length = best.plan.step if what == "step" else best.plan.half_range
-    count = f"a {what} of {length * 1e3:.4g} mm"
-    if what == "repeats":
-        count = f"{best.plan.repeats} repeats"
+    of_length = f"a {what} of {length * 1e3:.4g} mm"
+    count = f"{best.plan.repeats} repeats" if what == "repeats" else of_length
     out_of_reach = f"is out of reach by the {what} alone: the best is {reached}"
     problem = f"{goal[0].upper()}{goal[1:]} {out_of_reach}, with {count}."
     if name == "resolved_wavenumber":

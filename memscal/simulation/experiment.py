@@ -450,5 +450,4 @@ def simulate_experiment(
 
 
 def _as_stated(scan: Scan, truth: Mapping[str, float], **stated: Any) -> Scan:
-    """Return the scan with what the files state, and more of its truth."""
     return replace(scan, synthetic={**(scan.synthetic or {}), **truth}, **stated)

@@ -72,7 +72,6 @@ def advice(apparatus: ApparatusData) -> str:
 
 
 def _of_the_law(apparatus: ApparatusData) -> str:
-    """Return that the law of the film, which is not stated, dominates the uncertainty, if so."""
     dominated = []
     for symbol, name in (("A", "conversion_constant"), ("σ", "gaussian_sigma")):
         form = apparatus.budget.get(name, {}).get("model_form", 0.0)
@@ -91,7 +90,6 @@ def _method(apparatus: ApparatusData) -> str:
 
 
 def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
-    """Return A and the description of G by each method, and by the Gaussian alone."""
     parameters, other = apparatus.parameters, apparatus.other
     own = {name: parameter_json(parameters, name) for name in _OF_A_ROUTE if name in parameters}
     estimates: dict[str, Any] = {_method(apparatus) or "chosen": own}

@@ -316,7 +316,6 @@ def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
 def _friction_table(comparison: FrictionComparison | ShearComparison, loading: str) -> Table:
     level = next((percent(joint.interval.level) for *_, joint in _joint(comparison)), "95 %")
     way = f"{loading} loading" if loading else "profiles as given"
-    title = f"Effective friction coefficient, {way} [{level} interval]"
     shear = isinstance(comparison, ShearComparison)
     loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
     head = [*_LABELS, "by the shear", "χ²/ν", "p"]
@@ -340,7 +339,7 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
             joint, name = by_loading[loading], lubrication or "not stated"
             cells = [str(joint), *_fit(joint)]
             rows.append(["", name, "all", *(cells if shear else ["", *cells, ""])])
-    return Table(title, head, rows)
+    return Table(f"Effective friction coefficient, {way} [{level} interval]", head, rows)
 
 
 def _fit(reading: BoundedEstimate) -> tuple[str, str]:

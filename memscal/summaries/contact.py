@@ -58,7 +58,6 @@ def _deep(contact: Contact) -> str:
 
 
 def _in_rubber(contact: Contact) -> str:
-    """Say what a neo-Hookean film changes under a rod, where that is in the table."""
     film, rod, load = replace(contact.film, law=NEO_HOOKEAN), contact.indenter, contact.load
     if not isinstance(rod, Rod) or not is_tabulated(film, rod, load, math.inf):
         return ""

@@ -90,11 +90,8 @@ def _implied_table(implied: results.ImpliedFriction) -> Table:
 
 
 def _between(value: float, low: float, high: float) -> str:
-    return f"{_short(value)} [{_short(low)}, {_short(high)}]"
-
-
-def _short(value: float) -> str:
-    return friction_name(float(f"{value:.2g}"))
+    best, least, most = (friction_name(float(f"{number:.2g}")) for number in (value, low, high))
+    return f"{best} [{least}, {most}]"
 
 
 def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:

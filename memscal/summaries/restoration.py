@@ -98,7 +98,6 @@ def tables(restored: Restoration) -> list[Table]:
 
 
 def _stress_table(restored: Restoration) -> Table:
-    """Return the stress from the axis to where it has decayed."""
     comparison = restored.comparison
     strong = np.abs(restored.sigma_zz) > _TAIL * float(np.abs(restored.sigma_zz).max())
     last = float(restored.r[np.flatnonzero(strong)[-1]])

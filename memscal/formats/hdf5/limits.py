@@ -202,12 +202,11 @@ def _check_filters(where: str, plist: Any) -> None:
 
 def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
     chunk = plist.get_chunk()
-    shape = dataset.shape
     size = int(math.prod(chunk)) * int(dataset.get_type().get_size())
     if size > max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset)) or size > MAX_DATASET_BYTES:
         problem = f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data"
         raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
-    number = math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True))
+    number = math.prod(-(-n // c) for n, c in zip(dataset.shape, chunk, strict=True))
     if number > _MAX_CHUNKS:
         raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")
     if number and dataset.get_num_chunks() < number:

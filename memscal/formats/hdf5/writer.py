@@ -213,6 +213,7 @@ def _with_contents(root: Group, text: str) -> Group:
 
 
 def _write_number(file: Any, path: str, node: Number) -> None:
+    # The dataset is closed on return: while it is open HDF5 lays the next ones out otherwise.
     compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
     dataset = file.create_dataset(path, data=node.values, track_times=False, **compressed)
     for name, value in _attributes(node).items():

@@ -111,7 +111,6 @@ def run_meshio(
 
 
 def _run(request: str, folder: str, seconds: float, name: str) -> None:
-    """Run the worker to its end, in a folder, within a limit of time by the clock."""
     environment = {key: os.environ[key] for key in _ENVIRONMENT if key in os.environ}
     try:
         done = subprocess.run(
@@ -130,11 +129,10 @@ def _run(request: str, folder: str, seconds: float, name: str) -> None:
     except subprocess.TimeoutExpired:
         late = True
     except OSError as error:
-        raise InputError(
-            "A mesh is read by a process of its own, which cannot be started.",
-            why=f"The system says: {error.strerror or error}.",
-            cure="Run memscal where Python may start itself.",
-        ) from error
+        problem = "A mesh is read by a process of its own, which cannot be started."
+        why = f"The system says: {error.strerror or error}."
+        cure = "Run memscal where Python may start itself."
+        raise InputError(problem, why=why, cure=cure) from error
     if late:
         problem = f"Reading {name} takes longer than {seconds:.3g} s."
         raise UnsafeFileError(problem, why="It was ended.", cure=_AS_VTU)

@@ -321,7 +321,6 @@ def _along_radius(
 def _require_meaning(
     name: str, section: bool, shear: str | None, centre: tuple[float, float] | None
 ) -> None:
-    """Refuse an option that the mesh gives no meaning to."""
     if section and centre is not None:
         problem = f"A centre was given, but the mesh in {name} is a section."
         cure = "Leave out the centre (--centre), or shift the mesh."

@@ -75,7 +75,9 @@ def read_scan_table(
         notes.append(f"The readings are in {u_unit}.")
     if load_column is not None:
         columns["normal_load"] = table.quantity(load_column, load_unit, "force")
-    load = _nominal_load(load, columns, notes)
+    if load is None and "normal_load" in columns:
+        load = float(np.nanmedian(columns["normal_load"]))
+        notes.append(f"The nominal load is the median of the column: {load:g} N.")
     if load_scatter is not None and "normal_load" not in columns:
         if load is None:
             problem = "The scatter of the loads is given, but no load."
@@ -146,7 +148,6 @@ def _placed(columns: Mapping[str, FloatArray], notes: list[str]) -> dict[str, Fl
 
 
 def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
-    """Say how many readings, repeats and places there are, and what is missing."""
     x, y = columns["x"], columns.get("y", np.zeros(columns["x"].size))
     repeat = columns.get("repeat", np.zeros(x.size)).astype(np.intp)
     places = places_of(x, y, repeat)
@@ -215,14 +216,3 @@ def _mixed_loads(
         "pass)."
     )
     return [Message("mixed_loads", text, "warning")]
-
-
-def _nominal_load(
-    load: float | None, columns: Mapping[str, FloatArray], notes: list[str]
-) -> float | None:
-    """Return the load in N: the one given, or the median of the column of loads."""
-    if load is not None or "normal_load" not in columns:
-        return load
-    median = float(np.nanmedian(columns["normal_load"]))
-    notes.append(f"The nominal load is the median of the column: {median:g} N.")
-    return median
