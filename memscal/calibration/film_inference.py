@@ -240,10 +240,9 @@ def require_free(
             "/entry/sample/film/thickness_uncertainty).",
         )
     if any(reference is not None for reference in [*stated, *(scan.reference for scan in scans)]):
-        problem = "A reference is given, of one thickness."
         why = "To estimate the thickness the rod is solved on films of others."
         cure = "Leave the reference out, of the scan's file as well."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError("A reference is given, of one thickness.", why=why, cure=cure)
 
 
 def free_thickness(solution: Solution) -> FreeThickness:

@@ -116,8 +116,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     moved = inside[:, shifted] * shift[axis, np.arange(axis.size)][:, None]
     # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
     columns = np.hstack([inside, inside * (along / np.abs(along).max())[:, None], moved])
-    weights = estimate.weights / estimate.outlier_weight
-    columns = points.standardised(columns, weights)[model.point]
+    columns = points.standardised(columns, estimate.weights / estimate.outlier_weight)[model.point]
     own, moved = np.split(columns, [2 * repeats.size], axis=1)
     base = residuals.orthonormal(np.hstack([model.design, own]))
     rest, free = (values - base @ (base.T @ values) for values in (model.data, moved))

@@ -370,7 +370,6 @@ class _LinearModel:
         return float(self.rest @ self.rest) + self.added * self.freedom
 
     def decompose(self, columns: FloatArray, places: FloatArray) -> _Design:
-        """Decompose weighted columns of departures."""
         free = columns - self.q @ (self.q.T @ columns)
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ self.rest

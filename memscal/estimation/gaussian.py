@@ -182,7 +182,6 @@ def _smoothing_length(model: ForwardModel) -> float:
 
 
 def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
-    """Return the error for a scan that no Gaussian fits."""
     stopped = conversion_constant is not None
     end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
     return FitError(

@@ -417,8 +417,7 @@ def law_at_once(scan: Scan) -> str:
         return LINEAR
     rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     rod, load = scan.set_up[1:]
-    within = is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction)
-    return NEO_HOOKEAN if within else LINEAR
+    return NEO_HOOKEAN if is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction) else LINEAR
 
 
 def rod_spectrum(scan: Scan, reference: RadialSpectrum, law: str) -> FloatArray:

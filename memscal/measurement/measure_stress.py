@@ -266,7 +266,6 @@ def _prepared(
 
 
 def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
-    """Return the error with its file and load in front."""
     problem = f"{one_load.load_of(scan)}: {failure.problem}"
     return type(failure)(problem, why=failure.why, cure=failure.cure)
 
@@ -277,7 +276,6 @@ def _messages(
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
 ) -> Iterator[Message]:
-    """Yield the messages of a measured stress, warnings first."""
     yield from quality.failed_check_messages(checks)
     yield from quality.override_messages(overridden)
     yield from restore.failed_calibration_messages(sensor)

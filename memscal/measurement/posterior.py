@@ -139,7 +139,6 @@ class ShapeFit:
     """The fit of one shape of pressure and of departures from it."""
 
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
-    shape: PressureShape
     state: FloatArray  # (s,): posterior mean
     covariance: FloatArray  # (s, s): expected squared error
     gain: FloatArray  # (s, n): derivative of the state by the voltages
@@ -166,7 +165,6 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     log_information = 2 * float(np.log(np.abs(np.diag(root))).sum())
     growth = start.adopted_noise(weighed.noise) / weighed.noise
     return ShapeFit(
-        shape=shape,
         state=first + rows @ weighed.mean,
         covariance=growth**2 * (rows @ weighed.covariance @ rows.T),
         gain=rows @ weighed.gain,
@@ -217,7 +215,6 @@ class Posterior:
     changes: Mapping[str, FloatArray]  # (s, q) by source: change of the state
     residual: FloatArray  # (n,), in V
     found_noise: float  # of a point of weight one, in V, or over the stated uncertainties
-    shares: Mapping[tuple[float, float], float]  # posterior probability by exponent and shear
     resolved_wavenumber: float  # where the uncertainty is a third of the Gaussian's, rad/m
 
     @property
@@ -275,7 +272,6 @@ def posterior_of(
     changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
     changes["film"][:nodes] += scan.stated_load * of_film * mean[:nodes, None]
     covariances |= {source: columns @ columns.T for source, columns in changes.items()}
-    names = [(fit.shape.exponent, fit.shape.shear) for fit in fits]
     variance = np.sum([np.diag(covariance)[:nodes] for covariance in covariances.values()], axis=0)
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
     lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
@@ -288,7 +284,6 @@ def posterior_of(
         changes=changes,
         residual=np.average([fit.residual for fit in fits], axis=0, weights=shares),
         found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
-        shares=dict(zip(names, shares.tolist(), strict=True)),
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
 
@@ -298,8 +293,7 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     model, kernel = estimate.model, state[: estimate.model.k.size]
     geometry, wavenumbers = estimate.gaussian.geometry, model.reference.wavenumbers
     references = [(RadialSpectrum(wavenumbers, change),) for change in changes.T]
-    models = [replace(model, references=reference) for reference in references]
-    columns = [changed.signal(geometry, kernel) for changed in models]
+    columns = [replace(model, references=own).signal(geometry, kernel) for own in references]
     return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
 
 

@@ -309,8 +309,7 @@ def restore_known(
     checks += [_symmetry(restored), _outliers(restored)]
     if restored.comparison is not None:
         checks.append(_expected(restored.comparison))
-    messages = restoration_messages(restored, checks)
-    return replace(restored, checks=tuple(checks), messages=messages)
+    return replace(restored, checks=tuple(checks), messages=restoration_messages(restored, checks))
 
 
 def gaussian_pressure(
