@@ -29,10 +29,9 @@ from memscal.model.notation import format_measured
 #: thousand (Markov's inequality).
 _LOG_BAYES_LIMIT = -float(np.log(quality.FALSE_ALARM))
 _EDGE = "an edge: a flat top with steep flanks, as of a disc"
-_CORE = "a core of its own: a ring or a spike in the middle"
 _KINDS = {
     **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
-    **dict.fromkeys(("core", "ring"), _CORE),
+    **dict.fromkeys(("core", "ring"), "a core of its own: a ring or a spike in the middle"),
     **dict.fromkeys(("tail", "wide tail"), "tails that fall more slowly than a Gaussian's"),
 }
 

@@ -41,8 +41,7 @@ def calibration_messages(
         )
         messages.append(Message("experimental", text))
     messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
-    messages += _directions(solution.estimate, checks)
-    messages += _method(solution)
+    messages += _directions(solution.estimate, checks) + _method(solution)
     stress = solution.stress
     if not isinstance(stress, Contact) and (form := stress.form) is not None:
         text = (

@@ -164,8 +164,7 @@ class DrawnScans:
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
-        first = self.solution
-        channel = first.estimate.points.channel
+        first, channel = self.solution, self.solution.estimate.points.channel
         return self._results_of(solve(scans, first.stresses, first.method, channel, both=False))
 
     def _results_of(self, solution: Solution) -> FloatArray:

@@ -197,8 +197,6 @@ _TYPICAL_ELLIPTICITY = 0.2
 _KNEE = 3.0
 #: A width below this share of its typical size is left to a search with a trust region.
 _NARROWEST = 0.05
-
-
 #: A width below this share of its standard uncertainty is zero.  Of a sensor that the film hides
 #: entirely, half of the scans give such a width.
 _NO_WIDTH = 0.1
