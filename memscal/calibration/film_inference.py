@@ -110,8 +110,8 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
     solved: dict[str, Solution] = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
-        form: dict[str, Any] = {"law": law}
-        form["mooney_rivlin_ratio"] = ratio if law == reference else None
+        of_law = ratio if law == reference else None
+        form: dict[str, Any] = {"law": law, "mooney_rivlin_ratio": of_law}
         scans = [replace(s, film=replace(s.set_up.film, **form)) for s in solution.scans]
         if law == reference:
             solved[law] = replace(solution, scans=tuple(scans))

@@ -79,9 +79,8 @@ class IdealReference:
         """Return the Fourier transform at ``k`` (rad/m), in m^2; of a slit across it, in m."""
         phase, square = np.asarray(k, dtype=np.float64) * self.size, math.pi * self.size**2
         if self.shape == "disc":
-            return square * np.divide(
-                2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0
-            )
+            far = phase != 0
+            return square * np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=far)
         if self.shape == "slit":
             return np.asarray(self.size * np.sinc(phase / (2 * math.pi)))
         return np.asarray(np.exp(-0.5 * phase**2) * (2 * square or 1.0))
