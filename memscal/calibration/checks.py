@@ -227,8 +227,6 @@ def _prediction(
 _ROUTES_LIMIT = 3.2
 #: Full width of a Gaussian at half of its maximum, over its standard deviation.
 _HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
-#: By simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
-_SHAPE_WIDTH_LIMIT = 2.5
 #: The base stress of a neo-Hookean film differs there from a linear one's by a tenth.
 INDENTATION_LIMIT = 0.1
 _BEYOND = 1.5
@@ -357,8 +355,9 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
         f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
         f"noise: {cure}."
     )
+    # 2.5 by simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
     return [
-        check("shape_width", widest, _SHAPE_WIDTH_LIMIT, spike),
+        check("shape_width", widest, 2.5, spike),
         check("shape_negative", negative, 0.4, ripples),
         check("shape_roughness", rough, 0.1, noise),
     ]

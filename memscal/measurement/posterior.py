@@ -49,8 +49,6 @@ _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
 #: Shears from none to full stick: spheres of a contact radius from half to twice the thickness.
 _SHEARS_INCOMPRESSIBLE = (0.0, -0.2, -0.4)
 _SHEARS_COMPRESSIBLE = (0.0, 0.1, 0.2)
-#: Above this Poisson's ratio a pressed film flows outward under the indenter.
-_FLOWING = 0.4
 #: The transform of a rod's pressure passes through zero: where it is below this share of its force,
 #: the film counts as linear.  Half and twice of it change forces and stresses by less than 0.4 %.
 _LEAST_PRESSURE = 0.1
@@ -109,7 +107,8 @@ class PressureShape:
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
     """Return the shapes that a restoration averages."""
-    shears = _SHEARS_INCOMPRESSIBLE if (film.poisson_ratio > _FLOWING) else _SHEARS_COMPRESSIBLE
+    # Above a Poisson's ratio of 0.4 a pressed film flows outward under the indenter.
+    shears = _SHEARS_INCOMPRESSIBLE if film.poisson_ratio > 0.4 else _SHEARS_COMPRESSIBLE
     return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
 
 
