@@ -161,8 +161,7 @@ class Lattice:
         ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
         kx = 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
         spectrum = plane(ky, kx) * np.exp(1j * np.add.outer(ky * self.y[0], kx * self.x[0]))
-        field = scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size))
-        return np.asarray(field / self.cell_area)
+        return np.asarray(scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size)) / self.cell_area)
 
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the central point."""

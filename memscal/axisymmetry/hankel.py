@@ -53,9 +53,7 @@ def ring_areas(r: FloatArray) -> FloatArray:
 #: Order of a transform across lines: U(x) is the integral of U(k) cos(kx) dk/pi.
 ACROSS = -1
 
-
 _legendre = lru_cache(maxsize=8)(np.polynomial.legendre.leggauss)
-
 
 # Panels of many nodes are nearly as good as one Gauss rule for all (pi nodes an oscillation),
 # and their nodes are computed once.

@@ -120,7 +120,6 @@ def assemble(
 
 
 def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
-    """Return the estimate by the other route, with what is its own."""
     if solution.other is None or results is None:
         return None
     parameters = results.parameters.only(_OF_A_ROUTE)
@@ -432,10 +431,9 @@ def _of_law(
     law, ratio, friction = known
     if law is not None:
         if reference is not None:
-            problem = f"A film law ({law}) and a reference are given."
             why = "A reference has been calculated by a law already."
             cure = "Give one of them (film_law, --film-law; reference, --reference)."
-            raise InputError(problem, why=why, cure=cure)
+            raise InputError(f"A film law ({law}) and a reference are given.", why=why, cure=cure)
         film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=ratio)
         scan = replace(scan, film=film, reference=None)
     stress = scan.reference if reference is None else reference

@@ -29,10 +29,9 @@ from memscal.model.notation import format_measured
 #: thousand (Markov's inequality).
 _LOG_BAYES_LIMIT = -float(np.log(quality.FALSE_ALARM))
 _EDGE = "an edge: a flat top with steep flanks, as of a disc"
-_CORE = "a core of its own: a ring or a spike in the middle"
 _KINDS = {
     **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
-    **dict.fromkeys(("core", "ring"), _CORE),
+    **dict.fromkeys(("core", "ring"), "a core of its own: a ring or a spike in the middle"),
     **dict.fromkeys(("tail", "wide tail"), "tails that fall more slowly than a Gaussian's"),
 }
 
@@ -223,26 +222,14 @@ def _prediction(
     return check(f"held_out_{what}", worst.value, worst.limit, meaning, worst.p_value)
 
 
-_BASELINE_DRIFT_LIMIT = 0.05
-_TAIL_LIMIT = 0.05
-#: A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
-_SHEAR_TAIL_LIMIT = 0.10
-_BAND_LIMIT = 0.5
-_FORCE_LIMIT = 0.01
-_WIDTH_LIMIT = 3.0
 #: Exceeded by at most one good scan in a thousand: by 2 of 3600 simulated of Gaussians, a disc and
 #: tails at 0.1, 0.5 and 2 % noise, both of unstated noise (tests/accuracy/test_division.py).
 _ROUTES_LIMIT = 3.2
 #: Full width of a Gaussian at half of its maximum, over its standard deviation.
 _HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
-#: By simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
-_SHAPE_WIDTH_LIMIT = 2.5
 #: The base stress of a neo-Hookean film differs there from a linear one's by a tenth.
 INDENTATION_LIMIT = 0.1
-_NEGATIVE_LIMIT = 0.4
-_ROUGHNESS_LIMIT = 0.1
 _BEYOND = 1.5
-_NEGLIGIBLE_DIFFERENCE = 0.002
 _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
 
@@ -336,9 +323,8 @@ def _agreements(solution: Solution, results: Results) -> list[QualityCheck]:
     c, (fitted, deconvolved) = parameters.covariance, parameters.values[[i, j]]
     # The misfit is what is looked for: no allowance is made for it.
     variance = c[i, i] + c[j, j] - 2 * c[i, j] - results.budget[_WIDTHS[0]]["misfit"] ** 2
-    variance = max(variance, 0.0)
     # Differences below a fifth of a percent are negligible, however small their noise.
-    allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * fitted)
+    allowed = np.hypot(np.sqrt(max(variance, 0.0)), 0.002 * fitted)
     return [*routes, check("width_agreement", abs(deconvolved - fitted) / allowed, 3.0, meaning)]
 
 
@@ -369,10 +355,11 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
         f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
         f"noise: {cure}."
     )
+    # 2.5 by simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
     return [
-        check("shape_width", widest, _SHAPE_WIDTH_LIMIT, spike),
-        check("shape_negative", negative, _NEGATIVE_LIMIT, ripples),
-        check("shape_roughness", rough, _ROUGHNESS_LIMIT, noise),
+        check("shape_width", widest, 2.5, spike),
+        check("shape_negative", negative, 0.4, ripples),
+        check("shape_roughness", rough, 0.1, noise),
     ]
 
 
@@ -383,16 +370,17 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     change = 2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal
     force = abs(carried_force(solution.stress, estimate.model.reference) - 1.0)
     outliers = float(np.mean(estimate.outlier_weight < quality.OUTLIER_WEIGHT))
-    tail = _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT
+    # A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
+    tail = 0.10 if estimate.model.order else 0.05
     values = {
-        "resolved_band": (float(gaussian_transfer(np.array(resolved), sigma)), _BAND_LIMIT),
+        "resolved_band": (float(gaussian_transfer(np.array(resolved), sigma)), 0.5),
         "tail_share": (solution.tail_share, tail),
-        "baseline_drift": (change, _BASELINE_DRIFT_LIMIT),
-        "reference_force": (force, _FORCE_LIMIT),
+        "baseline_drift": (change, 0.05),
+        "reference_force": (force, 0.01),
         "outliers": (outliers, quality.OUTLIER_LIMIT),
     }
     if (film := solution.scan.film) is not None:
-        values = {"width_over_thickness": (sigma / film.thickness, _WIDTH_LIMIT), **values}
+        values = {"width_over_thickness": (sigma / film.thickness, 3.0), **values}
     meanings = {
         "width_over_thickness": "Width of G over the film's thickness. A failure means that the "
         "unit of the positions or of the film's thickness should be looked at.",
@@ -439,12 +427,10 @@ def _indentation(solution: Solution, results: Results) -> QualityCheck:
             else ("the form of the film's law, which is not stated, is counted (model_form)")
         )
         meaning += f"It has no limit, for {why}. A failure means that the film was stated linear."
-    limit = INDENTATION_LIMIT if formal else math.inf
-    return check("indentation", max(depths), limit, meaning)
+    return check("indentation", max(depths), INDENTATION_LIMIT if formal else math.inf, meaning)
 
 
 def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:
-    """Count the points that were held at a ceiling, and name them."""
     points = estimate.points
     if estimate.model.order:
         return []

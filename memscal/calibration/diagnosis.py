@@ -122,7 +122,6 @@ class _Length:
 
     @property
     def place(self) -> str:
-        """The name, and the path in the file."""
         return f"{self.name} (/entry/{self.path})"
 
     def scaled(self, factor: float, limit: str = "") -> str:
@@ -231,7 +230,6 @@ class _Search:
         return length.scaled(far, "at most " if far < 1 else "at least ")
 
     def _trial(self, length: _Length, factor: float) -> _Trial:
-        """Fit a Gaussian with one length scaled."""
         points, stresses = self.points, self.stresses
         if length.path == "data/x":
             points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
@@ -268,5 +266,4 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
 
 
 def _grid(most: float) -> FloatArray:
-    """Factors from 1 to at most ``most``."""
     return np.asarray(_RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0))

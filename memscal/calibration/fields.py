@@ -131,11 +131,6 @@ class LineFields:
         return self.grid.wavenumber_axis, spectral[0]
 
 
-_REFINEMENT = 5
-#: A node whose points count in full has nothing of the profile.
-_ROUNDING = 1e-12
-
-
 @dataclass(frozen=True, eq=False)
 class RasterFields:
     """A measured raster on its own lattice, continued by the fitted profile around it."""
@@ -237,7 +232,8 @@ class RasterFields:
         share = self.share(smoothed)
         profiled = np.ones_like(self.voltage.values)
         np.subtract.at(profiled, self.index, share * points.load)
-        kept = profiled > _ROUNDING
+        # A node whose points count in full has nothing of the profile.
+        kept = profiled > 1e-12
         bessel = j0(np.multiply.outer(k, self.grid.radius[kept]))
         elsewhere = (bessel * profiled[kept]) @ (bessel.T * weights) @ smoothed.gain
         own = j0(np.multiply.outer(k, self.grid.radius[self.index])) * share
@@ -247,7 +243,7 @@ class RasterFields:
         """Return a kernel on its support."""
         step = float(self.grid.x[1] - self.grid.x[0])
         # Odd, so that the kernel's zero stays a point of the lattice.
-        refinement = max(_REFINEMENT, int(np.ceil(step / (2 * self.step))) | 1)
+        refinement = max(5, int(np.ceil(step / (2 * self.step))) | 1)
         fine, values = self.grid.refined(kernel, refinement)
         if profile is not None:
             values = self._lifted(profile.radial, fine)

@@ -189,8 +189,7 @@ class FreeThickness:
             )
             if left > _HARDLY * u:
                 text += " The scans hardly determine it: it is what was stated."
-            far = abs(moved) > _FAR_OFF
-            messages.append(Message("free", text, "warning" if far else "note"))
+            messages.append(Message("free", text, "warning" if abs(moved) > _FAR_OFF else "note"))
         return messages
 
 
@@ -240,10 +239,9 @@ def require_free(
             "/entry/sample/film/thickness_uncertainty).",
         )
     if any(reference is not None for reference in [*stated, *(scan.reference for scan in scans)]):
-        problem = "A reference is given, of one thickness."
         why = "To estimate the thickness the rod is solved on films of others."
         cure = "Leave the reference out, of the scan's file as well."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError("A reference is given, of one thickness.", why=why, cure=cure)
 
 
 def free_thickness(solution: Solution) -> FreeThickness:

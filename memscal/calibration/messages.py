@@ -41,8 +41,7 @@ def calibration_messages(
         )
         messages.append(Message("experimental", text))
     messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
-    messages += _directions(solution.estimate, checks)
-    messages += _method(solution)
+    messages += _directions(solution.estimate, checks) + _method(solution)
     stress = solution.stress
     if not isinstance(stress, Contact) and (form := stress.form) is not None:
         text = (
@@ -61,7 +60,6 @@ def calibration_messages(
 
 
 def _centres(solution: Solution) -> list[Message]:
-    """Return that repeats have centres of their own, and why."""
     if not solution.per_repeat:
         return []
     owners, centres = np.array(solution.owners), solution.estimate.centres
@@ -93,7 +91,6 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
 
 
 def _directions(estimate: ProfileEstimate, checks: tuple[QualityCheck, ...]) -> list[Message]:
-    """Return that a sensor is not round."""
     fall = next((c.value for c in checks if c.name == "axisymmetry"), 0.0)
     if fall <= quality.chi_square_limit(2):
         return []
@@ -147,8 +144,7 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         if not all(is_tabulated(f, *s.set_up[1:], s.rod_friction) for s, f in pairs):
             text = "The film is taken as linear elastic, as stated; no other law is counted."
             return [Message("film_law", text)]
-        unstated = [replace(scan, film=replace(f, law="")) for scan, f in pairs]
-        changes = _changes(solution, unstated)
+        changes = _changes(solution, [replace(scan, film=replace(f, law="")) for scan, f in pairs])
 
     def changed(by: str, sign: int) -> str:
         if by not in changes:

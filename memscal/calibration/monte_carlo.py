@@ -164,13 +164,11 @@ class DrawnScans:
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
-        first = self.solution
-        channel = first.estimate.points.channel
+        first, channel = self.solution, self.solution.estimate.points.channel
         return self._results_of(solve(scans, first.stresses, first.method, channel, both=False))
 
     def _results_of(self, solution: Solution) -> FloatArray:
-        radii = self.solution.deconvolution.g.r
-        numbers, g = uncertainty.read_off(solution.deconvolution, radii)
+        numbers, g = uncertainty.read_off(solution.deconvolution, self.solution.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
 
@@ -445,7 +443,6 @@ def _messages(
     failures: list[str],
     draws: int,
 ) -> Iterator[Message]:
-    """Return messages on what was drawn, and on uncertainty that no draw shows."""
     if not calibration.effects:
         text = "No input states an uncertainty: the draws are of noise alone."
         yield Message("uncertainty_unstated", text)

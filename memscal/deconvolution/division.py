@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 #: The paper adds white noise "ten times weaker than the weakest relevant spectral component".
 NOISE_RATIO = 0.1
-
 _CLOSED = 1e-9
 
 
@@ -196,10 +195,6 @@ class Tikhonov(_Own):
         return filtered_division(problem, power / (power + alpha))
 
 
-#: Pixels below this share of the brightest are left out of a Richardson-Lucy step.
-_DARK = 1e-12
-
-
 def _images(problem: DivisionProblem) -> tuple[FloatArray, FloatArray, float]:
     """Image of order one, point spread function of sum one, and the scale of their quotient."""
     grid = problem.grid
@@ -277,14 +272,14 @@ class RichardsonLucy(_Own):
         field = np.full_like(voltage, voltage.max())
         for _ in range(self.iterations):
             predicted = grid.convolve(field, reference)
-            positive = predicted > _DARK * voltage.max()
+            # Pixels that are dark beside the brightest are left out of a step.
+            positive = predicted > 1e-12 * voltage.max()
             ratio = np.divide(voltage, predicted, out=np.zeros_like(voltage), where=positive)
             field = field * grid.inverse(backward * grid.forward(ratio))
         return image_division(problem, grid.to_image(field))
 
 
 ENTRY_POINT_GROUP = "memscal.regularisers"
-
 _METHODS: tuple[Any, ...] = (
     *(WhiteNoise, Bayesian, WhiteNoiseDraw, Tikhonov),
     *(Wiener, UnsupervisedWiener, RichardsonLucy),

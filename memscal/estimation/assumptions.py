@@ -116,8 +116,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     moved = inside[:, shifted] * shift[axis, np.arange(axis.size)][:, None]
     # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
     columns = np.hstack([inside, inside * (along / np.abs(along).max())[:, None], moved])
-    weights = estimate.weights / estimate.outlier_weight
-    columns = points.standardised(columns, weights)[model.point]
+    columns = points.standardised(columns, estimate.weights / estimate.outlier_weight)[model.point]
     own, moved = np.split(columns, [2 * repeats.size], axis=1)
     base = residuals.orthonormal(np.hstack([model.design, own]))
     rest, free = (values - base @ (base.T @ values) for values in (model.data, moved))
@@ -138,10 +137,6 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     )
 
 
-#: Posterior probabilities are cut off at this and one minus this.
-_LEAST_PROBABILITY = 1e-4
-
-
 @dataclass(frozen=True, eq=False)
 class ExtraColumns:
     """Outcome of adding columns to the model."""
@@ -158,7 +153,7 @@ def departure_test(estimate: ProfileEstimate) -> tuple[float, str, float]:
     # ln of the Bayes factor, within -8.5 and 8.5, the most probable kind of departure, and its
     # share of all departures' probability.
     prior, averaged = HYPOTHESES[0].estimate, estimate.weighed
-    posterior = np.clip(averaged.gaussian_probability, _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
+    posterior = np.clip(averaged.gaussian_probability, 1e-4, 1 - 1e-4)
     factor = (1 - posterior) / posterior * prior / (1 - prior)
     kinds: dict[str, float] = {}
     for hypothesis, probability in zip(HYPOTHESES[1:], averaged.probability[1:], strict=True):

@@ -274,7 +274,6 @@ def _fitted_families(
             yield FamilyFit(family, float(amplitude), float(width))
 
 
-_VARIANCE_ROUNDS = 8
 #: The smallest noise, over the largest residual of a Gaussian, that is distinct from rounding.
 _ROUNDING = 1e-9
 #: Hypotheses of a smaller share of the posterior probability are left out.
@@ -370,7 +369,6 @@ class _LinearModel:
         return float(self.rest @ self.rest) + self.added * self.freedom
 
     def decompose(self, columns: FloatArray, places: FloatArray) -> _Design:
-        """Decompose weighted columns of departures."""
         free = columns - self.q @ (self.q.T @ columns)
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ self.rest
@@ -385,7 +383,7 @@ class _LinearModel:
         if design is not None:
             signal, power = (strength * design.singular) ** 2, design.power
             beyond = max(self.power - float(power.sum()), 0.0)
-            for _ in range(_VARIANCE_ROUNDS):
+            for _ in range(8):
                 explained = power * scatter / (scatter + signal)
                 scatter = self._distinct((beyond + float(explained.sum())) / self.freedom)
         variance = max(scatter, self.least)

@@ -83,8 +83,7 @@ class FieldModel(ForwardModel):
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
         (spectrum,), plane = self._on_cells(kernel[None]), self._plane
-        slopes = [self._read(geometry, -1j * k * spectrum) for k in (plane.kx, plane.ky)]
-        return np.stack(slopes)
+        return np.stack([self._read(geometry, -1j * k * spectrum) for k in (plane.kx, plane.ky)])
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""

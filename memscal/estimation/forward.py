@@ -130,19 +130,14 @@ class ForwardModel:
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
-        per_newton = np.empty((geometry.radius.size, *kernel.shape[1:]))
-        synthesis, load = self.synthesis(geometry), self.points.load
-        for rows, measure in self._measures:
-            spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
-            per_newton[rows] = synthesis[rows] @ spread
-        return np.asarray(per_newton * (load if kernel.ndim == 1 else load[:, None]))
+        return self._summed(self.synthesis(geometry), kernel)
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
         if self.order:
             slope, _ = self._vector_slopes(geometry, kernel)
             return np.asarray(-geometry.towards[self.axis] * slope)
-        return -self._summed(geometry.bessel1, kernel)
+        return -self._summed(geometry.bessel1, self.k * kernel)
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
@@ -217,14 +212,15 @@ class ForwardModel:
         """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
         x = np.multiply.outer(geometry.radius, self.k)
         turn = np.divide(geometry.bessel1, x, out=np.full_like(x, 0.5), where=x > 0)
-        return [self._summed(matrix, kernel) for matrix in (geometry.bessel0 - turn, turn)]
+        return [self._summed(m, self.k * kernel) for m in (geometry.bessel0 - turn, turn)]
 
     def _summed(self, matrix: FloatArray, kernel: FloatArray) -> FloatArray:
-        """Voltages by k times a kernel, summed over the quadrature, shape (n,)."""
-        per_newton = np.empty(len(matrix))
+        """Voltages by kernels times single wavenumbers' (n, nodes), summed over the quadrature."""
+        per_newton, load = np.empty((len(matrix), *kernel.shape[1:])), self.points.load
         for rows, measure in self._measures:
-            per_newton[rows] = matrix[rows] @ (measure * self.k * kernel)
-        return np.asarray(per_newton * self.points.load)
+            spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
+            per_newton[rows] = matrix[rows] @ spread
+        return np.asarray(per_newton * (load if kernel.ndim == 1 else load[:, None]))
 
     @property
     def _measures(self) -> list[tuple[slice | NDArray[np.bool_], FloatArray]]:

@@ -182,7 +182,6 @@ def _smoothing_length(model: ForwardModel) -> float:
 
 
 def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
-    """Return the error for a scan that no Gaussian fits."""
     stopped = conversion_constant is not None
     end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
     return FitError(
@@ -198,8 +197,6 @@ _TYPICAL_ELLIPTICITY = 0.2
 _KNEE = 3.0
 #: A width below this share of its typical size is left to a search with a trust region.
 _NARROWEST = 0.05
-
-
 #: A width below this share of its standard uncertainty is zero.  Of a sensor that the film hides
 #: entirely, half of the scans give such a width.
 _NO_WIDTH = 0.1

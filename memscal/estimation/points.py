@@ -197,8 +197,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         cure = "Give the electronic noise, or leave it out to have it estimated."
         raise InputError(problem, why=why, cure=cure)
     arrays = {"x": x, "y": y, "u": u, "load": load, "repeat": scan.passes}
-    x_errors = np.zeros(()) if scan.x_errors is None else scan.x_errors
-    arrays["x_errors"] = np.broadcast_to(x_errors, u.shape)
+    arrays["x_errors"] = np.broadcast_to(0.0 if scan.x_errors is None else scan.x_errors, u.shape)
     arrays["branch"] = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     columns: dict[str, Any] = {name: values[keep] for name, values in arrays.items()}
     points = ScanPoints(

@@ -183,11 +183,7 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
 
 def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     """Choose the reference: the argument, the scan's own, or the rod's solution."""
-    if reference is not None:
-        return reference
-    if scan.reference is not None:
-        return scan.reference
-    return press_rod(*scan.set_up, scan.rod_friction)
+    return reference or scan.reference or press_rod(*scan.set_up, scan.rod_friction)
 
 
 def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
@@ -328,9 +324,8 @@ def reference_sensitivities(
     of_inputs = film_sensitivities, rod_sensitivities, law_sensitivities
     for sensitivities, of in zip(of_inputs, ("film", "indenter", "law"), strict=True):
         owners = [getattr(scan, of, None) for scan in scans]
-        distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
-            number = distinct.index(owner)
+            number = list(dict.fromkeys(owners)).index(owner)
             suffix = f"_{number + 1}" if number else ""
             for source, change in (sensitivities(scan, references[i]) if scan.film else {}).items():
                 blank = [np.zeros_like(change) for _ in scans]
@@ -417,8 +412,7 @@ def law_at_once(scan: Scan) -> str:
         return LINEAR
     rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     rod, load = scan.set_up[1:]
-    within = is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction)
-    return NEO_HOOKEAN if within else LINEAR
+    return NEO_HOOKEAN if is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction) else LINEAR
 
 
 def rod_spectrum(scan: Scan, reference: RadialSpectrum, law: str) -> FloatArray:

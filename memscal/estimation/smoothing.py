@@ -138,12 +138,11 @@ def _fitted(
     points, load = estimate.points, estimate.points.load[rows]
     y = signal / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
-    decay = reference
     if reference.source:
         # A source ends: what decays is G about it.
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
-        decay = replace(reference, values=reference.values * blurred)
-    spline = _RadialSpline.through(estimate.distance[rows], decay, points.step)
+        reference = replace(reference, values=reference.values * blurred)
+    spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
     for _ in range(_ROUNDS):
         gain = spline.gain(y, stated * weight)
@@ -299,9 +298,8 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     lost = np.flatnonzero(ratio < RESOLVED)
     end = int(lost[0]) + 1 if lost.size else k.size
     resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
-    weakest_voltage = float(np.interp(relevant, k, signal))
-    weakest_reference = float(np.interp(relevant, k, reference))
-    return Band(k, signal, noise, relevant, resolved, weakest_voltage, weakest_reference)
+    weakest = (float(np.interp(relevant, k, modulus)) for modulus in (signal, reference))
+    return Band(k, signal, noise, relevant, resolved, *weakest)
 
 
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:

@@ -28,8 +28,6 @@ from memscal.version import __version__
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale")
 
-#: One check of all profiles together may be stricter than one for each.
-_MEAN_LIMIT = 2.0
 #: What the shapes of pressure leave open of the mean force of several, whose shapes differ.
 _NEGLIGIBLE_MEAN = 0.005
 _FORCE = (
@@ -102,7 +100,7 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
     return check(
         "applied_force_all",
         off,
-        _MEAN_LIMIT,
+        2.0,  # one check of all profiles together may be stricter than one for each
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
         f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
         "difference from one is counted. " + _FORCE + _BLIND,
@@ -266,7 +264,6 @@ def _prepared(
 
 
 def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
-    """Return the error with its file and load in front."""
     problem = f"{one_load.load_of(scan)}: {failure.problem}"
     return type(failure)(problem, why=failure.why, cure=failure.cure)
 
@@ -277,7 +274,6 @@ def _messages(
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
 ) -> Iterator[Message]:
-    """Yield the messages of a measured stress, warnings first."""
     yield from quality.failed_check_messages(checks)
     yield from quality.override_messages(overridden)
     yield from restore.failed_calibration_messages(sensor)

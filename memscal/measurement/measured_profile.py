@@ -262,10 +262,6 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
 
 
-#: Radii of the smooth curve.
-_CURVE = 301
-
-
 def measured_scan(scan: Scan) -> MeasuredScan:
     """Return film, indenter, sensor and the other data of a scan without its points."""
     return MeasuredScan(
@@ -304,7 +300,7 @@ def measured_profile(
         **_of_place(restored, average),
     }
     maximum, budget = _on_axis(restored)
-    curve_r = np.linspace(0.0, float(r[order][-1]), _CURVE)
+    curve_r = np.linspace(0.0, float(r[order][-1]), 301)
     return MeasuredProfile(
         scan=origin,
         load=scan.stated_load,
@@ -330,7 +326,6 @@ def measured_profile(
 
 
 def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str, MeasuredPoints]:
-    """Return the points of one load by channel, as they were measured."""
     normal = measured_points(scan)
     weight = restored.posterior.estimate.outlier_weight
     if not noise.any():

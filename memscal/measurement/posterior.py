@@ -49,8 +49,6 @@ _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
 #: Shears from none to full stick: spheres of a contact radius from half to twice the thickness.
 _SHEARS_INCOMPRESSIBLE = (0.0, -0.2, -0.4)
 _SHEARS_COMPRESSIBLE = (0.0, 0.1, 0.2)
-#: Above this Poisson's ratio a pressed film flows outward under the indenter.
-_FLOWING = 0.4
 #: The transform of a rod's pressure passes through zero: where it is below this share of its force,
 #: the film counts as linear.  Half and twice of it change forces and stresses by less than 0.4 %.
 _LEAST_PRESSURE = 0.1
@@ -109,7 +107,8 @@ class PressureShape:
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
     """Return the shapes that a restoration averages."""
-    shears = _SHEARS_INCOMPRESSIBLE if (film.poisson_ratio > _FLOWING) else _SHEARS_COMPRESSIBLE
+    # Above a Poisson's ratio of 0.4 a pressed film flows outward under the indenter.
+    shears = _SHEARS_INCOMPRESSIBLE if film.poisson_ratio > 0.4 else _SHEARS_COMPRESSIBLE
     return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
 
 
@@ -139,7 +138,6 @@ class ShapeFit:
     """The fit of one shape of pressure and of departures from it."""
 
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
-    shape: PressureShape
     state: FloatArray  # (s,): posterior mean
     covariance: FloatArray  # (s, s): expected squared error
     gain: FloatArray  # (s, n): derivative of the state by the voltages
@@ -166,7 +164,6 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     log_information = 2 * float(np.log(np.abs(np.diag(root))).sum())
     growth = start.adopted_noise(weighed.noise) / weighed.noise
     return ShapeFit(
-        shape=shape,
         state=first + rows @ weighed.mean,
         covariance=growth**2 * (rows @ weighed.covariance @ rows.T),
         gain=rows @ weighed.gain,
@@ -217,7 +214,6 @@ class Posterior:
     changes: Mapping[str, FloatArray]  # (s, q) by source: change of the state
     residual: FloatArray  # (n,), in V
     found_noise: float  # of a point of weight one, in V, or over the stated uncertainties
-    shares: Mapping[tuple[float, float], float]  # posterior probability by exponent and shear
     resolved_wavenumber: float  # where the uncertainty is a third of the Gaussian's, rad/m
 
     @property
@@ -275,7 +271,6 @@ def posterior_of(
     changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
     changes["film"][:nodes] += scan.stated_load * of_film * mean[:nodes, None]
     covariances |= {source: columns @ columns.T for source, columns in changes.items()}
-    names = [(fit.shape.exponent, fit.shape.shear) for fit in fits]
     variance = np.sum([np.diag(covariance)[:nodes] for covariance in covariances.values()], axis=0)
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
     lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
@@ -288,7 +283,6 @@ def posterior_of(
         changes=changes,
         residual=np.average([fit.residual for fit in fits], axis=0, weights=shares),
         found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
-        shares=dict(zip(names, shares.tolist(), strict=True)),
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
 
@@ -298,8 +292,7 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     model, kernel = estimate.model, state[: estimate.model.k.size]
     geometry, wavenumbers = estimate.gaussian.geometry, model.reference.wavenumbers
     references = [(RadialSpectrum(wavenumbers, change),) for change in changes.T]
-    models = [replace(model, references=reference) for reference in references]
-    columns = [changed.signal(geometry, kernel) for changed in models]
+    columns = [replace(model, references=own).signal(geometry, kernel) for own in references]
     return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
 
 

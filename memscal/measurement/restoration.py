@@ -64,8 +64,7 @@ def compare_stress(
             "proportional to it.",
             cure="Calculate the stress for the scan's load.",
         )
-    estimate, nodes = posterior.estimate, posterior.nodes
-    model = estimate.model
+    model, nodes = posterior.estimate.model, posterior.nodes
     if isinstance(stress, Contact):
         spectrum = stress.base_spectrum(model.k) / stress.load
     else:
@@ -222,8 +221,7 @@ class Restoration(Result, Checked):
     @property
     def baseline_uncertainty(self) -> float:
         """Standard uncertainty of :attr:`baseline`, in V."""
-        i = self._first_drift
-        return float(np.sqrt(self.posterior.covariance[i, i]))
+        return float(np.sqrt(np.diag(self.posterior.covariance)[self._first_drift]))
 
     @property
     def resolved_wavenumber(self) -> float:

@@ -226,12 +226,6 @@ def noise_unstated_message(noise: str) -> Message:
     return Message(quality.NOISE_UNSTATED, text)
 
 
-#: A film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
-_LARGEST_KH = 20.0
-#: Radii of the table, from the axis to half the scan's width.
-_RADII = 161
-
-
 @single_threaded()
 def restore(
     scan: Scan | str | PathLike[str],
@@ -293,7 +287,8 @@ def restore_known(
     wavenumbers = estimate.model.reference.wavenumbers
     posterior = posterior_of(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
-    r = np.linspace(0.0, reach_of(points) / 3, _RADII)
+    # From the axis to half the scan's width.
+    r = np.linspace(0.0, reach_of(points) / 3, 161)
     matrix = wavenumbers.synthesise(np.eye(nodes), r)
     restored = Restoration(
         scan=scan,
@@ -309,15 +304,15 @@ def restore_known(
     checks += [_symmetry(restored), _outliers(restored)]
     if restored.comparison is not None:
         checks.append(_expected(restored.comparison))
-    messages = restoration_messages(restored, checks)
-    return replace(restored, checks=tuple(checks), messages=messages)
+    return replace(restored, checks=tuple(checks), messages=restoration_messages(restored, checks))
 
 
 def gaussian_pressure(
     scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
-    wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.set_up.film.thickness, reach_of(points))
+    # A film passes nothing of exp(-kh) beyond kh = 20: 2e-9 of the load.
+    wavenumbers = Wavenumbers.covering(20.0 / scan.set_up.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
     through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers))
     try:

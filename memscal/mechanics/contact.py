@@ -243,12 +243,10 @@ def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -
 
 
 def _radii(r: ArrayLike) -> FloatArray:
-    """Return radii as an array; refuse what is no radius."""
     radii = np.asarray(r, dtype=np.float64)
     if not np.all(np.isfinite(radii)):
         raise InputError("A radius is not finite.", cure="Leave missing positions out.")
     if np.any(radii < 0):
-        problem = f"A radius is {radii.min():g} m, but radii are not negative."
         cure = "Give distances from the indenter's axis, such as abs(x - centre)."
-        raise InputError(problem, cure=cure)
+        raise InputError(f"A radius is {radii.min():g} m, but radii are not negative.", cure=cure)
     return radii

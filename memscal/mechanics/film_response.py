@@ -196,10 +196,6 @@ def base_stress(
     return stress.reshape(np.shape(r))
 
 
-# Bessel functions evaluated together, which bounds the memory.
-_RINGS_CHUNK = 4_000_000
-
-
 @dataclass(frozen=True, eq=False)
 class RingTraction:
     """Pressure and outward shear (Pa) linear between rings (m, from 0), zero beyond the last."""
@@ -244,7 +240,8 @@ class RingTraction:
             rings = self.rings[used]
             s, weights = _nodes(rings, float(flat.max()))
             density, bessel = weights * s * np.interp(s, rings, values[used]), (j0, j1)[order]
-            size = max(1, _RINGS_CHUNK // s.size)
+            # So many Bessel functions are evaluated together, which bounds the memory.
+            size = max(1, 4_000_000 // s.size)
             for start in range(0, flat.size, size):
                 chunk = slice(start, start + size)
                 transform[chunk] = bessel(np.multiply.outer(flat[chunk], s)) @ density

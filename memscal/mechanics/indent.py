@@ -238,7 +238,6 @@ def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -
 def _check_request(
     friction: float, loading: str, backend: str, strain: str, rings: int | None
 ) -> None:
-    """Refuse what makes no sense."""
     for name, value, choices in (
         ("loading", loading, ("incremental", "total")),
         ("backend", backend, ("hankel", "fem")),

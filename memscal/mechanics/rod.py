@@ -73,15 +73,11 @@ def _series(terms: FloatArray, first: int) -> FloatArray:
     return series
 
 
-_RESCALE_ABOVE = 1e100
-_SMALLEST = 1e-30
-
-
 def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
     """Return j_0 to j_(count-1) at ``x``, one row each: some hundred times faster than scipy."""
     # Miller's backward recurrence j_(l-1) = (2l+1) j_l/x - j_(l+1), normalised by the sum of
     # (2l+1) j_l^2, which is 1.  One sweep serves all orders.
-    x = np.maximum(x, _SMALLEST)
+    x = np.maximum(x, 1e-30)
     largest = float(np.max(x, initial=0.0))
     # From here upward the functions are below 1e-16 (Airy decay beyond the turning point).
     start = max(count, int(largest + 15 * (largest / 2) ** (1 / 3))) + 30
@@ -94,7 +90,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
         norm += (2 * order + 1) * current**2
         above, current = current, (2 * order + 1) / x * current - above
         size = np.abs(current)
-        if np.max(size, initial=0.0) > _RESCALE_ABOVE:
+        if np.max(size, initial=0.0) > 1e100:
             scale = 1 / np.maximum(size, 1.0)
             above, current, norm = above * scale, current * scale, norm * scale**2
             rows[order:] *= scale

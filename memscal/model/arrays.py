@@ -73,18 +73,15 @@ def require_increasing(name: str, values: FloatArray) -> None:
         raise InputError(f"{name} must increase strictly.", cure="Sort it; merge equal positions.")
 
 
-#: A table has an edge where it changes by this share of its range within an interval that is
-#: narrower than that share of its neighbours.
-_JUMP, _NARROW = 0.05, 0.1
-
-
 def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
     """Return a cubic spline through a table; for one with an edge a monotone one, and ``True``."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
+    # A table has an edge where it changes by a twentieth of its range within an interval that is
+    # narrower than a tenth of its neighbours.
     widths, jumps = np.diff(x), np.abs(np.diff(y))
-    narrow = widths[1:-1] < _NARROW * np.minimum(widths[:-2], widths[2:])
-    sharp = bool(np.any(jumps[1:-1][narrow] > _JUMP * np.ptp(y)))
+    narrow = widths[1:-1] < 0.1 * np.minimum(widths[:-2], widths[2:])
+    sharp = bool(np.any(jumps[1:-1][narrow] > 0.05 * np.ptp(y)))
     # A cubic spline swings about an edge, by more than the table holds.
     return (PchipInterpolator if sharp else CubicSpline)(x, y), sharp
 
@@ -123,6 +120,6 @@ def same_content(first: Any, second: Any) -> bool:
     if isinstance(first, tuple | list) and isinstance(second, tuple | list):
         return len(first) == len(second) and all(map(same_content, first, second))
     if is_dataclass(first) and type(first) is type(second):
-        names = [f.name for f in fields(first)]
-        return all(same_content(getattr(first, n), getattr(second, n)) for n in names)
+        pairs = ((getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
+        return all(same_content(*pair) for pair in pairs)
     return bool(first == second)

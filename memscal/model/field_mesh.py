@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, freeze_arrays
 
-_CORNERS_ONLY, _WITH_MIDSIDES = 3, 6
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FieldMesh:
@@ -67,7 +65,7 @@ class FieldMesh:
                 )
             if not np.all(np.isfinite(values)):
                 raise InputError(f"{name} of the field mesh holds a value that is not finite.")
-        if triangles.ndim != 2 or triangles.shape[1] not in {_CORNERS_ONLY, _WITH_MIDSIDES}:
+        if triangles.ndim != 2 or triangles.shape[1] not in {3, 6}:
             raise InputError(
                 f"triangles of the field mesh has shape {triangles.shape}, but three columns "
                 "(corners) or six (corners, then middles of the sides) are needed."

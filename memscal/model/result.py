@@ -44,7 +44,6 @@ class Result:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        """Return the tables as HTML, for notebooks."""
         return "\n".join(table.html() for table in self.tables())
 
     def to_dict(self) -> dict[str, Any]:
@@ -76,7 +75,6 @@ class Result:
         return figure
 
     def _told(self, form: str) -> Any:
-        """Call a function of the result's summary, by its name."""
         function = getattr(import_module(f"memscal.summaries.{self._summary}"), form, None)
         if function is None:
             problem = f"A {type(self).__name__} has no {_FORMS[form]}."

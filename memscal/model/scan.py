@@ -391,8 +391,7 @@ class Scan:
     def __post_init__(self) -> None:
         for name in ("x", "y"):
             if (values := getattr(self, name)) is not None:
-                vector = arrays.finite_vector(f"{name} of the scan", values)
-                object.__setattr__(self, name, vector)
+                object.__setattr__(self, name, arrays.finite_vector(f"{name} of the scan", values))
         object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
         if self.repeat is not None:
             repeat = arrays.whole_numbers("repeat of the scan", self.repeat)

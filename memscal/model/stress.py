@@ -9,13 +9,8 @@ import numpy as np
 from scipy.special import j0, j1
 
 from memscal.errors import InputError
-from memscal.model.arrays import (
-    FloatArray,
-    finite_vector,
-    require_increasing,
-    require_positive,
-    table_spline,
-)
+from memscal.model import arrays
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -66,7 +61,7 @@ class IdealReference:
             cure = f"Give one of {', '.join(IDEAL)}."
             raise InputError(f"There is no ideal reference {self.shape!r}.", cure=cure)
         if self.shape != "point":
-            require_positive(f"{IDEAL[self.shape]} of the {self.shape}", self.size, "m")
+            arrays.require_positive(f"{IDEAL[self.shape]} of the {self.shape}", self.size, "m")
         elif self.size:
             raise InputError(f"A point has no size, but {self.size:g} m is given.")
 
@@ -151,9 +146,9 @@ class StressField:
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
-            axis = finite_vector(f"{name} of the field", getattr(self, name))
+            axis = arrays.finite_vector(f"{name} of the field", getattr(self, name))
             object.__setattr__(self, name, axis)
-            require_increasing(f"{name} of the field", axis)
+            arrays.require_increasing(f"{name} of the field", axis)
             steps = np.diff(axis)
             if not _FEWEST <= axis.size <= _MOST or np.ptp(steps) > _EVEN * steps.mean():
                 problem = f"{name} of the field has {axis.size} values, or uneven ones"
@@ -161,7 +156,7 @@ class StressField:
                 raise InputError(f"{problem}: not {_FEWEST} to {_MOST} even ones.", cure=cure)
         if (shape := np.shape(self.values)) != (expected := (self.y.size, self.x.size)):
             raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
-        values = finite_vector("The field", np.ravel(self.values)).reshape(expected)
+        values = arrays.finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
         border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
         left = np.abs(border).mean() / max(np.abs(values).max(), np.finfo(float).tiny)
@@ -173,7 +168,7 @@ class StressField:
                 cure="Change its sign, subtract the background, or give a larger field.",
             )
         if self.load is not None:
-            require_positive("load of the field", self.load, "N")
+            arrays.require_positive("load of the field", self.load, "N")
 
     def __str__(self) -> str:
         """Return it in words."""
@@ -297,15 +292,15 @@ class StressProfile:
     field: StressField | None = None
 
     def __post_init__(self) -> None:
-        require_positive("load of the stress profile", self.load, "N")
+        arrays.require_positive("load of the stress profile", self.load, "N")
         for name in ("r", "sigma_zz", "sigma_rz", "sigma_zz_errors"):
             if (stated := getattr(self, name)) is not None:
-                values = finite_vector(f"{name} of the stress profile", stated)
+                values = arrays.finite_vector(f"{name} of the stress profile", stated)
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:
                     count = f"{values.size} values for {self.r.size} radii"
                     raise InputError(f"{name} of the stress profile has {count}.")
-        require_increasing("r of the stress profile", self.r)
+        arrays.require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
             problem = "r of the stress profile is negative."
             raise InputError(problem, cure="Give radii, not positions.")
@@ -343,5 +338,5 @@ class StressProfile:
         inner = slice(1, 4) if self.r[0] == 0 else slice(0, 3)
         density = self.sigma_zz * self.r
         radii, values = (np.concatenate([-v[inner][::-1], v]) for v in (self.r, density))
-        spline, _ = table_spline(radii, values)
+        spline, _ = arrays.table_spline(radii, values)
         return float(2 * np.pi * spline.integrate(0.0, self.r[-1]))
