@@ -162,6 +162,7 @@ def compare_interface(
     macroscopic: float,  # coefficient at which the indenter slides
     macroscopic_uncertainty: float | None = None,
     amontons: ProfileFamily | None = None,  # incremental, from 0 to inf
+    slipping: ProfileFamily | None = None,  # elasto-plastic at the macroscopic coefficient
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> InterfaceComparison:
@@ -183,7 +184,7 @@ def compare_interface(
         rigid = family_at_loads(dry, amontons, partial(amontons_family, **contacts))
         tangential = weigh_slip_length(
             _measured(dry, apparatus, rigid),
-            _measured(dry, apparatus, family_at_loads(dry, None, law)),
+            _measured(dry, apparatus, family_at_loads(dry, slipping, law)),
             macroscopic=macroscopic,
             lubrication=dry[0].lubrication,
         )
