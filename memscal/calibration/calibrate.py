@@ -341,34 +341,13 @@ def calibrate(
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """
-    scans, pairs = require_one_sensor(opened_scans(scan)), correlations or {}
-    references = _references(reference, scans, pixel_size)
-    for rod_scan, of_scan in zip(scans, references, strict=True):
-        require_calibration_rod(rod_scan, of_scan)
-    as_stated = scans
-    known = film_law, mooney_rivlin_ratio, rod_friction
-    scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
-    if relative:
-        # A rod that has to be solved keeps its nominal load.
-        loads: dict[str, Any] = dict.fromkeys(("load_uncertainty", *_OF_POINTS))
-        kept = [
-            None if r or s.reference else s.load for s, r in zip(scans, references, strict=True)
-        ]
-        scans = tuple(replace(s, load=p, **loads) for s, p in zip(scans, kept, strict=True))
-    alternatives = None if alternative is None else _references(alternative, scans)
-    overridden = require_same_set_up(scans, references, alternatives or (), override=override)
-    scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
-    owners: Sequence[int] | None = None
-    stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
-    require_one_kind(stated, alternatives or ())
-    if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
-        # Under another law than the linear one each load has a stress of its own shape.
-        of_loads, owners = scans_by_load(scans)
-        scans, references = tuple(of_loads), [None] * len(of_loads)
-    stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
-    peak = float(np.abs(_table(stresses[0]).sigma_zz).max()) if relative else None
-    scans = tuple(at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True))
-    reading = replace(scans[0].reading, per="relative" if relative else stresses[0].unit)
+    pairs = correlations or {}
+    prepared = prepare(
+        opened_scans(scan), reference, alternative, (film_law, mooney_rivlin_ratio, rod_friction),
+        pixel_size=pixel_size, override=override, relative=relative,
+    )  # fmt: skip
+    scans, stresses, owners = prepared.scans, list(prepared.stresses), prepared.owners
+    reading, as_stated = prepared.reading, prepared.as_stated
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
@@ -377,13 +356,13 @@ def calibrate(
     if free:
         from memscal.calibration.film_inference import free_thickness, require_free
 
-        require_free(free, scans, references)
+        require_free(free, scans, prepared.references)
         start = solve(scans, stresses, chosen, channel, both=False, centre=centre, owners=owners)
         freed = free_thickness(start)
         scans = tuple(freed.of(scans))
         stresses = [reference_profile(s, None) for s in scans]
     solution = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
-    effects = _effects(solution, alternatives)
+    effects = _effects(solution, prepared.alternatives)
     results = uncertainties(solution, solution.deconvolution, effects, pairs, reading)
     beside = solution.other
     other = None if beside is None else uncertainties(solution, beside, effects, pairs, reading)
@@ -415,13 +394,68 @@ def calibrate(
         configuration["centre"] = {"choice": choice, "chosen_by": "option" if centre else "test"}
         if solution.apart is not None:
             configuration["centre"]["p_value"] = solution.apart.p_value
-    if overridden:
-        configuration["override"] = overridden
+    if prepared.overridden:
+        configuration["override"] = prepared.overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
-    messages = (*override_messages(overridden), *messages)
+    messages = (*override_messages(prepared.overridden), *messages)
     apparatus = assemble(solution, as_stated[0], results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What a calibration starts from: scans with the film and loads that count, and references."""
+
+    as_stated: tuple[Scan, ...]
+    scans: tuple[Scan, ...]
+    references: Sequence[BaseStress | None]  # as given
+    stresses: tuple[BaseStress, ...]  # as taken, one of each scan
+    alternatives: Sequence[BaseStress | None] | None
+    owners: Sequence[int] | None  # of scans that were split by their loads
+    reading: Reading
+    overridden: list[str]
+
+
+def prepare(
+    as_stated: Sequence[Scan],
+    reference: Reference | Sequence[Reference],
+    alternative: Reference | Sequence[Reference],
+    law: tuple[str | None, float | None, float | None],
+    *,
+    pixel_size: float | None,
+    override: bool,
+    relative: bool,
+) -> Prepared:
+    """Read and solve the references, and hold them against the scans; see :func:`calibrate`."""
+    # ``law``: the film's, its ratio, and the friction of the rod, where they are asked for.
+    as_stated = require_one_sensor(as_stated)
+    references = _references(reference, as_stated, pixel_size)
+    for scan, given in zip(as_stated, references, strict=True):
+        require_calibration_rod(scan, given)
+    scans = tuple(_of_law(s, r, law) for s, r in zip(as_stated, references, strict=True))
+    stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
+    if relative:
+        # A rod that has to be solved keeps its nominal load.
+        loads: dict[str, Any] = dict.fromkeys(("load_uncertainty", *_OF_POINTS))
+        kept = [None if r else s.load for s, r in zip(scans, stated, strict=True)]
+        scans = tuple(replace(s, load=p, **loads) for s, p in zip(scans, kept, strict=True))
+    alternatives = None if alternative is None else _references(alternative, scans)
+    overridden = require_same_set_up(scans, references, alternatives or (), override=override)
+    scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
+    require_one_kind(stated, alternatives or ())
+    owners: Sequence[int] | None = None
+    if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
+        # Under another law than the linear one each load has a stress of its own shape.
+        of_loads, owners = scans_by_load(scans)
+        scans, references = tuple(of_loads), [None] * len(of_loads)
+    stresses = tuple(reference_profile(s, r) for s, r in zip(scans, references, strict=True))
+    peak = float(np.abs(_table(stresses[0]).sigma_zz).max()) if relative else None
+    scans = tuple(at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True))
+    reading = replace(scans[0].reading, per="relative" if relative else stresses[0].unit)
+    return Prepared(
+        as_stated, scans, references, stresses, alternatives, owners, reading, overridden
+    )
 
 
 def _of_law(

@@ -7,6 +7,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -321,31 +322,31 @@ def _rehearse(
     as_json: bool,
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
+    from memscal.calibration.calibrate import prepare
     from memscal.calibration.stages import require_channel_method
-    from memscal.estimation import reference
     from memscal.estimation.points import joined_points, measured_points, scans_of_repeats
+    from memscal.estimation.reference import reference_spectra
     from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
-    channel, override = settings["channel"], settings["override"]
-    reference.require_one_sensor(scans)
+    channel, plan = settings["channel"], (regulariser.name, outputs)
     require_channel_method(channel, regulariser)
-    given = [profile] * len(scans), [alternative] * len(scans)
-    differences = reference.require_same_set_up(scans, *given, override=override)
-    out.show_messages(override_messages(differences))
+    law = settings["film_law"], settings["mooney_rivlin_ratio"], settings["rod_friction"]
+    flags = {name: settings[name] for name in ("override", "relative")}
+    prepared = prepare(scans, profile, alternative, law, pixel_size=None, **flags)
+    out.show_messages(override_messages(prepared.overridden))
+    separate, owners = list(prepared.scans), tuple(range(len(prepared.scans)))
     if settings["centre"] == "per-repeat":
-        scans = scans_of_repeats(scans, channel)[0]
-    stresses = [reference.reference_profile(scan, profile) for scan in scans]
-    peak = 1.0 if settings["relative"] else None
-    pairs = zip(stresses, scans, strict=True)
-    loaded = [reference.at_load_of(stress, scan, peak) for stress, scan in pairs]
-    readings = [measured_points(scan, channel) for scan in loaded]
-    reference.reference_spectra(stresses, readings)
-    points, plan = joined_points(readings), (regulariser.name, outputs)
+        separate, owners = scans_of_repeats(separate, channel)
+    readings = [measured_points(scan, channel) for scan in separate]
+    reference_spectra([prepared.stresses[i] for i in owners], readings)
+    stress, taken = prepared.stresses[0], prepared.scans[0]
     if as_json:
-        out.emit_json(rehearsal_json(stresses[0], *plan))
+        out.emit_json(rehearsal_json(stress, *plan))
     else:
-        out.emit_tables(rehearsal_table(scans[0], points, stresses[0], *plan))
+        load = taken.load if prepared.reading.per == "Pa" else None
+        taken = replace(taken, load=load)
+        out.emit_tables(rehearsal_table(taken, joined_points(readings), stress, *plan))
     out.message("Nothing was written (--dry-run).")
 
 
