@@ -103,6 +103,15 @@ class ApparatusFunction(Result, ApparatusData):
         InputError
             If the table is not in metres, is coarser than G, begins off the axis, or ends
             before the stress has decayed.
+
+        Examples
+        --------
+        >>> import memscal, numpy as np
+        >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+        >>> x = np.linspace(-5e-3, 5e-3, 101)
+        >>> stress = 1e3 * np.exp(-np.hypot.outer(x, x) ** 2 / 1e-6)
+        >>> bool(apparatus.convolve(x, stress, y=x).max() < stress.max())
+        True
         """
         if y is not None:
             return self._convolved_field(r, y, sigma_zz)
@@ -118,7 +127,7 @@ class ApparatusFunction(Result, ApparatusData):
     def predict(
         self, r: ArrayLike, sigma_zz: ArrayLike, *, y: ArrayLike | None = None
     ) -> FloatArray:
-        r"""Return the voltage :math:`A\,G \otimes \sigma_{zz}` of a base stress, in V.
+        r"""Return the reading :math:`A\,G \otimes \sigma_{zz}` of a base stress, in its unit (V).
 
         Parameters and errors are those of :meth:`convolve`.
         """
@@ -136,7 +145,7 @@ class ApparatusFunction(Result, ApparatusData):
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def predict_uncertainty(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
-        r"""Return the standard uncertainty of :meth:`predict` that A and G bring, in V.
+        r"""Return the standard uncertainty of :meth:`predict` that A and G bring, in its unit.
 
         The errors of A and G are correlated: a profile that is too narrow has too small a tail,
         and with it too small an A.  Artifacts that do not state the correlation count none.
@@ -156,7 +165,7 @@ class ApparatusFunction(Result, ApparatusData):
         return np.abs(self.stress(u_zz)) * relative
 
     def stress(self, u_zz: ArrayLike) -> FloatArray:
-        """Return the measured stress S_zz = U_zz / A, in Pa, for voltages in V of any shape.
+        """Return the measured stress S_zz = U_zz / A, in Pa, for readings in V (or their unit).
 
         The paper's definition: the stress as the sensor blurs it, to be compared with
         :meth:`convolve`.  Baselines must have been subtracted.
@@ -200,7 +209,8 @@ class ApparatusFunction(Result, ApparatusData):
             raise InputError(problem, cure="Give the radial profile of the shear, without y.")
         stress, g, offsets = np.asarray(sigma_zz, dtype=np.float64), self.field, []
         if stress.ndim != 2 or not np.isfinite(stress).all():
-            raise InputError("sigma_zz is no field (y, x) of finite stresses.")
+            problem = "sigma_zz is no field (y, x) of finite stresses."
+            raise InputError(problem, cure="Give an array of two axes without missing values.")
         for name, values, size in (("x", x, stress.shape[-1]), ("y", y, len(stress))):
             axis = finite_vector(name, values)
             step = float(np.ptp(axis)) / max(axis.size - 1, 1)
