@@ -16,7 +16,7 @@ from memscal.estimation import residuals as unexplained
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import carried_force, is_source
-from memscal.estimation.residuals import FEWEST_RESIDUALS, Residuals, TestOutcome
+from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, Residuals, TestOutcome
 from memscal.estimation.smoothing import RESOLVED
 from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
@@ -41,7 +41,7 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
     return [] if estimate.points.u_errors is None else [noise]
 
 
-def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
+def _size(estimate: ProfileEstimate, residuals: Residuals, model: FreeModel) -> list[QualityCheck]:
     """Compare what no G explains with the stated noise, or with the scatter of repeats."""
     degrees = residuals.degrees
     if residuals.stated:
@@ -49,7 +49,7 @@ def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]
         compared = f"with the stated noise: reduced chi-square of {degrees} degrees"
         noise = "the noise is larger than stated, or "
     else:
-        pure = unexplained.pure_error_test(estimate)
+        pure = unexplained.pure_error_test(estimate, model)
         if pure is None:
             return []
         outcome, noise = pure, ""
@@ -236,7 +236,8 @@ _MOST_NAMED = 12
 
 def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
-    estimate, residuals = solution.estimate, unexplained.residuals_of(solution.estimate)
+    estimate, model = solution.estimate, unexplained.free_model(solution.estimate)
+    residuals = unexplained.residuals_of(estimate, model)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
@@ -246,7 +247,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_set_up(solution),
         *([] if solution.scan.film is None else [_indentation(solution, results)]),
         *_noise(estimate),
-        *(_size(estimate, residuals) + _order(residuals) if enough else []),
+        *(_size(estimate, residuals, model) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
         _symmetry(estimate),
         *_linearity(estimate),

@@ -44,14 +44,14 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     method: Any = solution.method
     seeded = is_dataclass(method) and hasattr(method, "seed")
     estimate, weighed = solution.estimate, solution.estimate.weighed
-    model, predicted, root = estimate.model, estimate.predicted, estimate.noise_root
-    design = estimate.basis.signals(model, estimate.gaussian)
+    model, predicted, basis = estimate.model, estimate.predicted, estimate.basis
     for _ in range(count):
         # Noise of the voltages (n,), in V, with which the estimate moves to first order.
-        error = root @ rng.standard_normal(predicted.size)
+        error = estimate.drawn_noise(rng.standard_normal(predicted.size))
         new_seed, change = int(rng.integers(2**32)), weighed.gain @ error
         drawn_model = replace(model, points=replace(model.points, u=predicted + error))
-        drawn = replace(weighed, mean=weighed.mean + change, residual=error - design @ change)
+        left = error - basis.voltages(model, estimate.gaussian, change)
+        drawn = replace(weighed, mean=weighed.mean + change, residual=left)
         moved = replace(estimate, model=drawn_model, weighed=drawn)
         try:
             other = replace(method, seed=new_seed) if seeded else method
@@ -91,7 +91,7 @@ def _divided(
     smoothed = smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     # The width of the Gaussian chooses the grid.
-    sigma = estimate.gaussian.sigma + float(solution.estimate.gaussian_gain[1] @ error)
+    sigma = estimate.gaussian.sigma + float((solution.estimate.gaussian_gain[1:2] @ error)[0])
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
     drawn = deconvolve(estimate, band, fields, method)

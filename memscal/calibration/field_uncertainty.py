@@ -19,18 +19,22 @@ is counted beside that, as it is for the profile (``window``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from scipy.fft import fftshift, ifftshift, irfft2, rfft2
 
 from memscal.calibration.stages import Deconvolution, Solution
-from memscal.calibration.uncertainty import InputEffect, correlation_matrix, square_root
+from memscal.calibration.uncertainty import InputEffect, correlation_matrix
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import FloatArray
 
 #: Windows below this have closed.
 _CLOSED = 1e-9
+#: Nodes of the posterior's errors for each Gaussian width; columns that are made at a time.
+_PER_WIDTH, _COLUMNS = 6.0, 16
 
 
 def field_errors(
@@ -40,52 +44,79 @@ def field_errors(
     correlations: Mapping[tuple[str, str], float],
 ) -> FloatArray:
     """Standard uncertainties of G on its grid (2, m, n), in 1/m^2: of noise alone, and in all."""
-    from scipy.interpolate import CubicSpline, RectBivariateSpline
+    from scipy.interpolate import RectBivariateSpline
 
     fields: Any = solution.fields
     estimate, g = solution.estimate, deconvolution.g
-    voltages = np.array([effect.voltage for effect in effects.values()])
     inputs = np.zeros((estimate.points.u.size, 0))
     if effects:
+        voltages = np.array([effect.voltage for effect in effects.values()])
         inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
     x, y = fields.central.axes
-    # Kernels of all parameters about the centre on the lattice, (nodes, p).
-    radius = fields.central.radius
-    table = np.arange(0.0, float(radius.max()) + 4 * fields.step, fields.step)
-    kernels = CubicSpline(table, estimate.basis.radial(table))(radius.ravel())
-    kernels = kernels + estimate.oval_columns(x, y)
+    if not deconvolution.divided:
+        # No lattice is needed: as fine as the narrowest kernels.
+        x, y = (_evenly(axis, _PER_WIDTH / estimate.gaussian.sigma) for axis in (x, y))
     on_lattice = RectBivariateSpline(g.y, g.x, g.image)(
         np.clip(y, g.y[0], g.y[-1]), np.clip(x, g.x[0], g.x[-1])
     )
-    on_lattice[fields.confinement == 0] = 0.0
     changes = _divided if deconvolution.divided else _of_posterior
-    variances = changes(solution, deconvolution, kernels, on_lattice.ravel(), inputs)
+    variances = changes(solution, deconvolution, _kernels(estimate, x, y), on_lattice, inputs)
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
     planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
     return np.maximum.accumulate(np.maximum(planes, 0.0))
 
 
+def _evenly(axis: FloatArray, per_metre: float) -> FloatArray:
+    """An axis with at most so many nodes."""
+    count = min(axis.size, int(np.ceil(np.ptp(axis) * per_metre)) + 4)
+    return np.linspace(axis[0], axis[-1], count)
+
+
+def _kernels(
+    estimate: ProfileEstimate, x: FloatArray, y: FloatArray
+) -> Callable[[FloatArray], FloatArray]:
+    """Return combinations (p, m) of the posterior's kernels on a grid about the centre."""
+    from scipy.interpolate import CubicSpline
+
+    radius = np.hypot.outer(y, x).ravel()
+    step = min(x[1] - x[0], estimate.gaussian.sigma / _PER_WIDTH) / 2
+    table = np.arange(0.0, float(radius.max()) + 4 * step, step)
+    radial, rows = estimate.basis.radial(table), max(BLOCK // x.size, 1)
+
+    def combined(coefficients: FloatArray) -> FloatArray:
+        round_ = CubicSpline(table, radial @ coefficients)(radius)
+        for start in range(0, y.size, rows):
+            oval = estimate.oval_columns(x, y[start : start + rows])
+            first = start * x.size
+            round_[first : first + len(oval)] += oval @ coefficients
+        return np.asarray(round_)
+
+    return combined
+
+
 def _of_posterior(
     solution: Solution,
     deconvolution: Deconvolution,
-    kernels: FloatArray,
+    kernels: Callable[[FloatArray], FloatArray],
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate, a = solution.estimate, deconvolution.conversion_constant
-    rows = (kernels - np.outer(g, estimate.basis.integrals)) / a
-    gain, scattered = estimate.weighed.gain, estimate.scattered(estimate.weighed.gain)
-    random = scattered @ scattered.T
-    scatter = np.sum((rows @ random) * rows, axis=1)
-    rest = np.sum((rows @ (estimate.covariance - random)) * rows, axis=1)
-    return np.stack([scatter, rest + np.sum((rows @ (gain @ inputs)) ** 2, axis=1)])
+    gain, integrals = estimate.weighed.gain, estimate.basis.integrals
+    random = estimate.scattered(gain)
+    rest = square_root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
+    variances = []
+    for columns in (random, np.hstack([rest, gain @ inputs])):
+        changes = kernels(columns) - np.outer(g.ravel(), integrals @ columns)
+        variances.append(np.sum(changes**2, axis=1) / a**2)
+    return np.array(variances)
 
 
 def _divided(
     solution: Solution,
     deconvolution: Deconvolution,
-    kernels: FloatArray,
+    kernels: Callable[[FloatArray], FloatArray],
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
@@ -93,11 +124,15 @@ def _divided(
     fields: Any = solution.fields
     estimate, smoothed = solution.estimate, solution.smoothed
     grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
-    shape, taper = fields.confinement.shape, fields.confinement.ravel()
+    shape, fit = fields.confinement.shape, estimate.gaussian
     window, stress = deconvolution.quotient.window, grid.forward(fields.stress.values)
     ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
     share = fields.share(smoothed)
     noise = estimate.noise**2 / estimate.outlier_weight
+    # Nodes where G is stated.
+    x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in grid.axes)
+    inside = np.flatnonzero(np.logical_and.outer(y, x))
+    taper, g = fields.confinement.ravel(), g.ravel()[inside]
 
     def placed(values: FloatArray) -> FloatArray:
         """Put columns (n, q) of the points on the lattice, (q, m, n)."""
@@ -107,37 +142,60 @@ def _divided(
         return planes
 
     def filtered(planes: FloatArray, spectrum: FloatArray = ratio) -> FloatArray:
-        """Filter planes (q, m, n) to A G: (nodes, q)."""
+        """Filter planes (q, m, n) to A G within its support: (nodes, q)."""
         plane = fftshift(irfft2(spectrum * rfft2(planes), s=shape), axes=(1, 2))
         return plane.reshape(len(planes), -1).T
 
-    mean = fields.kernel(estimate.radial).ravel()
-    columns = np.column_stack([kernels, mean])
-    passed = filtered(ifftshift(columns.T.reshape(-1, *shape), axes=(1, 2)), window)
-    lost, passed = columns - taper[:, None] * passed, passed[:, :-1]
-    # An error of the centre moves what was fitted around the raster, and the frame that G is seen
-    # in: where nothing was measured they cancel.
-    signals = estimate.basis.signals(estimate.model, estimate.gaussian)
-    beside = passed - filtered(placed(signals))
-    weighted = noise * gain
+    # The posterior mean and its kernels: what of them the window takes away; and what an error of
+    # the parameters moves, of what was fitted around the raster and of the frame that G is seen in.
+    # Where nothing was measured these cancel.
+    count = estimate.basis.integrals.size
+    lost, beside = np.empty((inside.size, count + 1)), np.empty((inside.size, count))
+    sums, of_frame = np.empty(count + 1), np.empty(count)
+    for some in _chunks(count):
+        columns = kernels(unit := np.eye(count)[:, some])
+        passed = filtered(ifftshift(columns.T.reshape(-1, *shape), axes=(1, 2)), window)
+        moved = passed - filtered(placed(estimate.basis.voltages(estimate.model, fit, unit)))
+        beside[:, some], of_frame[some] = moved[inside], taper @ moved
+        columns -= taper[:, None] * passed
+        lost[:, some], sums[some] = columns[inside], columns.sum(axis=0)
+    mean = fields.kernel(estimate.radial)
+    columns = mean.ravel() - taper * filtered(ifftshift(mean)[None], window)[:, 0]
+    lost[:, -1], sums[-1] = columns[inside], columns.sum()
     own = np.zeros(shape)
     np.add.at(own, fields.index, share**2 * noise)
     squared = rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own)
-    variance = fftshift(irfft2(squared, s=shape)).ravel()
-    variance += 2 * np.sum(beside * filtered(placed(weighted.T)), axis=1)
-    variance += np.sum((beside @ (weighted @ gain.T)) * beside, axis=1)
+    variance = fftshift(irfft2(squared, s=shape)).ravel()[inside]
+    for left, right in gain.parts:
+        of_points: Any = np.eye(share.size) if right is None else right
+        for some in _chunks(of_points.shape[1]):
+            moved = filtered(placed(noise[:, None] * of_points[:, some]))[inside]
+            variance += 2 * np.sum((beside @ left[:, some]) * moved, axis=1)
+    spread = square_root(gain.covariance(lambda columns: np.sqrt(noise)[:, None] * columns))
+    for some in _chunks(count):
+        variance += np.sum((beside @ spread[:, some]) ** 2, axis=1)
     # A is the sum of A G over the nodes.
     back = irfft2(np.conj(ratio) * rfft2(ifftshift(fields.confinement)), s=shape)
-    of_a = grid.cell_area * (share * back[fields.index] + (taper @ beside) @ gain)
+    of_frame = (of_frame[None, :] @ gain).dense()[0]
+    of_a, taper = grid.cell_area * (share * back[fields.index] + of_frame), taper[inside]
 
     def changed(voltages: FloatArray) -> FloatArray:
         fitted = beside @ (gain @ voltages)
-        return np.asarray(taper[:, None] * (filtered(placed(voltages)) + fitted))
+        return np.asarray(taper[:, None] * (filtered(placed(voltages))[inside] + fitted))
 
     with_a = changed((noise * of_a)[:, None])[:, 0]
     variance = taper**2 * variance - 2 * g * with_a + g**2 * float(of_a**2 @ noise)
-    hidden = np.column_stack([lost[:, -1], lost[:, :-1] @ square_root(estimate.covariance)])
-    columns = np.hstack([changed(inputs), hidden])
-    sums = np.append(of_a @ inputs, grid.cell_area * hidden.sum(axis=0))
-    rest = np.sum((columns - np.outer(g, sums)) ** 2, axis=1)
-    return np.stack([variance, rest]) / a**2
+    rest = np.sum((changed(inputs) - np.outer(g, of_a @ inputs)) ** 2, axis=1)
+    root = np.zeros((count + 1, count + 1))
+    root[:-1, :-1], root[-1, -1] = square_root(estimate.covariance), 1.0
+    sums = grid.cell_area * (sums @ root)
+    for some in _chunks(count + 1):
+        rest += np.sum((lost @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)
+    planes = np.zeros((2, fields.confinement.size))
+    planes[:, inside] = np.stack([variance, rest]) / a**2
+    return planes
+
+
+def _chunks(count: int) -> list[slice]:
+    """Some columns at a time."""
+    return [slice(start, min(start + _COLUMNS, count)) for start in range(0, count, _COLUMNS)]

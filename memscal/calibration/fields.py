@@ -9,15 +9,16 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
-from scipy.special import j0
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
+from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
 from memscal.estimation.smoothing import Band, SmoothedProfile
+from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import EvenAxis, even_lattice
 
@@ -224,7 +225,7 @@ class RasterFields:
         weight = smoothed.outlier_weight / smoothed.estimate.points.load
         return np.asarray(weight / readings[self.index])
 
-    def gain(self, smoothed: SmoothedProfile) -> FloatArray:
+    def gain(self, smoothed: SmoothedProfile) -> VoltageMap:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
         # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
         points, k = smoothed.estimate.points, smoothed.estimate.model.k
@@ -232,12 +233,18 @@ class RasterFields:
         share = self.share(smoothed)
         profiled = np.ones_like(self.voltage.values)
         np.subtract.at(profiled, self.index, share * points.load)
-        # A node whose points count in full has nothing of the profile.
-        kept = profiled > 1e-12
-        bessel = j0(np.multiply.outer(k, self.grid.radius[kept]))
-        elsewhere = (bessel * profiled[kept]) @ (bessel.T * weights) @ smoothed.gain
-        own = j0(np.multiply.outer(k, self.grid.radius[self.index])) * share
-        return np.asarray(self.grid.cell_area * (own + elsewhere))
+        radius = self.grid.radius
+        table = wave_table(0, False, float(radius.max()), k.tobytes())
+        everywhere = table.interpolation(radius.ravel())
+        # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
+        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.splines
+        elsewhere = (table.splines.T @ both) * weights
+        own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
+        by_points = VoltageMap(((table.splines.T, own),))
+        if share.size <= DENSE:
+            by_points = VoltageMap(((by_points.dense(), None),))
+        by_profile: VoltageMap = elsewhere @ smoothed.gain
+        return (by_points + by_profile) * self.grid.cell_area
 
     def on_support(self, kernel: FloatArray, profile: PosteriorProfile | None) -> Field:
         """Return a kernel on its support."""

@@ -70,7 +70,7 @@ class DrawnScans:
         points = estimate.points
         noise: FloatArray = rng.standard_normal(points.u.size)
         if points.decorrelation is not None:
-            noise = np.asarray(np.linalg.solve(points.decorrelation, noise), dtype=float)
+            noise = points.decorrelation.correlate(noise)
         residual = points.u - uncertainty.drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise

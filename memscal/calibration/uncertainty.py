@@ -28,6 +28,7 @@ from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import RECTANGLE, carried_force, reference_sensitivities
 from memscal.estimation.smoothing import SmoothedProfile
+from memscal.estimation.voltage_map import VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
@@ -38,6 +39,8 @@ from memscal.model.stress import StressProfile
 _FINE = 20
 #: Windows below this have closed; what sums of squares lose to rounding.
 _CLOSED = _ROUNDING = 1e-9
+#: Columns over the points that are made at a time.
+_COLUMNS = 16
 #: Parameters whose uncertainty is broken down by source.
 BUDGETED = (
     "conversion_constant",
@@ -226,7 +229,7 @@ class DrawnScatter:
 class _Derivatives:
     """Derivatives of results, one row each, and what the regularisation hides of them."""
 
-    by_voltage: FloatArray  # (m, n)
+    by_voltage: VoltageMap  # (m, n)
     by_state: FloatArray  # (m, p): by the posterior's parameters, beside what voltages do to them
     hidden: FloatArray  # (m, q): columns
 
@@ -235,8 +238,8 @@ class _Derivatives:
 
     def combined(self, row: FloatArray) -> _Derivatives:
         """Derivatives of a sum of the results."""
-        parts = (self.by_voltage, self.by_state, self.hidden)
-        return _Derivatives(*((row @ part)[None, :] for part in parts))
+        rows = row[None, :]
+        return _Derivatives(rows @ self.by_voltage, rows @ self.by_state, rows @ self.hidden)
 
 
 def propagate(
@@ -254,16 +257,16 @@ def propagate(
     names = tuple(numbers)
     values = np.array([value for value, _ in numbers.values()])
     parts = [*(derivatives for _, derivatives in numbers.values()), kernel[1:]]
-    by_voltage = np.vstack([part.by_voltage for part in parts])
+    by_voltage = VoltageMap.stacked([part.by_voltage for part in parts])
     columns = {
         "noise": estimate.scattered(by_voltage),
         "regularisation": np.vstack([part.by_state for part in parts]) @ _fixed_root(estimate),
         "window": np.vstack([part.hidden for part in parts]),
     }
-    gaussian = np.zeros_like(by_voltage)
     rows = [names.index(name) for name in _OF_GAUSSIAN if name in names]
-    gaussian[rows] = by_voltage[rows]
-    columns["misfit"] = _misfit_columns(estimate, gaussian)
+    misfit = _misfit_columns(estimate, by_voltage[rows])
+    columns["misfit"] = np.zeros((len(by_voltage), misfit.shape[1]))
+    columns["misfit"][rows] = misfit
     if drawn is not None:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
@@ -330,7 +333,7 @@ def expected_values(solution: Solution) -> dict[str, float]:
     kernel = _kernel_derivatives(solution, deconvolution, np.zeros(0))
     residual = estimate.points.u - drawn_about(solution)
     return {
-        name: value - float(derivatives.by_voltage[0] @ residual)
+        name: value - float((derivatives.by_voltage @ residual)[0])
         for name, (value, derivatives) in _numbers(estimate, deconvolution, kernel).items()
     }
 
@@ -362,10 +365,13 @@ def _numbers(
     hidden, gaussian = kernel.hidden.shape[1], estimate.gaussian
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain, count = estimate.gaussian_gain, estimate.points.ellipse
-    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], hidden))}
+    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1:2], hidden))}
     first = len(gain) - count
     for i, name in enumerate(_OF_GAUSSIAN[2 : 2 + count]):
-        numbers[name] = float(gaussian.ellipticity[i]), _fitted(estimate, gain[first + i], hidden)
+        numbers[name] = (
+            float(gaussian.ellipticity[i]),
+            _fitted(estimate, gain[first + i : first + i + 1], hidden),
+        )
     return {
         "conversion_constant": (deconvolution.conversion_constant, kernel[:1]),
         **numbers,
@@ -374,10 +380,10 @@ def _numbers(
     }
 
 
-def _fitted(estimate: ProfileEstimate, row: FloatArray, hidden: int) -> _Derivatives:
+def _fitted(estimate: ProfileEstimate, row: VoltageMap, hidden: int) -> _Derivatives:
     """Derivatives of a parameter that no regularisation touches."""
     states = np.zeros((1, estimate.basis.integrals.size))
-    return _Derivatives(row[None, :], states, np.zeros((1, hidden)))
+    return _Derivatives(row, states, np.zeros((1, hidden)))
 
 
 def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float, _Derivatives]]:
@@ -392,10 +398,10 @@ def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float,
     states = np.eye(estimate.basis.integrals.size)
     numbers = {}
     for i, (name, scale) in enumerate(entries):
-        fitted = _fitted(estimate, scale * gain[2 + i], hidden)
+        fitted = _fitted(estimate, gain[2 + i : 3 + i] * scale, hidden)
         state = scale * states[2 + i : 3 + i]
         numbers[name] = scale * float(values[i]), replace(fitted, by_state=state)
-    gaussian = _fitted(estimate, estimate.gaussian_gain[0], hidden)
+    gaussian = _fitted(estimate, estimate.gaussian_gain[:1], hidden)
     numbers["conversion_constant_gaussian"] = (estimate.gaussian.conversion_constant, gaussian)
     return numbers
 
@@ -413,7 +419,7 @@ def _kernel_derivatives(
         return _posterior_kernel(estimate, deconvolution, wavenumbers)
     division = _division_map(solution, smoothed, deconvolution, wavenumbers)
     # Centre, baseline and drift are parameters of the estimate.
-    by_nuisance = -division.direct @ division.nuisance
+    by_nuisance = -(division.direct @ division.nuisance)
     by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
     by_state[:, division.places] = by_nuisance
     spread = division.lost[:, 1:] @ square_root(estimate.covariance)
@@ -442,9 +448,9 @@ def _posterior_kernel(
 class _DivisionMap:
     """A division of fields as a linear map from voltages less background to A, G and transfer."""
 
-    direct: FloatArray  # (m, n): of voltages, for given centre, baseline and drift
+    direct: VoltageMap  # (m, n): of voltages, for given centre, baseline and drift
     nuisance: FloatArray  # (n, q): voltages by free centres, baselines and drifts
-    signals: FloatArray  # (n, 1 + p): voltages of the posterior mean, and by its parameters
+    kept: FloatArray  # (m, 1 + p): what voltages of the posterior mean, and by its parameters, give
     lost: FloatArray  # (m, 1 + p): what the division hides of these
 
     @property
@@ -472,19 +478,19 @@ def _division_map(
     synthesis = fields.taper(r)[:, None] * j0(np.multiply.outer(r, model.k)) * weights
     rings = ring_areas(r)
 
-    def normalised(radial: FloatArray) -> FloatArray:
-        """Changes of A, G and its transfer function for changes of A G (r, m)."""
-        of_a = rings @ radial
-        of_g = (radial - np.multiply.outer(g, of_a)) / a
-        transfer = (j0(np.multiply.outer(wavenumbers, r)) * rings) @ of_g
-        return np.vstack([of_a[None, :], of_g, transfer])
-
+    # From changes of A G at its radii to those of A, G and its transfer function.
+    of_g = (np.eye(r.size) - np.multiply.outer(g, rings)) / a
+    transfer = (j0(np.multiply.outer(wavenumbers, r)) * rings) @ of_g
+    normalised = np.vstack([rings, of_g, transfer])
     geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
-    signals = model.signal(geometry, np.column_stack([estimate.kernel, basis.kernels(model.k)]))
+    kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
+    starts = range(0, kernels.shape[1], _COLUMNS)
+    signals = (model.signal(geometry, kernels[:, i : i + _COLUMNS]) for i in starts)
+    direct = normalised @ synthesis @ gain
+    kept = np.hstack([direct @ voltages for voltages in signals])
     radial = np.column_stack([estimate.radial(r), basis.radial(r)])
-    lost = normalised(radial - synthesis @ (gain @ signals))
-    return _DivisionMap(normalised(synthesis @ gain), nuisance, signals, lost)
+    return _DivisionMap(direct, nuisance, kept, normalised @ radial - kept)
 
 
 def route_difference(solution: Solution) -> float | None:
@@ -496,10 +502,9 @@ def route_difference(solution: Solution) -> float | None:
         return None
     division = solution.deconvolution if solution.deconvolution.divided else solution.other
     linear = _division_map(solution, smoothed, division, np.zeros(0))
-    changes = linear.signals[:, 1:].copy()
-    changes[:, linear.places] += linear.nuisance
-    moved = linear.direct @ changes
-    noise = estimate.scattered(linear.direct) - moved @ estimate.scattered(estimate.weighed.gain)
+    moved = linear.kept[:, 1:].copy()
+    moved[:, linear.places] += linear.direct @ linear.nuisance
+    noise = estimate.scattered(linear.direct - moved @ estimate.weighed.gain)
     difference = linear.direct @ (estimate.points.u - estimate.predicted)
     variance = np.sum(np.hstack([noise, moved @ _fixed_root(estimate)]) ** 2, axis=1)
     rings = ring_areas(division.g.r)
@@ -508,7 +513,7 @@ def route_difference(solution: Solution) -> float | None:
 
 
 def _drawn_columns(
-    by_voltage: FloatArray, names: tuple[str, ...], noise: FloatArray, drawn: DrawnScatter
+    by_voltage: VoltageMap, names: tuple[str, ...], noise: FloatArray, drawn: DrawnScatter
 ) -> FloatArray:
     """Scatter of repeated draws in place of the first-order noise of what the division decides."""
     columns = by_voltage @ drawn.voltages
@@ -521,8 +526,8 @@ def _drawn_columns(
     return np.asarray(columns)
 
 
-def _misfit_columns(estimate: ProfileEstimate, gain: FloatArray) -> FloatArray:
-    """Changes of the Gaussian fit, of this gain, with the reach of its scans; mean square: sum."""
+def _misfit_columns(estimate: ProfileEstimate, gain: VoltageMap) -> FloatArray:
+    """Changes of numbers of the Gaussian fit with the reach of its scans; mean square: sum."""
     # The sandwich of a misspecified model: White, Econometrica 50 (1982) 1; Conley, J. Econometrics
     # 92 (1999) 1.
     points, distance = estimate.points, estimate.distance
@@ -530,21 +535,14 @@ def _misfit_columns(estimate: ProfileEstimate, gain: FloatArray) -> FloatArray:
     share = distance / reach[points.scan]
     inwards = np.argsort(-share)
     misfit = estimate.predicted - estimate.gaussian.predicted
-    changes = np.cumsum((gain * misfit)[:, inwards], axis=1)
+    changes = np.cumsum((gain.dense() * misfit)[:, inwards], axis=1)
     # From the least reach to the full one, each change holds until the next point is left out.
     ends = np.clip(np.append(share[inwards], 0.0), _LEAST_REACH, 1.0)
-    return np.asarray(changes * np.sqrt(-np.diff(ends) / (1 - _LEAST_REACH)))
+    changes *= np.sqrt(-np.diff(ends) / (1 - _LEAST_REACH))
+    return triangular(changes.T).T
 
 
 def _fixed_root(estimate: ProfileEstimate) -> FloatArray:
     """Square root of what of the posterior's covariance does not scatter from scan to scan."""
     random = estimate.scattered(estimate.weighed.gain)
     return square_root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
-
-
-def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
-    """A square root of a covariance that may be singular, scaled by the given variances."""
-    scale = np.maximum(np.diag(covariance) if variances is None else variances, 0.0)
-    safe = np.where(scale > 0, np.sqrt(scale), 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
-    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

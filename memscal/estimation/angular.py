@@ -20,7 +20,7 @@ size of each order is the root mean square over its posterior, its logarithm wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ive
@@ -45,11 +45,44 @@ _FIRST, _SWEEPS = 0.1, 2
 
 
 @dataclass(frozen=True, eq=False)
+class AngularRings:
+    """Blurred rings of unit amplitude: of each order those with a cosine, then with a sine."""
+
+    radius: FloatArray  # (q,), in m
+    blur: float  # in m
+
+    @classmethod
+    def about(cls, fit: GaussianFit) -> AngularRings:
+        """Rings about a Gaussian fit."""
+        width = max(fit.sigma, 0.5 * fit.points.step)
+        return cls(width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING), _BLUR * width)
+
+    def at(self, x: FloatArray, y: FloatArray) -> list[FloatArray]:
+        """Values of each order at positions from the centre, (n,) in m: cosines, sines, (n, q)."""
+        from scipy.interpolate import CubicSpline
+
+        r, angle, blocks = np.hypot(x, y), np.arctan2(y, x), []
+        step = self.blur / _PER_BLUR
+        table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
+        for m in ORDERS:
+            values = CubicSpline(table, rings_of_order(m, table, self.radius, self.blur))(r)
+            blocks += [turn(m * angle)[:, None] * values for turn in (np.cos, np.sin)]
+        return blocks
+
+    def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
+        """Voltages at the points, for centres (scans, 2) in m: (n, 8 q), in V."""
+        blurred, blocks = np.exp(-0.5 * (self.blur * model.k) ** 2)[:, None], []
+        for m in ORDERS:
+            rings = blurred * bessel(m, np.multiply.outer(model.k, self.radius))
+            blocks.append(model.around(m, rings, rings, centres))
+        return np.hstack(blocks)
+
+
+@dataclass(frozen=True, eq=False)
 class AngularDepartures:
     """Kernels of unit prior variance: of each order those with a cosine, then those with a sine."""
 
-    radius: FloatArray  # (q,): of the rings, in m
-    blur: float  # in m
+    rings: AngularRings
     #: (q, m) of each cosine and sine of ORDERS: amplitudes of the rings in each kernel, in V/Pa.
     amplitudes: tuple[FloatArray, ...]
 
@@ -60,25 +93,13 @@ class AngularDepartures:
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Kernels at positions from the centre, shape (n,), in m: (n, count), in V/Pa/m^2."""
-        from scipy.interpolate import CubicSpline
+        return self.combined(np.hstack(self.rings.at(x, y)))
 
-        r, angle, blocks = np.hypot(x, y), np.arctan2(y, x), []
-        step = self.blur / _PER_BLUR
-        table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
-        for i, m in enumerate(ORDERS):
-            values = CubicSpline(table, rings_of_order(m, table, self.radius, self.blur))(r)
-            both = zip((np.cos, np.sin), self.amplitudes[2 * i : 2 * i + 2], strict=True)
-            blocks += [turn(m * angle)[:, None] * (values @ each) for turn, each in both]
-        return np.hstack(blocks)
-
-    def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
-        """Voltages of the kernels at the points, for centres (scans, 2) in m: (n, count), in V."""
-        blurred, blocks = np.exp(-0.5 * (self.blur * model.k) ** 2)[:, None], []
-        for i, m in enumerate(ORDERS):
-            rings = blurred * bessel(m, np.multiply.outer(model.k, self.radius))
-            cosines, sines = self.amplitudes[2 * i : 2 * i + 2]
-            blocks.append(model.around(m, rings @ cosines, rings @ sines, centres))
-        return np.hstack(blocks)
+    def combined(self, rings: FloatArray) -> FloatArray:
+        """Columns (n, count) of the kernels by those of the rings, (n, 8 q)."""
+        blocks = np.split(rings, len(self.amplitudes), axis=1)
+        pairs = zip(blocks, self.amplitudes, strict=True)
+        return np.hstack([block @ each for block, each in pairs])
 
 
 def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> FloatArray:
@@ -88,34 +109,29 @@ def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> Fl
 
 
 def angular_departures(
-    model: ForwardModel, fit: GaussianFit, radial: FloatArray, weights: FloatArray, noise: float
+    rings: AngularRings, fit: GaussianFit, columns: tuple[FloatArray, ...], noise: float
 ) -> AngularDepartures:
     """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
-    # ``radial``: voltages of the fit's parameters and of all radial departures, shape (n, p).
-    width = max(fit.sigma, 0.5 * model.points.step)
-    radius = width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING)
+    # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
+    # of the rings, (n, p).
+    data, flat, radial, of_rings = (values / noise for values in columns)
+    radius, width = rings.radius, rings.blur / _BLUR
     size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
-    amplitudes = [np.diag(size * each) for each in _unit_amplitudes(radius, width)]
-    plain = AngularDepartures(radius, _BLUR * width, tuple(np.repeat(amplitudes, 2, axis=0)))
-
-    def standardised(values: FloatArray) -> FloatArray:
-        return model.points.standardised(values, weights) / noise
-
-    columns, flat = standardised(plain.signal(model, fit.centre)), standardised(fit.jacobian)
+    plain = np.repeat([np.diag(size * a) for a in _unit_amplitudes(radius, width)], 2, axis=0)
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
-    axis = np.nonzero(model.points.free)[1]
+    axis = np.nonzero(fit.points.free)[1]
     shifts = flat[:, 2 : 2 + axis.size] @ np.eye(2)[axis]
-    moved, blocks = [*shifts.T, *flat[:, -2:].T], np.split(columns, 2 * len(ORDERS), axis=1)
+    moved = [*shifts.T, *flat[:, -2:].T]
+    blocks = [b @ a for b, a in zip(np.split(of_rings, len(plain), axis=1), plain, strict=True)]
     kept = [np.linalg.svd((c @ b)[None, :])[2][1:].T for c, b in zip(moved, blocks, strict=False)]
     kept += [np.eye(radius.size)] * (len(blocks) - len(kept))
-    left, singular, _ = np.linalg.svd(standardised(radial), full_matrices=False)
+    left, singular, _ = np.linalg.svd(np.hstack([flat, radial]), full_matrices=False)
     base = left[:, singular > _RESOLVED]
-    data = standardised(model.points.u - fit.predicted)
     free = np.hstack([block @ keep for block, keep in zip(blocks, kept, strict=True)])
     data, free = (values - base @ (base.T @ values) for values in (data, free))
     strengths = np.repeat(_expected_strengths(free, data, [keep.shape[1] for keep in kept]), 2)
-    parts = zip(strengths, plain.amplitudes, kept, strict=True)
-    return replace(plain, amplitudes=tuple(s * (each @ keep) for s, each, keep in parts))
+    parts = zip(strengths, plain, kept, strict=True)
+    return AngularDepartures(rings, tuple(s * (each @ keep) for s, each, keep in parts))
 
 
 def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:

@@ -17,7 +17,9 @@ from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_depar
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, TestOutcome
+from memscal.estimation.reduced_scan import ReducedScan
+from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
+from memscal.estimation.voltage_map import square_root, triangular
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -25,6 +27,8 @@ from memscal.model.checks import FALSE_ALARM
 _MOST_FOLDS = 10
 #: Loads that differ by less of their mean are one load, recorded with scatter.
 _SAME_LOAD = 0.05
+#: Columns are dependent below this share of the largest; so many are multiplied at a time.
+_DEPENDENT, _COLUMNS = 1e-10, 16
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,16 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
-    columns = model.design[:, 2 : 2 + nuisances]
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
-    predicted = {int(i): _predict(model, columns, fold == i) for i in np.unique(fold)}
+    # The triangular factors of each fold's design and data stand for them.
+    roots = {}
+    for i in np.unique(fold):
+        rows = np.flatnonzero(fold == i)
+        both = np.column_stack([model.design[rows], model.data[rows]])
+        roots[int(i)] = triangular(both), rows.size
+    predicted = {i: _predict(model.stated, roots, i, slice(2, 2 + nuisances)) for i in roots}
     outcomes = {i: outcome for i, outcome in predicted.items() if outcome is not None}
     if (folds := len(outcomes)) < 2:
         return None
@@ -70,26 +79,30 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
 
 
 def _predict(
-    model: FreeModel, nuisances: FloatArray, out: NDArray[np.bool_]
+    stated: bool, roots: dict[int, tuple[FloatArray, int]], out: int, nuisances: slice
 ) -> tuple[float, float, int, int | None] | None:
     """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
-    others, others_degrees = _residual(model.design[~out], model.data[~out])
-    both, both_degrees = _residual(np.hstack([model.design, nuisances * out[:, None]]), model.data)
+    rest = [root for i, root in roots.items() if i != out]
+    (own, own_count), joined = roots[out], np.vstack([root for root, _ in rest])
+    count = sum(size for _, size in rest)
+    others, others_degrees = _residual(joined, count)
+    beside = np.vstack([np.zeros((len(joined), own[:, nuisances].shape[1])), own[:, nuisances]])
+    whole = np.hstack([beside, np.vstack([joined, own])])
+    both, both_degrees = _residual(whole, count + own_count)
     degrees = both_degrees - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
     value = max(both - others, 0.0) / degrees
-    if model.stated:
+    if stated:
         return float(chdtrc(degrees, degrees * value)), value, degrees, None
     value /= max(others / others_degrees, np.finfo(float).tiny)
     return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
 
 
-def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
-    """Residual sum of squares and its degrees of freedom."""
-    basis = residuals.orthonormal(design)
-    rest = data - basis @ (basis.T @ data)
-    return float(rest @ rest), int(data.size - basis.shape[1])
+def _residual(root: FloatArray, count: int) -> tuple[float, int]:
+    """Residual sum of squares of the last column by the others, of ``count`` points; degrees."""
+    square, rank = _left_over(root, np.linalg.norm(root[:, :-1], axis=0))
+    return square, count - rank
 
 
 @dataclass(frozen=True)
@@ -102,39 +115,67 @@ class CentresApart(TestOutcome):
 def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     """Shift each repeat of line scans, whatever G; ``None`` without repeats that can be shifted."""
     points = estimate.points
-    repeats, first, size = np.unique(points.repeat, return_index=True, return_counts=True)
-    scan = points.scan[first]
-    if points.planar or repeats.size == points.scans or size.min() < MINIMUM_POSITIONS:
+    repeats, start, readings = np.unique(points.repeat, return_index=True, return_counts=True)
+    scan = points.scan[start]
+    if points.planar or repeats.size == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
     model = residuals.free_model(estimate, clip_outliers=True)
-    inside = (points.repeat[:, None] == repeats).astype(np.float64)
     axis = np.argmax(points.free[points.scan], axis=1)
     along = np.where(axis == 0, points.x, points.y)
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
+    # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
+    moved = shift[axis, np.arange(axis.size)]
+    own = np.stack([np.ones_like(along), along / np.abs(along).max(), moved], axis=1)
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
-    moved = inside[:, shifted] * shift[axis, np.arange(axis.size)][:, None]
-    # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
-    columns = np.hstack([inside, inside * (along / np.abs(along).max())[:, None], moved])
-    columns = points.standardised(columns, estimate.weights / estimate.outlier_weight)[model.point]
-    own, moved = np.split(columns, [2 * repeats.size], axis=1)
-    base = residuals.orthonormal(np.hstack([model.design, own]))
-    rest, free = (values - base @ (base.T @ values) for values in (model.data, moved))
-    shifts, _, count, _ = np.linalg.lstsq(free, rest, rcond=None)
-    degrees = rest.size - base.shape[1] - int(count)
-    left = float(np.sum((rest - free @ shifts) ** 2))
+    # Repeats are eliminated one by one, unless their noise is correlated: from a triangular factor.
+    alone = points.decorrelation is None
+    groups = [[i] for i in range(repeats.size)] if alone else [list(range(repeats.size))]
+    weights, common, apart, links = estimate.weights / estimate.outlier_weight, [], [], []
+    size: FloatArray = np.linalg.norm(model.design, axis=0)
+    for group in groups:
+        rows = np.flatnonzero(points.repeat[model.point] == repeats[group[0]])
+        rows = rows if alone else np.arange(model.point.size)
+        columns = [own * (points.repeat == repeats[i])[:, None] for i in group]
+        standard = [points.standardised(c, weights)[model.point[rows]] for c in columns]
+        parts = [c[:, :2] for c in standard]
+        parts += [c[:, 2:] for i, c in zip(group, standard, strict=True) if shifted[i]]
+        first, last = 2 * len(group), 2 * len(group) + int(shifted[group].sum())
+        root = triangular(np.hstack([*parts, model.design[rows], model.data[rows, None]]))
+        common.append(root[first:, last:])
+        apart.append(root[last:, last:])
+        links.append(root[first:last, first:])
+    (without, rank), (left, _) = (_left_over(np.vstack(stack), size) for stack in (common, apart))
+    count = int(shifted.sum())
+    degrees = model.data.size - 2 * repeats.size - rank - count
     if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
         return None
+    stack = np.vstack(apart)
+    coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
     places = np.zeros(repeats.size)
-    places[shifted] = shifts
+    places[shifted] = np.concatenate(
+        [
+            np.linalg.solve(
+                link[:, : len(link)], link[:, -1] - link[:, len(link) : -1] @ coefficients
+            )
+            for link in links
+        ]
+    )
     # Over the scatter that is left: exact whether the noise is stated or not.
-    value = max(float(rest @ rest) - left, 0.0) / count / (left / degrees)
+    value = max(without - left, 0.0) / count / (left / degrees)
     return CentresApart(
         value=value,
         limit=float(fdtri(count, degrees, 1 - FALSE_ALARM)),
         p_value=float(fdtrc(count, degrees, value)),
         distance=float(max(np.ptp(places[scan == i]) for i in range(points.scans))),
     )
+
+
+def _left_over(root: FloatArray, size: FloatArray) -> tuple[float, int]:
+    """Residual sum of squares of the last column by others of a size; their rank."""
+    basis = residuals.orthonormal(root[:, :-1], size)
+    rest = root[:, -1] - basis @ (basis.T @ root[:, -1])
+    return float(rest @ rest), basis.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,11 +269,11 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     columns = columns / scale
     round_ = estimate.gaussian.jacobian
     round_ = round_[:, : round_.shape[1] - estimate.points.ellipse]
-    base = np.linalg.qr(standardised(round_ / np.linalg.norm(round_, axis=0), weights))[0]
-    scaled = standardised(columns, weights)
-    residual = standardised(estimate.weighed.residual + estimate.oval, weights)
-    residual = residual - base @ (base.T @ residual)
-    free = scaled - base @ (base.T @ scaled)
+    parts = [round_ / np.linalg.norm(round_, axis=0), columns]
+    parts.append((estimate.weighed.residual + estimate.oval)[:, None])
+    # What the triangular factor has below the rows of the round columns is free of them.
+    root = triangular(standardised(np.hstack(parts), weights))[round_.shape[1] :]
+    free, residual = root[:, round_.shape[1] : -1], root[:, -1]
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
     fall = float(residual @ free @ coefficients)
@@ -284,15 +325,19 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
         fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     except FitError:
         return none
-    basis = departure_basis(model, fit, weights, estimate.basis.angular)
+    angular = estimate.basis.angular
+    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    basis = departure_basis(model, fit, reduced, angular)
     count = float(estimate.outlier_weight[~plateau].sum())
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
-    others = weigh_departures(model, fit, basis, weights, count, least_noise=least)
+    others = weigh_departures(reduced, basis, count, least_noise=least)
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau / plateau.sum()
     overshoot = -float(share @ others.residual)
-    slope = share @ basis.signals(model, fit)
-    variance = share**2 @ _ordinary_noise(estimate) ** 2 + slope @ others.covariance @ slope
+    spread = square_root(others.covariance)
+    starts = range(0, len(spread), _COLUMNS)
+    changes = [share @ basis.voltages(model, fit, spread[:, i : i + _COLUMNS]) for i in starts]
+    variance = share**2 @ _ordinary_noise(estimate) ** 2 + float(np.sum(np.hstack(changes) ** 2))
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 
 
@@ -307,10 +352,15 @@ def _plateau(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np
     order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
     u, noise = estimate.points.u[order], _ordinary_noise(estimate)[order]
     plateau = np.zeros_like(inside)
-    for count in range(_FEWEST, int(inside.sum()) // 2):
-        top, weight = u[:count], noise[:count] ** -2
-        scatter = weight @ (top - np.average(top, weights=weight)) ** 2
-        if scatter > chdtri(count - 1, _ALIKE):
-            break
-        plateau[order[:count]] = True
+    # Scatter about the mean of the first points, for every number of them.
+    half = int(inside.sum()) // 2
+    weight, offset = noise[:half] ** -2, u[:half] - u[:1]
+    sums = (np.cumsum(weight * offset**power) for power in range(3))
+    total, first, second = sums
+    scatter = second - first**2 / total
+    count = np.arange(1, half + 1)
+    beyond = (scatter > chdtri(np.maximum(count - 1, 1), _ALIKE)) & (count >= _FEWEST)
+    last = int(np.argmax(beyond)) if beyond.any() else half - 1
+    if last >= _FEWEST:
+        plateau[order[:last]] = True
     return plateau

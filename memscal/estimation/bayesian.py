@@ -45,6 +45,8 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel, Rings, Sm
 from memscal.estimation.angular import AngularDepartures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
+from memscal.estimation.reduced_scan import ReducedScan
+from memscal.estimation.voltage_map import VoltageMap
 from memscal.model.arrays import FloatArray
 
 #: Rings are never narrower than this many steps: a width below the sampling is not resolved.
@@ -180,11 +182,24 @@ class DepartureBasis:
         families = self._families(gaussian, lambda kernel: kernel.transform(k))
         return self._columns(gaussian, widening, rings + families)
 
-    def signals(self, model: ForwardModel, fit: GaussianFit) -> FloatArray:
-        """Voltages of all columns at the points, about the fit, shape (n, p), in V."""
-        around = [self.angular.signal(model, fit.centre)] if self.angular else []
-        rings = model.signal(fit.geometry, self.kernels(model.k)[:, self.flat :])
-        return np.hstack([fit.jacobian, *around, rings])
+    def columns(self, reduced: ReducedScan) -> FloatArray:
+        """Voltages of all columns, standardised, of a reduced scan, (r, p)."""
+        around = [self.angular.combined(reduced.rings)] if self.angular else []
+        kernels = self.kernels(reduced.model.k)[:, self.flat :]
+        return np.hstack([reduced.flat, *around, reduced.signal(kernels)])
+
+    def voltages(
+        self, model: ForwardModel, fit: GaussianFit, coefficients: FloatArray
+    ) -> FloatArray:
+        """Voltages at the points of combinations of all columns, (p,) or (p, m): (n,) or (n, m)."""
+        # Coefficients are few: of a million points there is no room for all columns.
+        count = fit.jacobian.shape[1]
+        volts = fit.jacobian @ coefficients[:count]
+        if self.angular:
+            columns = self.angular.combined(self.angular.rings.signal(model, fit.centre))
+            volts += columns @ coefficients[count : self.flat]
+        kernels = self.kernels(model.k)[:, self.flat :]
+        return np.asarray(volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :]))
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values of all columns at radii ``r`` (m), shape (r, p)."""
@@ -220,14 +235,14 @@ class DepartureBasis:
 def departure_basis(
     model: ForwardModel,
     fit: GaussianFit,
-    weights: FloatArray | None = None,
+    reduced: ReducedScan | None = None,
     angular: AngularDepartures | None = None,
 ) -> DepartureBasis:
     """Return the kernels of the fit's own parameters and of every shape about it."""
-    # With the weights of the points, (n,), of the families' best fits, too.
+    # With the scan as reduced about the fit, of the families' best fits, too.
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
-    families = () if weights is None else tuple(_fitted_families(model, fit, weights, width))
+    families = () if reduced is None else tuple(_fitted_families(reduced, width))
     flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 
@@ -238,27 +253,24 @@ _FAMILY_ROUNDS = 8
 _SETTLED, _LONGEST, _FARTHEST = 1e-3, 0.3, 2.5
 
 
-def _fitted_families(
-    model: ForwardModel, fit: GaussianFit, weights: FloatArray, start: float
-) -> Iterator[FamilyFit]:
+def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
     """Fit A and width of every family, centre, baseline and drift by the way."""
-    standardised, step = model.points.standardised, _RELATIVE_STEP
-    others = np.linalg.qr(standardised(fit.jacobian[:, 2:], weights))[0]
+    fit, k, step = reduced.fit, reduced.model.k, _RELATIVE_STEP
+    others = np.linalg.qr(reduced.flat[:, 2:])[0]
 
     def free(values: FloatArray) -> FloatArray:
-        values = standardised(values, weights)
         return np.asarray(values - others @ (others.T @ values))
 
-    gaussian = fit.conversion_constant * kernels.gaussian_transfer(model.k, fit.sigma)
-    data = free(model.points.u - fit.predicted + model.signal(fit.geometry, gaussian))
+    gaussian = fit.conversion_constant * kernels.gaussian_transfer(k, fit.sigma)
+    data = free(reduced.data + reduced.signal(gaussian))
     widths, amplitudes = np.full((2, len(FAMILIES)), start)
     for _ in range(_FAMILY_ROUNDS):
         sensors = [
-            family.kernel(width * factor).transform(model.k)
+            family.kernel(width * factor).transform(k)
             for factor in (1.0, 1 + step)
             for family, width in zip(FAMILIES, widths, strict=True)
         ]
-        signal, wider = np.hsplit(free(model.signal(fit.geometry, np.stack(sensors, axis=1))), 2)
+        signal, wider = np.hsplit(free(reduced.signal(np.stack(sensors, axis=1))), 2)
         # Least squares in A and A d ln(width), of all families at once.
         slope = (wider - signal) / step
         a, b, c = (np.sum(x, axis=0) for x in (signal**2, signal * slope, slope**2))
@@ -457,7 +469,7 @@ class WeighedFit:
 
     mean: FloatArray  # (p,): corrections to the fit's parameters, then the shapes' amplitudes
     covariance: FloatArray  # (p, p): expected squared error, the spread over hypotheses included
-    gain: FloatArray  # (p, n): derivative of the mean by the voltages
+    gain: VoltageMap  # (p, n): derivative of the mean by the voltages
     noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
@@ -480,10 +492,8 @@ class WeighedFit:
 
 
 def weigh_departures(
-    model: ForwardModel,
-    fit: GaussianFit,
+    reduced: ReducedScan,
     basis: DepartureBasis,
-    weights: FloatArray,
     effective_count: float,
     expected_noise: float = 0.0,
     least_noise: float = 0.0,
@@ -492,20 +502,19 @@ def weigh_departures(
     # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.
     # Of a point of weight one, ``expected_noise`` is that of voltages that have none (of a plan),
     # ``least_noise`` the least that there is, as stated.
-    standardised, flat = model.points.standardised, basis.flat
-    unexplained, signals = model.points.u - fit.predicted, basis.signals(model, fit)
-    columns, data = standardised(signals, weights), standardised(unexplained, weights)
-    count, size = data.size, basis.angular.count if basis.angular else 0
+    model, fit, flat = reduced.model, reduced.fit, basis.flat
+    columns, data = basis.columns(reduced), reduced.data
+    size = basis.angular.count if basis.angular else 0
     if size:
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
         prior = least_noise * np.eye(size, columns.shape[1], flat - size)
         columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
     noise = effective_count + size - flat, expected_noise**2, least_noise**2
-    averaged = _average(
-        list(_conditionals(basis, columns, data, noise)), expected_noise**2, basis.integrals
-    )
-    gain = averaged.gain[:, :count] @ standardised(np.eye(count), weights)
-    return replace(averaged, gain=gain, residual=unexplained - signals @ averaged.mean)
+    conditionals = list(_conditionals(basis, columns, data, noise))
+    averaged, gain = _average(conditionals, expected_noise**2, basis.integrals)
+    residual = model.points.u - fit.predicted - basis.voltages(model, fit, averaged.mean)
+    gain = gain[:, : reduced.data.size]
+    return replace(averaged, gain=reduced.by_voltages(gain), residual=residual)
 
 
 def _conditionals(
@@ -548,7 +557,7 @@ def _conditionals(
 
 def _average(
     conditionals: list[_Conditional | None], added: float, integrals: FloatArray
-) -> WeighedFit:
+) -> tuple[WeighedFit, FloatArray]:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
     log_marginal = np.array([-np.inf if c is None else c.log_marginal for c in conditionals])
     priors = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
@@ -570,9 +579,11 @@ def _average(
             covariance += q * added * ((g - gain) @ (g - gain).T)
     scatter = np.array([0.0 if c is None else c.scatter for c in conditionals])
     sums = (np.logaddexp.reduce(log_marginal[p > 0] + np.log(p[p > 0])) for p in priors)
-    noise, gain = float(np.sqrt(estimate @ scatter)), gain + moving
+    noise, unknown = float(np.sqrt(estimate @ scatter)), VoltageMap(())
     # The gain is that of the standardised data, and the residual is left to be computed.
-    return WeighedFit(mean, covariance, gain, noise, estimate, mean, change_of_a, *map(float, sums))
+    logs = map(float, sums)
+    averaged = WeighedFit(mean, covariance, unknown, noise, estimate, mean, change_of_a, *logs)
+    return averaged, gain + moving
 
 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:

@@ -48,6 +48,8 @@ class _Plane:
 class FieldModel(ForwardModel):
     """Voltages at the points of scans through fields."""
 
+    of_waves: ClassVar[bool] = False
+
     @cached_property
     def _plane(self) -> _Plane:
         points, last = self.points, float(self.k[-1])
@@ -73,7 +75,7 @@ class FieldModel(ForwardModel):
         radius = np.hypot(*offset)
         places = offset[::-1] / self._plane.spacing + self._plane.count / 2
         towards = -offset / np.where(radius > 0, radius, 1.0)
-        return PlaneGeometry(radius, towards, self.k, False, places)
+        return PlaneGeometry(radius, towards, self.k, False, self.reach, places)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""

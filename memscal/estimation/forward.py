@@ -19,42 +19,105 @@ the sensor to the indenter,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ive, j0, j1
+from scipy.special import ive, j1
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel
 from memscal.estimation.points import ScanPoints
+from memscal.estimation.voltage_map import BLOCK, DENSE
 from memscal.model.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Rows: TypeAlias = slice | NDArray[np.bool_]
+
+#: In place of the order of a Bessel function: J_1(x)/x.
+TURN = -1
+#: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
+_TABLE_PHASE, _DEGREE = 0.25, 5
+#: Combinations of waves whose voltages are below this share of the largest one's are left out.
+_NOTHING = 1e-14
+
+
+def _wave(wave: int, r: FloatArray, k: FloatArray, across: bool) -> FloatArray:
+    """A wave at all products of radii and wavenumbers: cosines and sines where it is a slit's."""
+    x = np.multiply.outer(r, k)
+    if across:
+        return np.asarray(2 * (np.cos, np.sin)[wave](x) / k)
+    if wave == TURN:
+        return np.divide(j1(x), x, out=np.full_like(x, 0.5), where=x != 0)
+    return bessel(wave, x)
+
+
+@dataclass(frozen=True, eq=False)
+class WaveTable:
+    """Waves on even radii, (t,), for all nodes, and the splines through them."""
+
+    radii: FloatArray
+    values: FloatArray  # (t, nodes)
+    splines: FloatArray  # (t, nodes): coefficients
+    knots: FloatArray
+
+    def interpolation(self, radius: FloatArray) -> csr_array:
+        """From coefficients to radii within the table, shape (n, t), sparse."""
+        from scipy.interpolate import BSpline
+
+        inside = np.clip(radius, self.radii[0], self.radii[-1])
+        return BSpline.design_matrix(inside, self.knots, _DEGREE)
+
+
+@lru_cache(maxsize=32)
+def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable:
+    """Return the table of a wave out to ``reach`` (m), a little beyond both ends."""
+    from scipy.interpolate import make_interp_spline
+
+    k = np.frombuffer(nodes)
+    count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
+    radii: FloatArray = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
+    values = _wave(wave, radii, k, across)
+    spline = make_interp_spline(radii, values, k=_DEGREE)
+    return WaveTable(radii, values, spline.c, spline.t)
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Distances of the points from a trial centre, and Bessel functions there."""
+    """Distances of the points from a trial centre, and sums of waves there."""
 
     radius: FloatArray  # (n,), in m
     towards: FloatArray  # (2, n): derivatives of the radius by the centre's x and y
     k: FloatArray  # (nodes,), in rad/m
     across: bool  # whether the scan crosses a slit: with cosines in place of Bessel functions
+    reach: float  # of the tables, in m
+
+    def summed(self, wave: int, spread: FloatArray, rows: Rows = slice(None)) -> FloatArray:
+        """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
+        if self.radius.size > DENSE or wave > 1:
+            return np.asarray(self.interpolation[rows] @ (self.table(wave).splines @ spread))
+        if wave not in self._waves:
+            # Repeats share their positions: each wave is computed once.
+            unique, back = np.unique(self.radius, return_inverse=True)
+            self._waves[wave] = _wave(wave, unique, self.k, self.across)[back]
+        return np.asarray(self._waves[wave][rows] @ spread)
+
+    def table(self, wave: int) -> WaveTable:
+        """The table of a wave."""
+        return wave_table(wave, self.across, self.reach, self.k.tobytes())
 
     @cached_property
-    def bessel0(self) -> FloatArray:
-        """Bessel function of order zero of all products k R, shape (n, nodes)."""
-        return 2 * self._of_products(np.cos) / self.k if self.across else self._of_products(j0)
+    def interpolation(self) -> csr_array:
+        """From coefficients of the tables' splines to the points, shape (n, t), sparse."""
+        return self.table(0).interpolation(self.radius)
 
     @cached_property
-    def bessel1(self) -> FloatArray:
-        """The same of order one: its negative derivative by k R."""
-        return 2 * self._of_products(np.sin) / self.k if self.across else self._of_products(j1)
-
-    def _of_products(self, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        # Repeats share their positions: each Bessel function is computed once.
-        unique, back = np.unique(self.radius, return_inverse=True)
-        return np.asarray(function(np.multiply.outer(unique, self.k))[back])
+    def _waves(self) -> dict[int, FloatArray]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +127,7 @@ class ForwardModel:
     points: ScanPoints
     # Transform of the base stress per newton for each scan, on the same nodes.
     references: tuple[RadialSpectrum, ...]
+    of_waves: ClassVar[bool] = True  # voltages are sums of waves around a centre
 
     @property
     def reference(self) -> RadialSpectrum:
@@ -102,11 +166,13 @@ class ForwardModel:
                     columns[-1][inside] = _unit_range(position[inside])
         return np.stack(columns, axis=1)
 
-    def table(self, order: int) -> tuple[FloatArray, FloatArray]:
-        """Radii (t,) that reach beyond the scans, and a Bessel function there, (t, nodes)."""
+    @cached_property
+    def reach(self) -> float:
+        """Beyond the distances of all points from any centre, in m."""
         # Rounded up, so that parts of one raster share their tables.
-        reach = 1.25e-3 * np.ceil(1e3 * np.hypot(np.ptp(self.points.x), np.ptp(self.points.y)))
-        return bessel_table(order, float(reach), self.k.tobytes())
+        return float(
+            1.25e-3 * np.ceil(1e3 * np.hypot(np.ptp(self.points.x), np.ptp(self.points.y)))
+        )
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
@@ -114,7 +180,8 @@ class ForwardModel:
         dx, dy = self.points.x - centre[0], self.points.y - centre[1]
         radius = np.hypot(dx, dy)
         towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
-        return Geometry(radius, towards, self.k, self.reference.order == ACROSS)
+        across = self.reference.order == ACROSS
+        return Geometry(radius, towards, self.k, across, self.reach)
 
     def cosines(self, centres: FloatArray) -> FloatArray:
         """Cosines between a channel's component and the points, for trial centres (m, 2)."""
@@ -122,22 +189,53 @@ class ForwardModel:
         radius = np.hypot(*across)
         return np.asarray(across[self.axis] / np.where(radius > 0, radius, 1.0))
 
-    def synthesis(self, geometry: Geometry) -> FloatArray:
-        """Voltages of single wavenumbers, shape (n, nodes): Bessel functions and their parity."""
-        if self.order == 0:
-            return geometry.bessel0
-        return np.asarray(-geometry.towards[self.axis][:, None] * geometry.bessel1)
-
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
-        return self._summed(self.synthesis(geometry), kernel)
+        voltages = self._summed(geometry, self.order, kernel)
+        if self.order == 0:
+            return voltages
+        return np.asarray(-(geometry.towards[self.axis] * voltages.T).T)
+
+    def framed(
+        self, geometry: Geometry, beside: Sequence[FloatArray]
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Columns (n, b + f), those ``beside`` first, and C (f, nodes): kernels K make F C K."""
+        # By singular values: a film transmits few combinations of all waves.  No F and C where
+        # there are not more points than columns.
+        if self.points.u.size <= DENSE or not self.of_waves:
+            return np.hstack(beside), None
+        measures = [ref.wavenumbers.weights * ref.values for ref in self.references]
+        groups: dict[bytes, list[int]] = {}
+        for scan, measure in enumerate(measures):
+            groups.setdefault(measure.tobytes(), []).append(scan)
+        strongest, table = np.abs(measures).max(axis=0), geometry.table(self.order)
+        inside = (table.radii >= 0) & (table.radii <= geometry.radius.max() + table.radii[-1] / 99)
+        _, size, right = np.linalg.svd(table.values[inside] * strongest, full_matrices=False)
+        size = size[size > _NOTHING * size[0]]
+        right, width = right[: size.size], size.size
+        splines = table.splines @ ((strongest[:, None] * right.T) / size)
+        factor, first = self.points.load, sum(columns.shape[1] for columns in beside)
+        if self.order:
+            factor = -factor * geometry.towards[self.axis]
+        columns, mixes = np.zeros((factor.size, first + width * len(groups))), []
+        np.concatenate(beside, axis=1, out=columns[:, :first])
+        for i, scans in enumerate(groups.values()):
+            rows = np.flatnonzero(np.isin(self.points.scan, scans))
+            place = slice(first + i * width, first + (i + 1) * width)
+            for start in range(0, rows.size, BLOCK):
+                block = rows[start : start + BLOCK]
+                columns[block, place] = geometry.interpolation[block] @ splines
+                columns[block, place] *= factor[block, None]
+            share = measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
+            mixes.append(size[:, None] * right * share)
+        return columns, np.vstack(mixes)
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
         if self.order:
             slope, _ = self._vector_slopes(geometry, kernel)
             return np.asarray(-geometry.towards[self.axis] * slope)
-        return -self._summed(geometry.bessel1, self.k * kernel)
+        return -self._summed(geometry, 1, self.k * kernel)
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
@@ -162,30 +260,27 @@ class ForwardModel:
         self, geometry: Geometry, places: list[FloatArray]
     ) -> tuple[list[FloatArray], FloatArray]:
         """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
-        from scipy.interpolate import CubicSpline
-
-        points, count = self.points, len(places)
-        radius, toward, across = geometry.radius, *geometry.towards
+        count, radius = len(places), geometry.radius
+        toward, across = geometry.towards
         angle = np.arctan2(-across, -toward)
         totals, (slope, turn) = np.zeros((count, radius.size)), np.zeros((2, radius.size))
         for m in range(_HARMONICS):
-            table, matrix = self.table(2 * m)
             kernels, tilts = np.empty((self.k.size, count)), np.empty(count)
             for i, (sigma, *e) in enumerate(places):
                 e1, e2 = bounded(np.array(e))
                 half, size = 0.5 * (sigma * self.k) ** 2, float(np.hypot(e1, e2))
                 kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
                 tilts[i] = 0.5 * np.arctan2(e2, e1)
-            for scan, reference in enumerate(self.references):
-                rows = points.scan == scan
-                measure = reference.wavenumbers.weights * reference.values
-                spline = CubicSpline(table, matrix @ (measure[:, None] * kernels))
-                phase = 2 * m * np.subtract.outer(angle[rows], tilts)
-                load = (1 if m == 0 else 2) * points.load[rows]
-                profiles = spline(radius[rows])
-                totals[:, rows] += (load[:, None] * np.cos(phase) * profiles).T
-                slope[rows] += load * np.cos(phase[:, 0]) * spline(radius[rows], 1)[:, 0]
-                turn[rows] -= 2 * m * load * np.sin(phase[:, 0]) * profiles[:, 0]
+            profiles = (1 if m == 0 else 2) * self._summed(geometry, 2 * m, kernels)
+            phase = 2 * m * np.subtract.outer(angle, tilts)
+            totals += (np.cos(phase) * profiles).T
+            # By J_n' = (J_(n-1) - J_(n+1))/2.
+            steps = [
+                self._summed(geometry, abs(2 * m + i), self.k * kernels[:, 0]) for i in (-1, 1)
+            ]
+            steepness = -steps[1] if m == 0 else steps[0] - steps[1]
+            slope += np.cos(phase[:, 0]) * steepness
+            turn -= 2 * m * np.sin(phase[:, 0]) * profiles[:, 0]
         around = np.stack([-geometry.towards[1], geometry.towards[0]])
         turned = np.divide(turn, radius, out=np.zeros_like(turn), where=radius > 0)
         return list(totals), geometry.towards * slope + around * turned
@@ -195,48 +290,33 @@ class ForwardModel:
     ) -> FloatArray:
         """Voltages of kernels with cos or sin of m times the angle: (n, both), in V."""
         # ``cosines`` and ``sines``: their transforms of order m, (nodes, a) and (nodes, b), V/Pa.
-        from scipy.interpolate import CubicSpline
-
-        geometry, (table, matrix) = self.geometry(centres), self.table(m)
+        geometry = self.geometry(centres)
         angle = m * np.arctan2(-geometry.towards[1], -geometry.towards[0])
-        kernels = np.hstack([cosines, sines])
-        columns = np.empty((angle.size, kernels.shape[1]))
-        for rows, measure in self._measures:
-            spline = CubicSpline(table, matrix @ (measure[:, None] * kernels))
-            columns[rows] = spline(geometry.radius[rows]) * self.points.load[rows, None]
+        columns = self._summed(geometry, m, np.hstack([cosines, sines]))
         columns[:, : cosines.shape[1]] *= np.cos(angle)[:, None]
         columns[:, cosines.shape[1] :] *= np.sin(angle)[:, None]
         return columns
 
     def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
         """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
-        x = np.multiply.outer(geometry.radius, self.k)
-        turn = np.divide(geometry.bessel1, x, out=np.full_like(x, 0.5), where=x > 0)
-        return [self._summed(m, self.k * kernel) for m in (geometry.bessel0 - turn, turn)]
+        turn = self._summed(geometry, TURN, self.k * kernel)
+        return [self._summed(geometry, 0, self.k * kernel) - turn, turn]
 
-    def _summed(self, matrix: FloatArray, kernel: FloatArray) -> FloatArray:
-        """Voltages by kernels times single wavenumbers' (n, nodes), summed over the quadrature."""
-        per_newton, load = np.empty((len(matrix), *kernel.shape[1:])), self.points.load
+    def _summed(self, geometry: Geometry, wave: int, kernel: FloatArray) -> FloatArray:
+        """Voltages by kernels, each scan through its reference: a wave summed over the nodes."""
+        load, per_newton = self.points.load, np.empty((self.points.u.size, *kernel.shape[1:]))
         for rows, measure in self._measures:
             spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
-            per_newton[rows] = matrix[rows] @ spread
+            per_newton[rows] = geometry.summed(wave, spread, rows)
         return np.asarray(per_newton * (load if kernel.ndim == 1 else load[:, None]))
 
     @property
-    def _measures(self) -> list[tuple[slice | NDArray[np.bool_], FloatArray]]:
+    def _measures(self) -> list[tuple[Rows, FloatArray]]:
         """Rows of each scan, and the quadrature's weights times its reference."""
         measures = [ref.wavenumbers.weights * ref.values for ref in self.references]
         if len(measures) == 1:
             return [(slice(None), measures[0])]
         return [(self.points.scan == i, measure) for i, measure in enumerate(measures)]
-
-
-@lru_cache(maxsize=32)
-def bessel_table(order: int, reach: float, nodes: bytes) -> tuple[FloatArray, FloatArray]:
-    """Even radii out to ``reach`` (m), and a Bessel function there for wavenumbers, (t, nodes)."""
-    k = np.frombuffer(nodes)
-    radii = np.linspace(0.0, reach, int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 4)
-    return radii, bessel(order, np.multiply.outer(radii, k))
 
 
 def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> ForwardModel:
@@ -259,8 +339,6 @@ def _unit_range(positions: FloatArray) -> FloatArray:
 #: An ellipse's response is a sum of so many harmonics, its derivatives are by centred differences.
 _HARMONICS = 5
 _LARGEST = 0.95
-#: Phase (rad) of the last wavenumber from one radius of a table to the next.
-_TABLE_PHASE = 0.25
 _STEP = 1e-4
 
 

@@ -4,7 +4,7 @@ It is fitted by weighted least squares, with A, centre, baseline and linear drif
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError, InputError
 from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
+from memscal.estimation.voltage_map import DENSE, VoltageMap, triangular
 from memscal.model.arrays import FloatArray
 
 _MOST_STEPS = 20
@@ -48,7 +49,9 @@ def gauss_newton(
             place = place - step
             continue
         root = stretch**-0.5
-        whole = np.linalg.lstsq(slope * root[:, None], -residual * root, rcond=None)[0]
+        # The triangular factor of both stands for them.
+        both = triangular(np.column_stack([slope * root[:, None], -residual * root]))
+        whole = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
         longest = float(np.abs(whole).max())
         step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
         place, cost = place + step, loss
@@ -90,6 +93,8 @@ def _require_parity(
 
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
+#: Of more points as many are tried, evenly chosen along the scan.
+_MOST_AT_START = 5000
 #: Where no film blurs: so many from half a step to a quarter of the span.
 _SOURCE_WIDTHS = 8
 
@@ -110,6 +115,10 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
 def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Best of a grid of centres and widths, by the sum of absolute residuals."""
     # A single outlier can be the largest voltage of a scan: positions are tried, not read off.
+    if (count := model.points.u.size) > _MOST_AT_START:
+        order = np.lexsort((model.points.x, model.points.y))
+        chosen = np.sort(order[np.linspace(0, count - 1, _MOST_AT_START).astype(np.intp)])
+        model, weights = replace(model, points=model.points.selected(chosen)), weights[chosen]
     points = model.points
     centres = _trial_centres(model)
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
@@ -232,11 +241,14 @@ class GaussianFit:
         inverse = np.linalg.inv(information / np.outer(scale, scale))
         return np.asarray(noise**2 * inverse / np.outer(scale, scale))
 
-    def gain(self, weights: FloatArray) -> FloatArray:
+    def gain(self, weights: FloatArray) -> VoltageMap:
         """Derivative of the parameters by the voltages, shape (p, n)."""
         twice = self.points.standardised(self.jacobian, weights)
-        back = self.points.standardised(np.eye(weights.size), weights)
-        return np.asarray(self.covariance(weights, 1.0) @ twice.T @ back)
+        covariance = self.covariance(weights, 1.0)
+        right = self.points.unstandardise(twice, weights)
+        if len(right) > DENSE:
+            return VoltageMap(((covariance, right),))
+        return VoltageMap(((covariance @ right.T, None),))
 
 
 def fit_gaussian_to_points(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
+from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
@@ -101,7 +102,7 @@ class ScanPoints:
     scan: NDArray[np.intp]  # (n,): number of each point's scan
     free: NDArray[np.bool_]  # (scans, 2): along x and y, whether the centre is a free parameter
     missing: int  # how many points were missing
-    decorrelation: FloatArray | None = None  # (n, n): makes noise of the stated correlation white
+    decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
     channel: str = "zz"
     reading: Reading = VOLTS  # the unit in which voltages are shown
 
@@ -178,7 +179,19 @@ class ScanPoints:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         root = np.sqrt(weights)
         scaled = values * (root if values.ndim == 1 else root[:, None])
-        return scaled if self.decorrelation is None else self.decorrelation @ scaled
+        return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
+
+    def standardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return :meth:`standardised` of columns (n, m), which are overwritten."""
+        columns *= np.sqrt(weights)[:, None]
+        return columns if self.decorrelation is None else self.decorrelation.apply(columns)
+
+    def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
+        """Apply the transposed standardisation to columns (n, m), which are overwritten."""
+        if self.decorrelation is not None:
+            columns = self.decorrelation.adjoint(columns)
+        columns *= np.sqrt(weights)[:, None]
+        return columns
 
 
 def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
@@ -319,23 +332,32 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     )
 
 
-def _joined_decorrelation(scans: Sequence[ScanPoints]) -> FloatArray | None:
+def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
     if all(points.decorrelation is None for points in scans):
         return None
-    from scipy.linalg import block_diag
+    blocks, first = [], 0
+    for points in scans:
+        known = points.decorrelation.blocks if points.decorrelation else ()
+        blocks += [(rows + first, root) for rows, root in known]
+        first += points.u.size
+    return Decorrelation(tuple(blocks))
 
-    blocks = [np.eye(p.u.size) if p.decorrelation is None else p.decorrelation for p in scans]
-    return np.asarray(block_diag(*blocks))
 
-
-def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
-    """Inverse Cholesky factor of the correlation of all kept points, repeat by repeat."""
+def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> Decorrelation | None:
+    """Cholesky factors of the correlation of all kept points, repeat by repeat."""
     if scan.u_zz_correlation is None:
         return None
-    repeats = scan.u_zz.size // scan.u_zz_correlation.shape[0]
-    whole = np.kron(np.eye(repeats), scan.u_zz_correlation)
-    measured = np.ix_(keep.ravel(), keep.ravel())
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(whole[measured])))
+    size, blocks, first = len(scan.u_zz_correlation), [], 0
+    roots: dict[bytes, FloatArray] = {}
+    for measured in keep.reshape(-1, size):
+        kept = np.flatnonzero(measured)
+        if (key := measured.tobytes()) not in roots and kept.size:
+            chosen = scan.u_zz_correlation[np.ix_(kept, kept)]
+            roots[key] = np.asarray(np.linalg.cholesky(chosen), dtype=np.float64)
+        if kept.size:
+            blocks.append((np.arange(first, first + kept.size), roots[key]))
+        first += kept.size
+    return Decorrelation(tuple(blocks))
 
 
 def _require_usable(points: ScanPoints) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,14 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
 from memscal.estimation import bayesian
-from memscal.estimation.angular import angular_departures, isolated, raster_noise
+from memscal.estimation.angular import AngularRings, angular_departures, isolated, raster_noise
 from memscal.estimation.bayesian import DepartureBasis, WeighedFit
+from memscal.estimation.decorrelation import Decorrelation
 from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints
+from memscal.estimation.reduced_scan import ReducedScan
+from memscal.estimation.voltage_map import DENSE, Tall, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 
@@ -56,15 +60,26 @@ class ProfileEstimate:
         """Adopted noise of each voltage, shape (n,), in V, uncertain positions included."""
         return np.asarray(self.noise_scale / np.sqrt(self.weights / self.outlier_weight))
 
-    @property
-    def noise_root(self) -> FloatArray:
-        """Square root of the voltages' covariance, shape (n, n), in V."""
-        return self.scattered(np.eye(self.noise.size))
+    def drawn_noise(self, standard: FloatArray) -> FloatArray:
+        """Noise of the voltages, in V, of independent standard normal draws, (n,) or (n, m)."""
+        factor = self.points.decorrelation
+        correlated = standard if factor is None else factor.correlate(standard)
+        return np.asarray((self.noise / self.outlier_weight**0.5 * correlated.T).T)
 
-    def scattered(self, rows: FloatArray) -> FloatArray:
-        """Rows (m, n) times the square root of the voltages' covariance: columns of a root."""
-        scaled, factor = rows * (self.noise / self.outlier_weight**0.5), self.points.decorrelation
-        return np.asarray(scaled if factor is None else scaled @ np.linalg.inv(factor))
+    def scattered(self, numbers: VoltageMap) -> FloatArray:
+        """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
+        factor, noise = self.points.decorrelation, self.noise / self.outlier_weight**0.5
+
+        def root(columns: Tall) -> Tall:
+            moved: Any = (
+                columns if factor is None or isinstance(columns, np.ndarray) else columns.toarray()
+            )
+            moved = noise[:, None] * moved
+            return moved if factor is None else factor.correlate_adjoint(moved)
+
+        if noise.size <= DENSE:
+            return np.asarray(root(numbers.dense().T).T)
+        return square_root(numbers.covariance(root))
 
     @property
     def noise_scale(self) -> float:
@@ -83,8 +98,8 @@ class ProfileEstimate:
         """Covariance of all corrections, at the adopted noise."""
         return self.weighed.covariance
 
-    @property
-    def gaussian_gain(self) -> FloatArray:
+    @cached_property
+    def gaussian_gain(self) -> VoltageMap:
         """Derivative of the Gaussian fit's parameters by the voltages."""
         return self.gaussian.gain(self.weights)
 
@@ -219,12 +234,16 @@ def estimate_profile(
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
-        if angular:
+        rings = AngularRings.about(fit) if angular else None
+        reduced = ReducedScan.of(model, fit, weights, rings)
+        if rings:
             noise = raster_noise(points, residual) or noise
-            radial = bayesian.departure_basis(model, fit, weights).signals(model, fit)
-            around = angular_departures(model, fit, radial, weights, noise)
-        basis = bayesian.departure_basis(model, fit, weights, around)
-        weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=noise)
+            kernels = bayesian.departure_basis(model, fit, reduced).kernels(model.k)
+            radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
+            columns = reduced.data, reduced.flat, radial, reduced.rings
+            around = angular_departures(rings, fit, columns, noise)
+        basis = bayesian.departure_basis(model, fit, reduced, around)
+        weighed = bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
         residual = weighed.residual
         updated = _outliers(points, residual, stated, OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
@@ -261,19 +280,21 @@ def log_marginal_likelihood(
         # The covariance 1 + S S^T of standardised voltages is made white by its inverse root.
         changes = points.standardised(inputs, weights) / noise
         left, singular, _ = np.linalg.svd(changes, full_matrices=False)
-        white = np.eye(len(left)) + (left * (1 / np.hypot(1, singular) - 1)) @ left.T
-        factor = points.decorrelation
-        points = replace(points, decorrelation=white if factor is None else white @ factor)
+        factor = points.decorrelation or Decorrelation(())
+        factor = replace(factor, common=left, growth=np.hypot(1, singular))
+        points = replace(points, decorrelation=factor)
         volume = float(np.log1p(singular**2).sum())
     model = forward_model(points, estimate.model.references)
     fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     if not fit.has_width(weights, noise):
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
-    basis = bayesian.departure_basis(model, fit, weights, estimate.basis.angular)
+    angular = estimate.basis.angular
+    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    basis = bayesian.departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = float(estimate.outlier_weight.sum())
-    weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
+    weighed = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
     both = weighed.log_marginal_likelihood, weighed.log_marginal_of_uncertainty
     return np.asarray(both) - volume / 2
 

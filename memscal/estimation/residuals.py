@@ -17,22 +17,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
 _CLIPPED = 4.0
+#: Columns are dependent where a singular value is below this; so many are multiplied at a time.
+_DEPENDENT, _COLUMNS = 1e-10, 8
+#: Points among which those are chosen that determine the parameters.
+_CANDIDATES = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,25 +60,33 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         u = np.where(ordinary, u, estimate.predicted + np.clip(u - estimate.predicted, -most, most))
         ordinary = np.ones_like(ordinary)
     weights = np.where(ordinary, weights, estimate.weights)
-    point = np.flatnonzero(ordinary)
-
-    def standardised(values: FloatArray) -> FloatArray:
-        return points.standardised(values, weights)[point]
-
-    jacobian = estimate.gaussian.jacobian
-    flat = standardised(jacobian / np.linalg.norm(jacobian, axis=0))
-    signals = basis.signals(estimate.model, estimate.gaussian)
-    rings = standardised(signals[:, jacobian.shape[1] :])
+    point, fit, model = np.flatnonzero(ordinary), estimate.gaussian, estimate.model
+    kernels = basis.kernels(model.k)[:, basis.flat :]
+    unexplained = (u - fit.predicted)[:, None]
+    beside = [unexplained, fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)]
+    if basis.angular:
+        around = basis.angular.rings.signal(model, fit.centre)
+        beside.append(basis.angular.combined(around))
+    columns, mix = model.framed(fit.geometry, beside)
+    last = columns.shape[1] - (0 if mix is None else len(mix))
+    columns = points.standardise(columns, weights)
+    columns = columns if ordinary.all() else columns[point]
+    data, q = columns[:, 0].copy(), None
+    if mix is None:
+        flat = columns[:, 1:]
+        rings = points.standardised(model.signal(fit.geometry, kernels), weights)[point]
+    else:
+        q, columns = orthonormalised(columns)
+        flat, rings = columns[:, 1:last], columns[:, last:] @ (mix @ kernels)
+    # Angular departures are no parameters: what of them stands above the noise counts.
+    count = fit.jacobian.shape[1]
+    rings, flat = np.hstack([flat[:, count:], rings]), flat[:, :count]
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
     resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
-    return FreeModel(
-        data=standardised(u - estimate.gaussian.predicted),
-        design=np.hstack([flat, left[:, resolved] * singular[resolved]]),
-        point=point,
-        stated=stated,
-    )
+    design = np.hstack([flat, left[:, resolved] * singular[resolved]])
+    return FreeModel(data, design if q is None else q @ design, point, stated)
 
 
 #: Weight of the correlation from one step to the next: half as much for each step farther.
@@ -123,19 +133,22 @@ class Residuals:
         from scipy.linalg import qr
 
         # The points that determine the parameters best are dropped: what is left of the others
-        # is then nearest to their own residuals.
-        dropped = qr(self.basis.T, mode="r", pivoting=True)[1][: self.basis.shape[1]]
-        rest = np.delete(np.arange(self.values.size), dropped)
-        # The symmetric inverse root of 1 - QQ' for the rows that are left of Q.
-        left, singular, _ = np.linalg.svd(self.basis[rest], full_matrices=False)
-        growth = 1 / np.sqrt(np.maximum(1 - singular**2, np.finfo(float).eps)) - 1
-        values = self.values[rest]
-        return np.asarray(values + left @ (growth * (left.T @ values))), rest
+        # is then nearest to their own residuals.  Of very many, they are among some.
+        count = self.values.size
+        some = np.unique(np.linspace(0, count - 1, _CANDIDATES).astype(np.intp))
+        dropped = some[qr(self.basis[some].T, mode="r", pivoting=True)[1][: self.basis.shape[1]]]
+        rest = np.delete(np.arange(count), dropped)
+        # The symmetric inverse root of 1 - QQ' for the rows that are left of Q, by Q'Q of others.
+        shares, vectors = np.linalg.eigh(self.basis[dropped].T @ self.basis[dropped])
+        root = np.sqrt(np.maximum(shares, np.finfo(float).eps))
+        along = self.basis.T @ self.values - self.basis[dropped].T @ self.values[dropped]
+        growth = vectors @ ((vectors.T @ along) / (root * (1 + root)))
+        return np.asarray((self.values + self.basis @ growth)[rest]), rest
 
 
-def residuals_of(estimate: ProfileEstimate) -> Residuals:
+def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> Residuals:
     """Project a scan off all voltages that an apparatus function can make."""
-    model, points = free_model(estimate), estimate.points
+    model, points = model or free_model(estimate), estimate.points
     runs_along_x = points.free[points.scan, 0]
     along = np.where(runs_along_x, points.x, points.y)
     across = np.where(runs_along_x, points.of_places("row"), 0)
@@ -159,14 +172,14 @@ def chi_square_test(residuals: Residuals) -> TestOutcome:
     return TestOutcome(total / degrees, chi_square_limit(degrees) / degrees, p_value)
 
 
-def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
+def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome | None:
     """Test the misfit against the scatter of repeats: F(l, m) of lack of fit over pure error."""
     # Repeats at one place and load scatter by noise alone.  A mean for each place beside the design
     # leaves m degrees of pure error; the means take l.  This is exact also where repeats lie only
     # near each other (Christensen, Ann. Stat. 17, 1989): the design contains their difference.
-    model, points = free_model(estimate), estimate.points
-    place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.point]
-    group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
+    points = estimate.points
+    place = points.scan, points.of_places("index"), points.load
+    group = grouped(*(values[model.point] for values in place))
     if points.decorrelation is not None or group.max() + 1 == group.size:
         return None
     weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.point]
@@ -179,8 +192,9 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
 
     basis = orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)
-    near, singular, _ = np.linalg.svd(within(basis), full_matrices=False)
-    near = near[:, singular > _APART]
+    moved = within(basis)
+    _, singular, right = np.linalg.svd(triangular(moved), full_matrices=False)
+    near = moved @ (right[singular > _APART].T / singular[singular > _APART])
     scatter = within(model.data[:, None])[:, 0]
     scatter = scatter - near @ (near.T @ scatter)
     pure = float(scatter @ scatter)
@@ -225,41 +239,74 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     deviation = np.sqrt(2 * second / (nu * (nu + 2)))
     skewness = max(8 * third / (nu * (nu + 2) * (nu + 4)) / deviation**3, _LEAST_SKEWNESS)
     shape = 4 / skewness**2
-    value = float(values @ (neighbours @ values) / (values @ values)) - mean
+    value = float(values @ _weighted(neighbours, values) / (values @ values)) - mean
     limit = deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
     p_value = gammaincc(shape, max(shape + np.sqrt(shape) * value / deviation, 0.0))
     return TestOutcome(value, float(limit), float(p_value))
 
 
-def _neighbours(residuals: Residuals) -> csr_array:
-    """Weights of the pairs of residuals that follow each other in one pass, shape (n, n)."""
-    from scipy.sparse import diags_array
-
+def _neighbours(residuals: Residuals) -> list[FloatArray]:
+    """Weights of the pairs of residuals that follow each other in one pass, by their distance."""
     place, sequence, n = residuals.place, residuals.sequence, residuals.place.size
     apart = range(1, min(_FARTHEST, n - 1) + 1)
-    weights = [0.5 * _DECAY ** (place[i:] - place[:-i]) for i in apart]
-    diagonals = [w * (sequence[i:] == sequence[:-i]) for w, i in zip(weights, apart, strict=True)]
-    pairs = diags_array(diagonals, offsets=list(apart), shape=(n, n))
-    return (pairs + pairs.T).tocsr()
+    return [
+        0.5 * _DECAY ** (place[i:] - place[:-i]) * (sequence[i:] == sequence[:-i]) for i in apart
+    ]
 
 
-def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
+def _weighted(pairs: list[FloatArray], values: FloatArray) -> FloatArray:
+    """Product of the symmetric matrix of the pairs with columns (n,) or (n, m)."""
+    total = np.zeros_like(values)
+    for i, weights in enumerate(pairs, start=1):
+        weights = weights if values.ndim == 1 else weights[:, None]
+        total[:-i] += weights * values[i:]
+        total[i:] += weights * values[:-i]
+    return total
+
+
+def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, float]:
     """Traces of the first three powers of (1 - QQ') W, for a W without diagonal."""
-    moved = matrix @ basis
-    within = basis.T @ moved
-    squared = matrix @ matrix
-    second = squared.trace() - 2 * np.sum(moved**2) + np.trace(within @ within)
-    third = (
-        (matrix * squared).sum()
-        - 3 * np.sum(moved * (matrix @ moved))
-        + 3 * np.sum(within * (moved.T @ moved))
-        - np.trace(within @ within @ within)
+    squared = 2 * sum(float(weights @ weights) for weights in pairs)
+    cubed = 0.0
+    for i, first in enumerate(pairs, start=1):
+        for j, second in enumerate(pairs[: len(pairs) - i], start=1):
+            both = pairs[i + j - 1]
+            cubed += 6 * float(np.sum(first[: both.size] * second[i : i + both.size] * both))
+    # Q'WQ, Q'W^2 Q and Q'W^3 Q, some columns at a time.
+    products = np.zeros((3, basis.shape[1], basis.shape[1]))
+    for start in range(0, basis.shape[1], _COLUMNS):
+        some = slice(start, start + _COLUMNS)
+        moved = basis[:, some]
+        for product in products:
+            moved = _weighted(pairs, moved)
+            product[:, some] = basis.T @ moved
+    within, second, third = products
+    return (
+        float(-np.trace(within)),
+        float(squared - 2 * np.trace(second) + np.trace(within @ within)),
+        float(
+            cubed
+            - 3 * np.trace(third)
+            + 3 * np.sum(within * second)
+            - np.trace(within @ within @ within)
+        ),
     )
-    return float(-np.trace(within)), float(second), float(third)
 
 
-def orthonormal(design: FloatArray) -> FloatArray:
+def grouped(*keys: NDArray[Any]) -> NDArray[np.intp]:
+    """Number of the group of each point, (n,), of equal keys (n,)."""
+    order = np.lexsort(keys)
+    new = np.any([np.diff(key[order], prepend=key[order[:1]]) != 0 for key in keys], axis=0)
+    group = np.empty_like(order)
+    group[order] = np.cumsum(new)
+    return group
+
+
+def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArray:
     """Orthonormal basis of the columns' span; they are scaled first, and zeros are skipped."""
-    size = np.linalg.norm(design, axis=0)
-    left, singular, _ = np.linalg.svd(design[:, size > 0] / size[size > 0], full_matrices=False)
-    return np.asarray(left[:, singular > 1e-10 * singular[0]])
+    size = np.linalg.norm(design, axis=0) if size is None else size
+    scaled = design[:, size > 0] / size[size > 0]
+    if len(scaled) > DENSE:
+        return orthonormalised(scaled, _DEPENDENT)[0]
+    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+    return np.asarray(left[:, singular > _DEPENDENT * max(singular[0], 1.0)])

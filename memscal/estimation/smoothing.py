@@ -26,7 +26,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +37,18 @@ from scipy.special import j0, j1
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, gauss_between
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import OUTLIER_THRESHOLD, ProfileEstimate, outlier_weights
+from memscal.estimation.voltage_map import BLOCK, DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 #: Order of the derivative that is penalised; the spline is of degree 2 m - 1.
 _ORDER = 3
 _DEGREE = 2 * _ORDER - 1
-#: Intervals of the spline: so many for each step of the scan, and at most.
-_PER_STEP, _MOST_INTERVALS = 2, 400
+#: Intervals of the spline: so many for each step of the scan, for each radian of the last
+#: wavenumber, and at most.
+_PER_STEP, _PER_RADIAN, _MOST_INTERVALS = 2, 2, 400
 #: Error of a spline, relative to the largest voltage: what it leaves of a scan without noise.
 _FLOOR_OF_NOISE = 5e-6
 #: The reference's profile counts as no less than this share of its maximum.
@@ -64,7 +71,7 @@ class SmoothedProfile:
     """The radial profile of the voltages, per newton, as a linear function of them."""
 
     estimate: ProfileEstimate  # whose centre, baseline, drift and noise it takes
-    gain: FloatArray  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
+    gain: VoltageMap  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
     predicted: FloatArray  # (n,): the smoothed signal at the points, in V
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
 
@@ -83,7 +90,8 @@ class SmoothedProfile:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
         floor = _FLOOR_OF_NOISE * float(np.abs(self.signal).max())
         electronic = np.sum(self.estimate.scattered(self.gain) ** 2, axis=1)
-        return np.asarray(np.sqrt(electronic + floor**2 * np.sum(self.gain**2, axis=1)))
+        plain = np.diag(self.gain.covariance(lambda columns: columns))
+        return np.asarray(np.sqrt(electronic + floor**2 * plain))
 
 
 def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
@@ -101,8 +109,7 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
             estimate, signal[rows], references[scans[0]], rows
         )
         predicted[rows] = load * smoothed
-        gain = np.zeros((estimate.model.k.size, points.u.size))
-        gain[:, rows] = of_scans / load
+        gain = of_scans.over(1 / load, rows, points.u.size)
         gains.append((references[scans[0]].values, gain))
     return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
 
@@ -113,8 +120,8 @@ def _round_signal(estimate: ProfileEstimate) -> FloatArray:
 
 
 def _joined(
-    gains: Sequence[tuple[FloatArray, FloatArray]], estimate: ProfileEstimate
-) -> FloatArray:
+    gains: Sequence[tuple[FloatArray, VoltageMap]], estimate: ProfileEstimate
+) -> VoltageMap:
     r"""Join profiles of several references to that of the first, by least squares at each k.
 
     .. math:: \hat U = \hat\sigma_1 \sum_s \hat\sigma_s \hat U_s / v_s
@@ -125,14 +132,15 @@ def _joined(
         return gain
     variances = [np.sum(estimate.scattered(g) ** 2, axis=1) for _, g in gains]
     pairs = list(zip(gains, variances, strict=True))
-    above = np.sum([(stress / v)[:, None] * g for (stress, g), v in pairs], axis=0)
+    above = [g * (first * stress / v) for (stress, g), v in pairs]
     below = np.sum([stress**2 / v for (stress, _), v in pairs], axis=0)
-    return np.asarray((first / below)[:, None] * above)
+    joined: VoltageMap = reduce(add, above)
+    return joined * (1 / below)
 
 
 def _fitted(
     estimate: ProfileEstimate, signal: FloatArray, reference: RadialSpectrum, rows: NDArray[np.intp]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[VoltageMap, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
     points, load = estimate.points, estimate.points.load[rows]
@@ -145,10 +153,8 @@ def _fitted(
     spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
     for _ in range(_ROUNDS):
-        gain = spline.gain(y, stated * weight)
-        predicted = spline.design @ (gain @ y)
-        freedom = 1 - np.einsum("ij,ji->i", spline.design, gain)
-        left = (y - predicted) * np.sqrt(stated / np.clip(freedom, _LEAST_FREEDOM, 1.0))
+        fitted = spline.fit(y, stated * weight)
+        left = (y - fitted.predicted) * np.sqrt(stated / np.clip(fitted.freedom, _LEAST_FREEDOM, 1))
         if points.planar:
             # Found by their neighbours in the plane.
             updated = estimate.outlier_weight[rows]
@@ -158,14 +164,25 @@ def _fitted(
         if np.allclose(updated, weight, atol=0.02):
             break
         weight = updated
-    return spline.transform @ gain, predicted, weight
+    return spline.transform @ fitted.gain, fitted.predicted, weight
+
+
+@dataclass(frozen=True, eq=False)
+class _FittedSpline:
+    """Splines fitted to values y at n points."""
+
+    gain: VoltageMap  # (m, n): derivative of the coefficients by y
+    predicted: FloatArray  # (n,)
+    freedom: FloatArray  # (n,): share of each residual's variance that is left
 
 
 @dataclass(frozen=True, eq=False)
 class _RadialSpline:
     """Even splines on [0, R], continued by the reference's tail."""
 
-    design: FloatArray  # (n, m): splines at the points
+    points: csr_array  # (n, b): B-splines at the points, of which few differ from zero at each
+    interval: NDArray[np.intp]  # (n,): the interval between knots that each point lies in
+    free: FloatArray  # (b, m): splines with the slope of the tail at R, by B-splines
     root: FloatArray  # (m, m): triangular root of the penalty
     transform: FloatArray  # (k, m): transforms of the splines
 
@@ -173,45 +190,106 @@ class _RadialSpline:
     def through(cls, radius: FloatArray, reference: RadialSpectrum, step: float) -> _RadialSpline:
         """Place the splines for points at radii (m), ``step`` apart."""
         reach = float(radius.max()) * (1 + 1e-9)
-        intervals = int(np.clip(np.ceil(_PER_STEP * reach / step), _DEGREE, _MOST_INTERVALS))
+        k, per_newton = reference.wavenumbers.k, reference.values
+        finest = min(_PER_STEP / step, _PER_RADIAN * k[-1])
+        intervals = int(np.clip(np.ceil(finest * reach), _DEGREE, _MOST_INTERVALS))
         knots = np.linspace(0.0, reach, intervals + 1)
         basis = _even_splines(knots)
         nodes, weights = gauss_between(knots, _NODES)
         stress = reference.at(np.append(nodes, [0.0, reach]))
         peak, end = stress[-2], stress[-1]
-        k, per_newton = reference.wavenumbers.k, reference.values
         slope = -float((reference.wavenumbers.weights * k * per_newton) @ j1(k * reach))
         # At R a spline has the logarithmic slope of the tail, which goes on from there.
-        ending = basis(np.array([reach]), 0)
-        tied = step * (end * basis(np.array([reach]), 1) - slope * ending)
+        ending = basis(np.array([reach]), 0).toarray()
+        tied = step * (end * basis(np.array([reach]), 1).toarray() - slope * ending)
         # A source that ends inside has no tail to go on with: the spline ends with the scan.
         tail = not reference.source
         free = np.linalg.svd(tied)[2][1:].T if tail else np.eye(tied.size)
-        curved = basis(nodes, _ORDER) * step**_ORDER
+        curved = basis(nodes, _ORDER).toarray() * step**_ORDER
+        values = basis(nodes, 0).toarray()
         rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
         # What no penalty holds, a parabola, is held by next to nothing.
-        rows = np.vstack([curved, _NEXT_TO_NOTHING * basis(nodes, 0)]) @ free
+        rows = np.vstack([curved, _NEXT_TO_NOTHING * values]) @ free
         rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
         phase = np.multiply.outer(k, nodes)
         across = reference.order == ACROSS
         bessel = 2 * np.cos(phase) if across else 2 * np.pi * j0(phase) * nodes
         bessel *= weights
-        transform = bessel @ basis(nodes, 0) @ free
+        transform = bessel @ values @ free
         if tail:
             transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
-        return cls(basis(radius, 0) @ free, np.asarray(np.linalg.qr(rows)[1]), transform)
+        interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
+        root = np.asarray(np.linalg.qr(rows)[1])
+        return cls(basis(radius, 0), interval, free, root, transform)
 
-    def gain(self, y: FloatArray, weight: FloatArray) -> FloatArray:
-        """Return derivatives of the coefficients by values y, shape (m, n)."""
+    def fit(self, y: FloatArray, weight: FloatArray) -> _FittedSpline:
+        """Fit values y (n,) with weights, smoothed by the restricted likelihood."""
         from scipy.linalg import solve_triangular
 
         root = np.sqrt(weight)
-        design = solve_triangular(self.root, (root[:, None] * self.design).T, trans="T").T
+        cells, reduced = self._reduced(root)
+        design = solve_triangular(self.root, (reduced @ self.free).T, trans="T").T
         left, values, right = np.linalg.svd(design, full_matrices=False)
         data = root * y
-        smoothing = _restricted_likelihood(values, left.T @ data, float(data @ data), y.size)
-        filtered = (values / (values**2 + smoothing))[:, None] * (left.T * root)
-        return np.asarray(solve_triangular(self.root, right.T @ filtered))
+        along = left.T @ (data if cells is None else cells.T @ data)
+        smoothing = _restricted_likelihood(values, along, float(data @ data), y.size)
+        # The data, by the rows of the reduced design, to the coefficients.
+        back = solve_triangular(self.root, (right.T * (values / (values**2 + smoothing))) @ left.T)
+        predicted = self.points @ (self.free @ (back @ (left @ along)))
+        kept = values**2 / (values**2 + smoothing)
+        if cells is None:
+            gain = VoltageMap(((back * root, None),))
+            return _FittedSpline(gain, predicted, 1 - (left**2 @ kept))
+        gain = VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),))
+        return _FittedSpline(gain, predicted, 1 - _leverage(cells, (left * kept) @ left.T))
+
+    def _reduced(self, root: FloatArray) -> tuple[csr_array | None, FloatArray]:
+        """Columns Q (n, r), orthonormal, and R (r, b) of the weighted B-splines: Q R."""
+        # Between two knots few splines differ from zero: each interval has few rows in R.
+        weighted = self.points.multiply(root[:, None]).tocsr()
+        if root.size <= DENSE:
+            return None, weighted.toarray()
+        return _by_intervals(weighted, self.interval)
+
+
+def _by_intervals(weighted: csr_array, interval: NDArray[np.intp]) -> tuple[csr_array, FloatArray]:
+    """QR decomposition of B-splines at points, interval by interval: Q (n, r) and R (r, b)."""
+    from scipy.sparse import csr_array
+
+    order = np.argsort(interval, kind="stable")
+    ends = np.flatnonzero(np.diff(interval[order], append=-1)) + 1
+    roots, parts, width, first = [], [], 0, 0
+    for end in ends.tolist():
+        rows = order[first:end]
+        block = weighted[rows]
+        columns = np.unique(block.indices)
+        q, r = np.linalg.qr(block[:, columns].toarray())
+        whole = np.zeros((len(r), weighted.shape[1]))
+        whole[:, columns] = r
+        roots.append(whole)
+        places = np.broadcast_to(width + np.arange(len(r)), q.shape)
+        parts.append((q.ravel(), np.repeat(rows, len(r)), places.ravel()))
+        width, first = width + len(r), end
+    data, where, places = (np.concatenate(values) for values in zip(*parts, strict=True))
+    orthonormal = csr_array((data, (where, places)), shape=(interval.size, width))
+    return orthonormal, np.vstack(roots)
+
+
+def _leverage(cells: csr_array, hat: FloatArray) -> FloatArray:
+    """Diagonal of Q H Q' for sparse rows Q, (n,)."""
+    # All rows of one interval have the same places.
+    counts = np.diff(cells.indptr)
+    leverage = np.empty(counts.size)
+    for count in np.unique(counts):
+        rows = np.flatnonzero(counts == count)
+        inside = cells.indptr[rows][:, None] + np.arange(count)
+        places, values = cells.indices[inside], cells.data[inside]
+        for start in range(0, rows.size, BLOCK):
+            block = slice(start, start + BLOCK)
+            at = places[block]
+            square = hat[at[:, :, None], at[:, None, :]]
+            leverage[rows[block]] = np.einsum("ij,ijk,ik->i", values[block], square, values[block])
+    return leverage
 
 
 def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, count: int) -> float:
@@ -233,21 +311,24 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
     return float(squares[0] * np.exp(least.x))
 
 
-def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
+def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], csr_array]:
     """Return even B-splines on even knots from zero: their derivatives at radii, (n, m)."""
     from scipy.interpolate import BSpline
+    from scipy.sparse import csr_array, eye_array, vstack
 
     both = np.concatenate([-knots[:0:-1], knots])
     outside = (knots[1] - knots[0]) * np.arange(_DEGREE, 0, -1)
     extended = np.concatenate([both[0] - outside, both, both[-1] + outside[::-1]])
     count = extended.size - _DEGREE - 1
-    spline = BSpline(extended, np.eye(count), _DEGREE)
+    spline, middle = BSpline(extended, np.eye(count), _DEGREE), count // 2
+    # The even half of them: each spline with its mirror image.
+    upper = eye_array(count - middle).tocsr()
+    folding = vstack([upper[count % 2 :][::-1], upper]).tocsr()
 
-    def values(radius: FloatArray, derivative: int) -> FloatArray:
-        columns, middle = spline(radius, nu=derivative), count // 2
-        folded = columns[:, middle:].copy()
-        folded[:, count % 2 :] += columns[:, :middle][:, ::-1]
-        return np.asarray(folded)
+    def values(radius: FloatArray, derivative: int) -> csr_array:
+        if derivative == 0:
+            return csr_array(BSpline.design_matrix(radius, extended, _DEGREE) @ folding)
+        return csr_array(spline(radius, nu=derivative) @ folding)
 
     return values
 

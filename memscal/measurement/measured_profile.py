@@ -350,7 +350,7 @@ def _of_channel(
         load_errors = np.nan_to_num(scan.normal_load_errors[measured_mask(scan, points.channel)])
     correlation = None
     if points.decorrelation is not None:
-        root = np.linalg.inv(points.decorrelation)
+        root = points.decorrelation.correlate(np.eye(points.u.size))
         correlation = root @ root.T
     return MeasuredPoints(
         x=points.x,

@@ -27,6 +27,8 @@ stress by the wrong :math:`T`.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 from scipy.special import hyp0f1
@@ -39,7 +41,9 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
+from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
@@ -140,7 +144,7 @@ class ShapeFit:
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
     state: FloatArray  # (s,): posterior mean
     covariance: FloatArray  # (s, s): expected squared error
-    gain: FloatArray  # (s, n): derivative of the state by the voltages
+    gain: VoltageMap  # (s, n): derivative of the state by the voltages
     residual: FloatArray  # (n,), in V
     noise: float  # of a point of weight one, in V, or over the stated uncertainties
     log_marginal: float  # marginal likelihood up to a constant of the scan
@@ -153,7 +157,8 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
-    weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
+    reduced = ReducedScan.of(model, fit, weights)
+    weighed = weigh_departures(reduced, basis, float(start.outlier_weight.sum()))
     kernels = basis.kernels(model.k)
     rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)[0]
@@ -252,7 +257,7 @@ def posterior_of(
     weight[weight < _NEGLIGIBLE] = 0.0
     shares = np.asarray(weight / weight.sum())
     mean = np.average([fit.state for fit in fits], axis=0, weights=shares)
-    gain = np.average([fit.gain for fit in fits], axis=0, weights=shares)
+    gain = reduce(add, (fit.gain * share for fit, share in zip(fits, shares, strict=True)))
     within = np.average([fit.covariance for fit in fits], axis=0, weights=shares)
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size

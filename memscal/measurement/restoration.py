@@ -103,7 +103,8 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
         added = np.column_stack([added, (scan.load_uncertainty / scan.stated_load) * signal])
     # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
-    root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
+    ratio = 1 / estimate.noise_scale if stated else posterior.noise_ratio
+    root = ratio * estimate.drawn_noise(np.eye(points.u.size))
     whiten = np.linalg.inv(np.linalg.cholesky(root @ root.T + added @ added.T))
     flat = np.linalg.qr(whiten @ np.hstack(columns))[0]
     left = whiten @ (points.u - signal)
@@ -252,7 +253,8 @@ class Restoration(Result, Checked):
     @property
     def noise_root(self) -> FloatArray:
         """Square root of the voltages' covariance, shape (n, n), in V; outliers' raised."""
-        return self.posterior.noise_ratio * self.posterior.estimate.noise_root
+        unit = np.eye(self.points.u.size)
+        return self.posterior.noise_ratio * self.posterior.estimate.drawn_noise(unit)
 
     @property
     def degrees(self) -> float:

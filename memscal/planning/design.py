@@ -27,6 +27,7 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
+from memscal.estimation.reduced_scan import ReducedScan
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
@@ -139,9 +140,10 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     assert points.u_errors is not None  # the plan's: the voltages themselves have none
     weights = np.asarray(1 / points.u_errors**2)
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
-    basis = departure_basis(model, fit, weights)
+    reduced = ReducedScan.of(model, fit, weights)
+    basis = departure_basis(model, fit, reduced)
     count = float(plan.repeats * weights.size)
-    weighed = weigh_departures(model, fit, basis, weights, count, expected_noise=1.0)
+    weighed = weigh_departures(reduced, basis, count, expected_noise=1.0)
     ones = np.ones_like(weights)
     estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, ones, basis)
     require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")

@@ -1,0 +1,57 @@
+"""Transformations that make correlated noise white, without a matrix over all points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from memscal.model.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Decorrelation:
+    r"""Makes noise of covariance :math:`(1 + S S^T) C` or :math:`C`, block by block, white."""
+
+    # Points of each block, and the lower Cholesky factor of their correlation C.
+    blocks: tuple[tuple[NDArray[np.intp], FloatArray], ...]
+    # Orthonormal columns (n, q) of what changes all points in common, after that; its growth (q,).
+    common: FloatArray | None = None
+    growth: FloatArray | None = None
+
+    def apply(self, values: FloatArray) -> FloatArray:
+        """Make columns (n,) or (n, m) white."""
+        white = values.copy()
+        for rows, root in self.blocks:
+            white[rows] = solve_triangular(root, values[rows], lower=True)
+        return self._scaled(white, 1.0)
+
+    def adjoint(self, values: FloatArray) -> FloatArray:
+        """The transposed transformation of columns."""
+        white = self._scaled(values, 1.0).copy()
+        for rows, root in self.blocks:
+            white[rows] = solve_triangular(root, white[rows], lower=True, trans="T")
+        return white
+
+    def correlate(self, white: FloatArray) -> FloatArray:
+        """Give white noise the correlation: the inverse of :meth:`apply`."""
+        values = self._scaled(white, -1.0).copy()
+        for rows, root in self.blocks:
+            values[rows] = root @ values[rows]
+        return values
+
+    def correlate_adjoint(self, values: FloatArray) -> FloatArray:
+        """The transposed of :meth:`correlate`."""
+        moved = values.copy()
+        for rows, root in self.blocks:
+            moved[rows] = root.T @ values[rows]
+        return self._scaled(moved, -1.0)
+
+    def _scaled(self, values: FloatArray, power: float) -> FloatArray:
+        """Divide what is along the common columns by its growth, to a power."""
+        if self.common is None or self.growth is None:
+            return values
+        along = self.common.T @ values
+        return np.asarray(values + self.common @ (along.T * (self.growth**-power - 1)).T)

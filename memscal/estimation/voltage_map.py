@@ -1,0 +1,174 @@
+"""Linear functions of the voltages of a scan, and orthonormal columns over its points.
+
+A scan may have a million points.  Matrices over them are kept as they are up to :data:`DENSE`
+points; of more, as products of a small matrix and few columns over the points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from memscal.model.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+#: Points up to which matrices over the points are not taken apart.
+DENSE = 400
+#: Rows of the blocks in which tall matrices are worked on.
+BLOCK = 32_768
+#: Columns are dependent where their singular value is below this share of the largest.
+_DEPENDENT = 1e-12
+
+Tall: TypeAlias = "FloatArray | csr_array"
+"""Columns over the points, (n, r)."""
+
+
+@dataclass(frozen=True, eq=False)
+class VoltageMap:
+    """Derivatives (m, n) of m numbers by n voltages: a sum of products L R'."""
+
+    # (m, r) and (n, r) each; without a second factor the first is the matrix itself.
+    parts: tuple[tuple[FloatArray, Tall | None], ...]
+    #: So that numpy leaves ``array @ map`` to this class.
+    __array_ufunc__ = None
+
+    @classmethod
+    def stacked(cls, maps: Sequence[VoltageMap]) -> VoltageMap:
+        """Put maps below each other; those of the same columns share them."""
+        columns = {id(right): right for each in maps for _, right in each.parts}
+        parts = []
+        for key, right in columns.items():
+            width = next(left.shape[1] for m in maps for left, r in m.parts if id(r) == key)
+            rows = [np.zeros((len(each), width)) for each in maps]
+            for block, each in zip(rows, maps, strict=True):
+                for left, other in each.parts:
+                    if id(other) == key:
+                        block += left
+            parts.append((np.vstack(rows), right))
+        return cls(tuple(parts))
+
+    def __len__(self) -> int:
+        """How many numbers there are."""
+        return len(self.parts[0][0])
+
+    def __getitem__(self, rows: slice | NDArray[np.intp] | list[int]) -> VoltageMap:
+        """Some of the numbers."""
+        return VoltageMap(tuple((left[rows], right) for left, right in self.parts))
+
+    def __matmul__(self, values: FloatArray) -> FloatArray:
+        """Changes (m,) or (m, q) of the numbers for changes (n,) or (n, q) of the voltages."""
+        terms = [
+            left @ (values if right is None else right.T @ values) for left, right in self.parts
+        ]
+        return np.asarray(sum(terms))
+
+    def __rmatmul__(self, rows: FloatArray) -> VoltageMap:
+        """Linear combinations of the numbers, by rows (l, m)."""
+        return VoltageMap(tuple((rows @ left, right) for left, right in self.parts))
+
+    def __mul__(self, factors: float | FloatArray) -> VoltageMap:
+        """Multiply all numbers by one factor, or each by its own, (m,)."""
+        scale: Any = factors if np.ndim(factors) == 0 else np.asarray(factors)[:, None]
+        return VoltageMap(tuple((left * scale, right) for left, right in self.parts))
+
+    def __add__(self, other: VoltageMap) -> VoltageMap:
+        """Add two maps to the same numbers."""
+        merged = {id(right): (left, right) for left, right in self.parts}
+        for left, right in other.parts:
+            known = merged.get(id(right))
+            merged[id(right)] = (left if known is None else known[0] + left, right)
+        return VoltageMap(tuple(merged.values()))
+
+    def __sub__(self, other: VoltageMap) -> VoltageMap:
+        """Subtract a map to the same numbers."""
+        return self + other * -1.0
+
+    def dense(self) -> FloatArray:
+        """All derivatives, (m, n)."""
+        terms = [left if right is None else (right @ left.T).T for left, right in self.parts]
+        return np.asarray(sum(terms))
+
+    def over(self, factors: FloatArray, rows: NDArray[np.intp], count: int) -> VoltageMap:
+        """Derivatives by ``count`` voltages, of which these, times factors (n,), are ``rows``."""
+        parts: list[tuple[FloatArray, Tall | None]] = []
+        for left, right in self.parts:
+            if right is None:
+                wide = np.zeros((len(left), count))
+                wide[:, rows] = left * factors
+                parts.append((wide, None))
+            else:
+                parts.append((left, _placed(right, factors, rows, count)))
+        return VoltageMap(tuple(parts))
+
+    def covariance(self, root: Any) -> FloatArray:
+        """Covariance (m, m) of the numbers; ``root`` of (n, r) is N^(1/2)' times it."""
+        moved = [
+            (left, root(np.eye(left.shape[1]) if right is None else right))
+            for left, right in self.parts
+        ]
+        total: FloatArray = np.zeros((len(self), len(self)))
+        for i, (left, right) in enumerate(moved):
+            for j, (other, columns) in enumerate(moved[: i + 1]):
+                product = left @ _gram(right, columns) @ other.T
+                total += product if i == j else product + product.T
+        return total
+
+
+def _placed(right: Tall, factors: FloatArray, rows: NDArray[np.intp], count: int) -> Tall:
+    if isinstance(right, np.ndarray):
+        wide = np.zeros((count, right.shape[1]))
+        wide[rows] = right * factors[:, None]
+        return wide
+    from scipy.sparse import coo_array
+
+    entries = right.tocoo()
+    data = entries.data * factors[entries.coords[0]]
+    places = (rows[entries.coords[0]], entries.coords[1])
+    return coo_array((data, places), shape=(count, right.shape[1])).tocsr()
+
+
+def _gram(first: Any, second: Any) -> FloatArray:
+    product = first.T @ second
+    return np.asarray(product if isinstance(product, np.ndarray) else product.toarray())
+
+
+def triangular(columns: FloatArray) -> FloatArray:
+    """Triangular factor R of the QR decomposition of tall columns (n, f), block by block."""
+    root = np.linalg.qr(columns[:BLOCK], mode="r")
+    for start in range(BLOCK, len(columns), BLOCK):
+        root = np.linalg.qr(np.vstack([root, columns[start : start + BLOCK]]), mode="r")
+    return np.asarray(root)
+
+
+def orthonormalised(
+    columns: FloatArray, dependent: float = _DEPENDENT
+) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal columns Q (n, r) of the same span, and R (r, f): the columns are Q R.
+
+    The columns are overwritten by Q.
+    """
+    root = triangular(columns)
+    scale = np.linalg.norm(root, axis=0)
+    scale[scale == 0] = 1.0
+    _, singular, right = np.linalg.svd(root / scale, full_matrices=False)
+    right = right[singular > dependent * singular[0]]
+    singular = singular[: len(right)]
+    turn = (right / singular[:, None] / scale).T
+    for start in range(0, len(columns), BLOCK):
+        block = columns[start : start + BLOCK]
+        block[:, : len(right)] = block @ turn
+    return columns[:, : len(right)], np.asarray(singular[:, None] * right * scale)
+
+
+def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
+    """A square root of a covariance that may be singular, scaled by the given variances."""
+    scale = np.maximum(np.diag(covariance) if variances is None else variances, 0.0)
+    safe = np.where(scale > 0, np.sqrt(scale), 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
+    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
