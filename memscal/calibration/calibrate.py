@@ -366,7 +366,8 @@ def calibrate(
     results = uncertainties(solution, solution.deconvolution, effects, pairs, reading)
     beside = solution.other
     other = None if beside is None else uncertainties(solution, beside, effects, pairs, reading)
-    checks = quality_checks(solution, results)
+    division = results.division or (other.division if other else None)
+    checks = quality_checks(solution, results, division)
     messages = calibration_messages(solution, results, checks)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}

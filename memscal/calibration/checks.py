@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Misfit, Solution
-from memscal.calibration.uncertainty import Results, route_difference
+from memscal.calibration.uncertainty import DivisionMap, Results, route_difference
 from memscal.estimation import assumptions
 from memscal.estimation import residuals as unexplained
 from memscal.estimation.bayesian import Bayesian
@@ -234,15 +234,17 @@ _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
 
 
-def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, ...]:
-    """Run every check that applies to the scan."""
+def quality_checks(
+    solution: Solution, results: Results, division: DivisionMap | None
+) -> tuple[QualityCheck, ...]:
+    """Run every check that applies to the scan; ``division`` is the one by either method."""
     estimate, model = solution.estimate, unexplained.free_model(solution.estimate)
     residuals = unexplained.residuals_of(estimate, model)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
         *_constraint(solution),
-        *_agreements(solution, results),
+        *_agreements(solution, results, division),
         *_shape(solution, results.parameters),
         *_set_up(solution),
         *([] if solution.scan.film is None else [_indentation(solution, results)]),
@@ -301,9 +303,11 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
     return [check("constraint", rise, limit, meaning)]
 
 
-def _agreements(solution: Solution, results: Results) -> list[QualityCheck]:
+def _agreements(
+    solution: Solution, results: Results, division: DivisionMap | None
+) -> list[QualityCheck]:
     """Compare division and Bayesian estimate, and the deconvolved G with the Gaussian."""
-    difference = route_difference(solution)
+    difference = route_difference(solution, division)
     routes = []
     if difference is not None:
         meaning = (

@@ -104,10 +104,8 @@ def _of_posterior(
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate, a = solution.estimate, deconvolution.conversion_constant
     gain, integrals = estimate.weighed.gain, estimate.basis.integrals
-    random = estimate.scattered(gain)
-    rest = square_root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
     variances = []
-    for columns in (random, np.hstack([rest, gain @ inputs])):
+    for columns in (estimate.scattered(gain), np.hstack([estimate.fixed_root, gain @ inputs])):
         changes = kernels(columns) - np.outer(g.ravel(), integrals @ columns)
         variances.append(np.sum(changes**2, axis=1) / a**2)
     return np.array(variances)
@@ -171,7 +169,7 @@ def _divided(
         for some in _chunks(of_points.shape[1]):
             moved = filtered(placed(noise[:, None] * of_points[:, some]))[inside]
             variance += 2 * np.sum((beside @ left[:, some]) * moved, axis=1)
-    spread = square_root(gain.covariance(lambda columns: np.sqrt(noise)[:, None] * columns))
+    spread = square_root(gain.covariance(np.sqrt(noise)))
     for some in _chunks(count):
         variance += np.sum((beside @ spread[:, some]) ** 2, axis=1)
     # A is the sum of A G over the nodes.

@@ -212,6 +212,7 @@ class Results:
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
+    division: DivisionMap | None = None  # that was propagated
     field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
 
@@ -252,7 +253,7 @@ def propagate(
 ) -> Results:
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
     estimate, radii = solution.estimate, deconvolution.g.r.size
-    kernel = _kernel_derivatives(solution, deconvolution, wavenumbers)
+    kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
     numbers = _numbers(estimate, deconvolution, kernel)
     names = tuple(numbers)
     values = np.array([value for value, _ in numbers.values()])
@@ -260,7 +261,7 @@ def propagate(
     by_voltage = VoltageMap.stacked([part.by_voltage for part in parts])
     columns = {
         "noise": estimate.scattered(by_voltage),
-        "regularisation": np.vstack([part.by_state for part in parts]) @ _fixed_root(estimate),
+        "regularisation": np.vstack([part.by_state for part in parts]) @ estimate.fixed_root,
         "window": np.vstack([part.hidden for part in parts]),
     }
     rows = [names.index(name) for name in _OF_GAUSSIAN if name in names]
@@ -292,6 +293,7 @@ def propagate(
         cross_covariance=stored[count:, :count],
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(np.hstack(scatter)[count:stop], axis=1),
+        division=division,
     )
 
 
@@ -330,7 +332,7 @@ def expected_values(solution: Solution) -> dict[str, float]:
     """Parameters that scans about the posterior mean give on average, to first order."""
     # A division follows the noise of its scan, of which scans drawn about the mean know nothing.
     estimate, deconvolution = solution.estimate, solution.deconvolution
-    kernel = _kernel_derivatives(solution, deconvolution, np.zeros(0))
+    kernel, _ = _kernel_derivatives(solution, deconvolution, np.zeros(0))
     residual = estimate.points.u - drawn_about(solution)
     return {
         name: value - float((derivatives.by_voltage @ residual)[0])
@@ -412,22 +414,23 @@ def _number(scan: int) -> str:
 
 def _kernel_derivatives(
     solution: Solution, deconvolution: Deconvolution, wavenumbers: FloatArray
-) -> _Derivatives:
+) -> tuple[_Derivatives, DivisionMap | None]:
     """Derivatives of A, G at its radii and its transfer function by either route."""
     estimate, smoothed = solution.estimate, solution.smoothed
     if not deconvolution.divided or smoothed is None:
-        return _posterior_kernel(estimate, deconvolution, wavenumbers)
+        return _posterior_kernel(estimate, deconvolution, wavenumbers), None
     division = _division_map(solution, smoothed, deconvolution, wavenumbers)
     # Centre, baseline and drift are parameters of the estimate.
     by_nuisance = -(division.direct @ division.nuisance)
     by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
     by_state[:, division.places] = by_nuisance
     spread = division.lost[:, 1:] @ square_root(estimate.covariance)
-    return _Derivatives(
+    derivatives = _Derivatives(
         by_voltage=division.direct + by_nuisance @ estimate.weighed.gain[division.places],
         by_state=by_state,
         hidden=np.hstack([division.lost[:, :1], spread]),
     )
+    return derivatives, division
 
 
 def _posterior_kernel(
@@ -445,7 +448,7 @@ def _posterior_kernel(
 
 
 @dataclass(frozen=True, eq=False)
-class _DivisionMap:
+class DivisionMap:
     """A division of fields as a linear map from voltages less background to A, G and transfer."""
 
     direct: VoltageMap  # (m, n): of voltages, for given centre, baseline and drift
@@ -464,7 +467,7 @@ def _division_map(
     smoothed: SmoothedProfile,
     deconvolution: Deconvolution,
     wavenumbers: FloatArray,
-) -> _DivisionMap:
+) -> DivisionMap:
     estimate, fields = solution.estimate, solution.fields
     basis, model = estimate.basis, estimate.model
     a, r, g = deconvolution.conversion_constant, deconvolution.g.r, deconvolution.g.radial
@@ -490,24 +493,24 @@ def _division_map(
     direct = normalised @ synthesis @ gain
     kept = np.hstack([direct @ voltages for voltages in signals])
     radial = np.column_stack([estimate.radial(r), basis.radial(r)])
-    return _DivisionMap(direct, nuisance, kept, normalised @ radial - kept)
+    return DivisionMap(direct, nuisance, kept, normalised @ radial - kept)
 
 
-def route_difference(solution: Solution) -> float | None:
+def route_difference(solution: Solution, division: DivisionMap | None) -> float | None:
     """Difference of division and Bayesian estimate beyond what the former hides, over its size."""
     # Of the division of the Bayesian fit's residuals: A's in standard deviations, or the root of
     # G's squared integral over its expectation, if that is larger.
-    estimate, smoothed = solution.estimate, solution.smoothed
-    if solution.other is None or smoothed is None:
+    estimate = solution.estimate
+    if solution.other is None or division is None:
         return None
-    division = solution.deconvolution if solution.deconvolution.divided else solution.other
-    linear = _division_map(solution, smoothed, division, np.zeros(0))
-    moved = linear.kept[:, 1:].copy()
-    moved[:, linear.places] += linear.direct @ linear.nuisance
-    noise = estimate.scattered(linear.direct - moved @ estimate.weighed.gain)
-    difference = linear.direct @ (estimate.points.u - estimate.predicted)
-    variance = np.sum(np.hstack([noise, moved @ _fixed_root(estimate)]) ** 2, axis=1)
-    rings = ring_areas(division.g.r)
+    divided = solution.deconvolution if solution.deconvolution.divided else solution.other
+    rings = ring_areas(divided.g.r)
+    # A and G, without the transfer function.
+    direct, moved = division.direct[: 1 + rings.size], division.kept[: 1 + rings.size, 1:].copy()
+    moved[:, division.places] += direct @ division.nuisance
+    noise = estimate.scattered(direct - moved @ estimate.weighed.gain)
+    difference = direct @ (estimate.points.u - estimate.predicted)
+    variance = np.sum(np.hstack([noise, moved @ estimate.fixed_root]) ** 2, axis=1)
     of_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
     return float(max(abs(difference[0]) / np.sqrt(variance[0]), of_g))
 
@@ -540,9 +543,3 @@ def _misfit_columns(estimate: ProfileEstimate, gain: VoltageMap) -> FloatArray:
     ends = np.clip(np.append(share[inwards], 0.0), _LEAST_REACH, 1.0)
     changes *= np.sqrt(-np.diff(ends) / (1 - _LEAST_REACH))
     return triangular(changes.T).T
-
-
-def _fixed_root(estimate: ProfileEstimate) -> FloatArray:
-    """Square root of what of the posterior's covariance does not scatter from scan to scan."""
-    random = estimate.scattered(estimate.weighed.gain)
-    return square_root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))

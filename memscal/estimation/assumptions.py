@@ -19,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
-from memscal.estimation.voltage_map import square_root, triangular
+from memscal.estimation.voltage_map import triangular
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -27,8 +27,8 @@ from memscal.model.checks import FALSE_ALARM
 _MOST_FOLDS = 10
 #: Loads that differ by less of their mean are one load, recorded with scatter.
 _SAME_LOAD = 0.05
-#: Columns are dependent below this share of the largest; so many are multiplied at a time.
-_DEPENDENT, _COLUMNS = 1e-10, 16
+#: Columns are dependent below this share of the largest.
+_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True)
@@ -334,10 +334,8 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau / plateau.sum()
     overshoot = -float(share @ others.residual)
-    spread = square_root(others.covariance)
-    starts = range(0, len(spread), _COLUMNS)
-    changes = [share @ basis.voltages(model, fit, spread[:, i : i + _COLUMNS]) for i in starts]
-    variance = share**2 @ _ordinary_noise(estimate) ** 2 + float(np.sum(np.hstack(changes) ** 2))
+    slope = reduced.summed(share) @ basis.columns(reduced)
+    variance = share**2 @ _ordinary_noise(estimate) ** 2 + slope @ others.covariance @ slope
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 
 

@@ -220,12 +220,13 @@ class ForwardModel:
         columns, mixes = np.zeros((factor.size, first + width * len(groups))), []
         np.concatenate(beside, axis=1, out=columns[:, :first])
         for i, scans in enumerate(groups.values()):
-            rows = np.flatnonzero(np.isin(self.points.scan, scans))
-            place = slice(first + i * width, first + (i + 1) * width)
-            for start in range(0, rows.size, BLOCK):
-                block = rows[start : start + BLOCK]
+            place, ours = slice(first + i * width, first + (i + 1) * width), factor
+            if len(groups) > 1:
+                ours = np.where(np.isin(self.points.scan, scans), factor, 0.0)
+            for start in range(0, factor.size, BLOCK):
+                block = slice(start, start + BLOCK)
                 columns[block, place] = geometry.interpolation[block] @ splines
-                columns[block, place] *= factor[block, None]
+                columns[block, place] *= ours[block, None]
             share = measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
             mixes.append(size[:, None] * right * share)
         return columns, np.vstack(mixes)

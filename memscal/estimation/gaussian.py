@@ -93,7 +93,7 @@ def _require_parity(
 
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
-#: Of more points as many are tried, evenly chosen along the scan.
+#: Of more points as many are fitted at first.
 _MOST_AT_START = 5000
 #: Where no film blurs: so many from half a step to a quarter of the span.
 _SOURCE_WIDTHS = 8
@@ -115,10 +115,6 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
 def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Best of a grid of centres and widths, by the sum of absolute residuals."""
     # A single outlier can be the largest voltage of a scan: positions are tried, not read off.
-    if (count := model.points.u.size) > _MOST_AT_START:
-        order = np.lexsort((model.points.x, model.points.y))
-        chosen = np.sort(order[np.linspace(0, count - 1, _MOST_AT_START).astype(np.intp)])
-        model, weights = replace(model, points=model.points.selected(chosen)), weights[chosen]
     points = model.points
     centres = _trial_centres(model)
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
@@ -255,12 +251,22 @@ def fit_gaussian_to_points(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
-    if start is None:
+    if start is not None:
+        return _solve(model, weights, _parameters(start), robust=False)
+    if (count := weights.size) <= _MOST_AT_START:
         return _solve(model, weights, _robust_start(model, weights), robust=True)
-    centres = start.centre[model.points.free]
-    shape = [start.conversion_constant, start.sigma]
-    theta = np.concatenate([shape, centres, start.drift, start.ellipticity[: model.points.ellipse]])
-    return _solve(model, weights, theta, robust=False)
+    # Some points, evenly chosen along the scan, give the start for all.
+    order = np.lexsort((model.points.x, model.points.y, model.points.scan))
+    chosen = np.sort(order[np.linspace(0, count - 1, _MOST_AT_START).astype(np.intp)])
+    some = replace(model, points=model.points.selected(chosen))
+    theta = _parameters(fit_gaussian_to_points(some, weights[chosen]))
+    return _solve(model, weights, theta, robust=True)
+
+
+def _parameters(fit: GaussianFit) -> FloatArray:
+    centres, ellipticity = fit.centre[fit.points.free], fit.ellipticity[: fit.points.ellipse]
+    shape = [fit.conversion_constant, fit.sigma]
+    return np.concatenate([shape, centres, fit.drift, ellipticity])
 
 
 def _solve(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from memscal.estimation.forward import ForwardModel, elliptic_departure, forward
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.reduced_scan import ReducedScan
-from memscal.estimation.voltage_map import DENSE, Tall, VoltageMap, square_root
+from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 
@@ -69,17 +68,16 @@ class ProfileEstimate:
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
         factor, noise = self.points.decorrelation, self.noise / self.outlier_weight**0.5
+        if noise.size > DENSE:
+            return square_root(numbers.covariance(noise, factor))
+        scaled = noise * numbers.dense()
+        return scaled if factor is None else factor.correlate_adjoint(scaled.T).T
 
-        def root(columns: Tall) -> Tall:
-            moved: Any = (
-                columns if factor is None or isinstance(columns, np.ndarray) else columns.toarray()
-            )
-            moved = noise[:, None] * moved
-            return moved if factor is None else factor.correlate_adjoint(moved)
-
-        if noise.size <= DENSE:
-            return np.asarray(root(numbers.dense().T).T)
-        return square_root(numbers.covariance(root))
+    @cached_property
+    def fixed_root(self) -> FloatArray:
+        """Square root of what of the posterior's covariance does not scatter between scans."""
+        random = self.scattered(self.weighed.gain)
+        return square_root(self.covariance - random @ random.T, np.diag(self.covariance))
 
     @property
     def noise_scale(self) -> float:
@@ -229,31 +227,48 @@ def estimate_profile(
     fit = fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
     residual, noise = points.u - fit.predicted, _least_noise(fit)
-    angular, around = angular and points.planar and not model.order, None
+    angular = angular and points.planar and not model.order
     outlier = _outliers(points, residual, stated, 2 * OUTLIER_THRESHOLD)
-    for _ in range(_WEIGHING_ROUNDS):
+    for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
-        rings = AngularRings.about(fit) if angular else None
-        reduced = ReducedScan.of(model, fit, weights, rings)
-        if rings:
+        if angular:
             noise = raster_noise(points, residual) or noise
-            kernels = bayesian.departure_basis(model, fit, reduced).kernels(model.k)
-            radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
-            columns = reduced.data, reduced.flat, radial, reduced.rings
-            around = angular_departures(rings, fit, columns, noise)
-        basis = bayesian.departure_basis(model, fit, reduced, around)
-        weighed = bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
+        basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = _outliers(points, residual, stated, OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
         outlier = updated
+        if rounds_left:
+            # Of many points there is room for one.
+            del weighed
     within = bayesian.supported(basis, weighed)
     raster = raster_noise(points, residual) if angular else None
     estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis, raster)
     _require_determined(estimate)
     return estimate
+
+
+def _weighed(
+    fit: GaussianFit,
+    model: ForwardModel,
+    weights: FloatArray,
+    count: float,
+    noise: float,
+    *,
+    angular: bool,
+) -> tuple[DepartureBasis, WeighedFit]:
+    """Weigh departures from a fit for ``count`` readings and a least noise."""
+    rings, around = AngularRings.about(fit) if angular else None, None
+    reduced = ReducedScan.of(model, fit, weights, rings)
+    if rings:
+        kernels = bayesian.departure_basis(model, fit, reduced).kernels(model.k)
+        radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
+        columns = reduced.data, reduced.flat, radial, reduced.rings
+        around = angular_departures(rings, fit, columns, noise)
+    basis = bayesian.departure_basis(model, fit, reduced, around)
+    return basis, bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
 
 
 def _outliers(

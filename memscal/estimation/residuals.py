@@ -255,12 +255,11 @@ def _neighbours(residuals: Residuals) -> list[FloatArray]:
 
 
 def _weighted(pairs: list[FloatArray], values: FloatArray) -> FloatArray:
-    """Product of the symmetric matrix of the pairs with columns (n,) or (n, m)."""
+    """Product of the symmetric matrix of the pairs with rows (n,) or (m, n)."""
     total = np.zeros_like(values)
     for i, weights in enumerate(pairs, start=1):
-        weights = weights if values.ndim == 1 else weights[:, None]
-        total[:-i] += weights * values[i:]
-        total[i:] += weights * values[:-i]
+        total[..., :-i] += weights * values[..., i:]
+        total[..., i:] += weights * values[..., :-i]
     return total
 
 
@@ -276,10 +275,10 @@ def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, f
     products = np.zeros((3, basis.shape[1], basis.shape[1]))
     for start in range(0, basis.shape[1], _COLUMNS):
         some = slice(start, start + _COLUMNS)
-        moved = basis[:, some]
+        moved = np.ascontiguousarray(basis[:, some].T)
         for product in products:
             moved = _weighted(pairs, moved)
-            product[:, some] = basis.T @ moved
+            product[some] = moved @ basis
     within, second, third = products
     return (
         float(-np.trace(within)),

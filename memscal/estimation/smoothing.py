@@ -90,7 +90,7 @@ class SmoothedProfile:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
         floor = _FLOOR_OF_NOISE * float(np.abs(self.signal).max())
         electronic = np.sum(self.estimate.scattered(self.gain) ** 2, axis=1)
-        plain = np.diag(self.gain.covariance(lambda columns: columns))
+        plain = np.diag(self.gain.covariance(np.ones_like(self.signal)))
         return np.asarray(np.sqrt(electronic + floor**2 * plain))
 
 
@@ -132,10 +132,9 @@ def _joined(
         return gain
     variances = [np.sum(estimate.scattered(g) ** 2, axis=1) for _, g in gains]
     pairs = list(zip(gains, variances, strict=True))
-    above = [g * (first * stress / v) for (stress, g), v in pairs]
     below = np.sum([stress**2 / v for (stress, _), v in pairs], axis=0)
-    joined: VoltageMap = reduce(add, above)
-    return joined * (1 / below)
+    joined: VoltageMap = reduce(add, [g * (first * stress / v / below) for (stress, g), v in pairs])
+    return joined
 
 
 def _fitted(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -106,16 +107,18 @@ class VoltageMap:
                 parts.append((left, _placed(right, factors, rows, count)))
         return VoltageMap(tuple(parts))
 
-    def covariance(self, root: Any) -> FloatArray:
-        """Covariance (m, m) of the numbers; ``root`` of (n, r) is N^(1/2)' times it."""
-        moved = [
-            (left, root(np.eye(left.shape[1]) if right is None else right))
-            for left, right in self.parts
-        ]
+    def covariance(self, noise: FloatArray, factor: Decorrelation | None = None) -> FloatArray:
+        """Covariance (m, m) of the numbers, for voltages of a noise (n,) and its correlation."""
+        tall = [(left, np.eye(left.shape[1]) if r is None else r) for left, r in self.parts]
+        if factor is not None:
+            dense = (r if isinstance(r, np.ndarray) else r.toarray() for _, r in tall)
+            moved = (factor.correlate_adjoint(noise[:, None] * r) for r in dense)
+            tall = [(left, r) for (left, _), r in zip(tall, moved, strict=True)]
+            noise = np.ones_like(noise)
         total: FloatArray = np.zeros((len(self), len(self)))
-        for i, (left, right) in enumerate(moved):
-            for j, (other, columns) in enumerate(moved[: i + 1]):
-                product = left @ _gram(right, columns) @ other.T
+        for i, (left, right) in enumerate(tall):
+            for j, (other, columns) in enumerate(tall[: i + 1]):
+                product = left @ _gram(right, columns, noise**2) @ other.T
                 total += product if i == j else product + product.T
         return total
 
@@ -133,9 +136,15 @@ def _placed(right: Tall, factors: FloatArray, rows: NDArray[np.intp], count: int
     return coo_array((data, places), shape=(count, right.shape[1])).tocsr()
 
 
-def _gram(first: Any, second: Any) -> FloatArray:
-    product = first.T @ second
-    return np.asarray(product if isinstance(product, np.ndarray) else product.toarray())
+def _gram(first: Any, second: Any, weight: FloatArray) -> FloatArray:
+    """Products of all columns, by blocks of rows."""
+    total: FloatArray = np.zeros((first.shape[1], second.shape[1]))
+    for start in range(0, weight.size, BLOCK):
+        rows = slice(start, start + BLOCK)
+        weighted = weight[rows, None] * second[rows]
+        product = first[rows].T @ weighted
+        total += product if isinstance(product, np.ndarray) else product.toarray()
+    return total
 
 
 def triangular(columns: FloatArray) -> FloatArray:
