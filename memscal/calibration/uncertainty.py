@@ -40,7 +40,7 @@ _FINE = 20
 #: Windows below this have closed; what sums of squares lose to rounding.
 _CLOSED = _ROUNDING = 1e-9
 #: Columns over the points that are made at a time.
-_COLUMNS = 16
+_COLUMNS = 8
 #: Parameters whose uncertainty is broken down by source.
 BUDGETED = (
     "conversion_constant",

@@ -4,7 +4,7 @@ Some add m columns to the fitted model: chi-square falls by a chi-square variabl
 of freedom.  Others predict a group of points from the rest, or look for a ceiling of the voltage.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
-from memscal.estimation.voltage_map import triangular
+from memscal.estimation.voltage_map import evenly, triangular
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -292,6 +292,8 @@ _FEWEST, _EQUAL = 3, 1e-9
 _FINE, _CURVED = 30.0, 3.0
 #: Points are a plateau while their scatter has at least this p-value; this weight leaves them out.
 _ALIKE, _LITTLE = 1e-3, 1e-9
+#: So many points of it, and of the others, are enough.
+_ENOUGH = 10_000
 
 
 def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
@@ -321,6 +323,13 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
         return none
     model, points = estimate.model, estimate.points
     weights = np.where(plateau, _LITTLE, 1.0) * estimate.weights
+    chosen = np.arange(plateau.size)
+    if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
+        # Some of the plateau, and of the others.
+        both = (np.flatnonzero(plateau == is_of) for is_of in (True, False))
+        chosen = np.sort(np.concatenate([evenly(rows, _ENOUGH) for rows in both]))
+        model = replace(model, points=points.selected(chosen))
+        weights = weights[chosen]
     try:
         fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     except FitError:
@@ -328,14 +337,14 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(model, fit, reduced, angular)
-    count = float(estimate.outlier_weight[~plateau].sum())
+    count = float((estimate.outlier_weight * ~plateau)[chosen].sum())
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
     others = weigh_departures(reduced, basis, count, least_noise=least)
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
-    share = plateau / plateau.sum()
+    share = plateau[chosen] / plateau[chosen].sum()
     overshoot = -float(share @ others.residual)
     slope = reduced.summed(share) @ basis.columns(reduced)
-    variance = share**2 @ _ordinary_noise(estimate) ** 2 + slope @ others.covariance @ slope
+    variance = share**2 @ _ordinary_noise(estimate)[chosen] ** 2 + slope @ others.covariance @ slope
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 
 

@@ -12,7 +12,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError, InputError
 from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.voltage_map import DENSE, VoltageMap, triangular
+from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
 from memscal.model.arrays import FloatArray
 
 _MOST_STEPS = 20
@@ -253,11 +253,11 @@ def fit_gaussian_to_points(
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is not None:
         return _solve(model, weights, _parameters(start), robust=False)
-    if (count := weights.size) <= _MOST_AT_START:
+    if weights.size <= _MOST_AT_START:
         return _solve(model, weights, _robust_start(model, weights), robust=True)
     # Some points, evenly chosen along the scan, give the start for all.
     order = np.lexsort((model.points.x, model.points.y, model.points.scan))
-    chosen = np.sort(order[np.linspace(0, count - 1, _MOST_AT_START).astype(np.intp)])
+    chosen = np.sort(evenly(order, _MOST_AT_START))
     some = replace(model, points=model.points.selected(chosen))
     theta = _parameters(fit_gaussian_to_points(some, weights[chosen]))
     return _solve(model, weights, theta, robust=True)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
+from memscal.estimation.voltage_map import DENSE, evenly, orthonormalised, triangular
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
@@ -69,11 +69,11 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         beside.append(basis.angular.combined(around))
     columns, mix = model.framed(fit.geometry, beside)
     last = columns.shape[1] - (0 if mix is None else len(mix))
-    columns = points.standardise(columns, weights)
-    columns = columns if ordinary.all() else columns[point]
-    data, q = columns[:, 0].copy(), None
+    columns, q = points.standardise(columns, weights), None
+    columns[~ordinary] = 0.0
+    data = columns[point, 0]
     if mix is None:
-        flat = columns[:, 1:]
+        flat = columns[point, 1:]
         rings = points.standardised(model.signal(fit.geometry, kernels), weights)[point]
     else:
         q, columns = orthonormalised(columns)
@@ -86,7 +86,9 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     stated = points.u_errors is not None
     resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
     design = np.hstack([flat, left[:, resolved] * singular[resolved]])
-    return FreeModel(data, design if q is None else q @ design, point, stated)
+    if q is not None:
+        design = q @ design if point.size == len(q) else (q @ design)[point]
+    return FreeModel(data, design, point, stated)
 
 
 #: Weight of the correlation from one step to the next: half as much for each step farther.
@@ -135,7 +137,7 @@ class Residuals:
         # The points that determine the parameters best are dropped: what is left of the others
         # is then nearest to their own residuals.  Of very many, they are among some.
         count = self.values.size
-        some = np.unique(np.linspace(0, count - 1, _CANDIDATES).astype(np.intp))
+        some = evenly(np.arange(count), _CANDIDATES)
         dropped = some[qr(self.basis[some].T, mode="r", pivoting=True)[1][: self.basis.shape[1]]]
         rest = np.delete(np.arange(count), dropped)
         # The symmetric inverse root of 1 - QQ' for the rows that are left of Q, by Q'Q of others.

@@ -147,6 +147,12 @@ def _gram(first: Any, second: Any, weight: FloatArray) -> FloatArray:
     return total
 
 
+def evenly(rows: NDArray[Any], most: int) -> NDArray[Any]:
+    """At most so many of the rows, evenly chosen."""
+    count = min(rows.size, most)
+    return rows[np.linspace(0, rows.size - 1, count).astype(np.intp)]
+
+
 def triangular(columns: FloatArray) -> FloatArray:
     """Triangular factor R of the QR decomposition of tall columns (n, f), block by block."""
     root = np.linalg.qr(columns[:BLOCK], mode="r")
