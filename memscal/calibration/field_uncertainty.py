@@ -59,6 +59,7 @@ def field_errors(
     on_lattice = RectBivariateSpline(g.y, g.x, g.image)(
         np.clip(y, g.y[0], g.y[-1]), np.clip(x, g.x[0], g.x[-1])
     )
+    on_lattice[np.hypot.outer(y, x) >= fields.support] = 0.0
     changes = _divided if deconvolution.divided else _of_posterior
     variances = changes(solution, deconvolution, _kernels(estimate, x, y), on_lattice, inputs)
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
@@ -86,9 +87,9 @@ def _kernels(
     def combined(coefficients: FloatArray) -> FloatArray:
         round_ = CubicSpline(table, radial @ coefficients)(radius)
         for start in range(0, y.size, rows):
-            oval = estimate.oval_columns(x, y[start : start + rows])
+            oval = estimate.oval_changes(x, y[start : start + rows], coefficients)
             first = start * x.size
-            round_[first : first + len(oval)] += oval @ coefficients
+            round_[first : first + len(oval)] += oval
         return np.asarray(round_)
 
     return combined

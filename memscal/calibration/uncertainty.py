@@ -272,8 +272,9 @@ def propagate(
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
     scaled = [name.startswith("conversion_constant") for name in names]
-    for source, effect in effects.items():
-        column = by_voltage @ effect.voltage
+    voltages = np.array([effect.voltage for effect in effects.values()])
+    changes = by_voltage @ voltages.reshape(len(effects), -1).T
+    for (source, effect), column in zip(effects.items(), changes.T, strict=True):
         column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
         if effect.exact is not None:
             _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)

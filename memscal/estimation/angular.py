@@ -57,18 +57,6 @@ class AngularRings:
         width = max(fit.sigma, 0.5 * fit.points.step)
         return cls(width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING), _BLUR * width)
 
-    def at(self, x: FloatArray, y: FloatArray) -> list[FloatArray]:
-        """Values of each order at positions from the centre, (n,) in m: cosines, sines, (n, q)."""
-        from scipy.interpolate import CubicSpline
-
-        r, angle, blocks = np.hypot(x, y), np.arctan2(y, x), []
-        step = self.blur / _PER_BLUR
-        table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
-        for m in ORDERS:
-            values = CubicSpline(table, rings_of_order(m, table, self.radius, self.blur))(r)
-            blocks += [turn(m * angle)[:, None] * values for turn in (np.cos, np.sin)]
-        return blocks
-
     def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
         """Voltages at the points, for centres (scans, 2) in m: (n, 8 q), in V."""
         blurred, blocks = np.exp(-0.5 * (self.blur * model.k) ** 2)[:, None], []
@@ -91,9 +79,23 @@ class AngularDepartures:
         """How many kernels there are."""
         return sum(amplitudes.shape[1] for amplitudes in self.amplitudes)
 
-    def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Kernels at positions from the centre, shape (n,), in m: (n, count), in V/Pa/m^2."""
-        return self.combined(np.hstack(self.rings.at(x, y)))
+    def at(self, x: FloatArray, y: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """Combinations (count, c) at positions from the centre, (n,) in m: (n, c), V/Pa/m^2."""
+        from scipy.interpolate import CubicSpline
+
+        r, angle, rings = np.hypot(x, y), np.arctan2(y, x), self.rings
+        step = rings.blur / _PER_BLUR
+        table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
+        total, first = np.zeros((r.size, coefficients.shape[1])), 0
+        for i, amplitudes in enumerate(self.amplitudes):
+            m, turn = ORDERS[i // 2], (np.cos, np.sin)[i % 2]
+            rows = slice(first, first + amplitudes.shape[1])
+            profile = rings_of_order(m, table, rings.radius, rings.blur) @ (
+                amplitudes @ coefficients[rows]
+            )
+            total += turn(m * angle)[:, None] * CubicSpline(table, profile)(r)
+            first = rows.stop
+        return total
 
     def combined(self, rings: FloatArray) -> FloatArray:
         """Columns (n, count) of the kernels by those of the rings, (n, 8 q)."""

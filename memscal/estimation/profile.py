@@ -151,28 +151,28 @@ class ProfileEstimate:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
         fit = self.gaussian
         kernel = fit.conversion_constant * elliptic_departure(x, y, fit.sigma, fit.ellipticity)
-        return np.asarray(
-            kernel + (self.oval_columns(x, y) @ self.weighed.mean).reshape(kernel.shape)
-        )
+        changes = self.oval_changes(x, y, self.weighed.mean[:, None])
+        return np.asarray(kernel + changes.reshape(kernel.shape))
 
-    def oval_columns(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """What of the posterior's columns is not round, on a grid: shape (y x, p)."""
+    def oval_changes(self, x: FloatArray, y: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """What of combinations (p, c) of the posterior's kernels is not round: (y x, c)."""
         fit, around, flat = self.gaussian, self.basis.angular, self.basis.flat
-        columns = np.zeros((y.size * x.size, self.basis.integrals.size))
+        changes = np.zeros((y.size * x.size, coefficients.shape[1]))
         if self.points.ellipse:
             place = np.append(fit.sigma, fit.ellipticity)
             steps = _STEP * np.diag([fit.sigma, 1.0, 1.0])
             oval, *moved = (
                 elliptic_departure(x, y, p[0], p[1:]).ravel() for p in (place, *(place + steps))
             )
-            end = fit.jacobian.shape[1]
-            columns[:, 0] = oval
-            for column, other, step in zip((1, end - 2, end - 1), moved, steps, strict=True):
-                columns[:, column] = fit.conversion_constant * (other - oval) / step.sum()
+            end, a = fit.jacobian.shape[1], fit.conversion_constant
+            changes += np.outer(oval, coefficients[0])
+            for row, other, step in zip((1, end - 2, end - 1), moved, steps, strict=True):
+                changes += np.outer(a * (other - oval) / step.sum(), coefficients[row])
         if around:
-            plane = (axis.ravel() for axis in np.meshgrid(x, y))
-            columns[:, flat - around.count : flat] = around.at(*plane)
-        return columns
+            plane_x, plane_y = (axis.ravel() for axis in np.meshgrid(x, y))
+            theirs = coefficients[flat - around.count : flat]
+            changes += around.at(plane_x, plane_y, theirs)
+        return changes
 
     @property
     def oval(self) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from memscal.estimation.angular import AngularRings
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
-from memscal.estimation.voltage_map import Tall, VoltageMap, orthonormalised
+from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
 from memscal.model.arrays import FloatArray
 
 
@@ -47,6 +47,7 @@ class ReducedScan:
             columns, reduced = orthonormalised(columns)
             last -= len(mix)
             synthesis, right = reduced[:, last:] @ mix, points.unstandardise(columns, weights)
+            right = right.astype(np.float32) if len(right) > SINGLE else right
             columns = reduced
         parts = columns[:, 0], columns[:, 1 : 1 + count], columns[:, 1 + count : last]
         return cls(model, fit, *parts, weights, synthesis, right)

@@ -87,7 +87,9 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
     design = np.hstack([flat, left[:, resolved] * singular[resolved]])
     if q is not None:
-        design = q @ design if point.size == len(q) else (q @ design)[point]
+        design = q @ design
+        del q, columns, flat, rings
+        design = design if ordinary.all() else design[point]
     return FreeModel(data, design, point, stated)
 
 

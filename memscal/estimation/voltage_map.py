@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Points up to which matrices over the points are not taken apart.
 DENSE = 400
+#: Points from which on columns of derivatives, which only uncertainties need, have seven digits.
+SINGLE = 250_000
 #: Rows of the blocks in which tall matrices are worked on.
 BLOCK = 32_768
 #: Columns are dependent where their singular value is below this share of the largest.
@@ -65,7 +67,7 @@ class VoltageMap:
     def __matmul__(self, values: FloatArray) -> FloatArray:
         """Changes (m,) or (m, q) of the numbers for changes (n,) or (n, q) of the voltages."""
         terms = [
-            left @ (values if right is None else right.T @ values) for left, right in self.parts
+            left @ (values if right is None else _gram(right, values)) for left, right in self.parts
         ]
         return np.asarray(sum(terms))
 
@@ -136,12 +138,12 @@ def _placed(right: Tall, factors: FloatArray, rows: NDArray[np.intp], count: int
     return coo_array((data, places), shape=(count, right.shape[1])).tocsr()
 
 
-def _gram(first: Any, second: Any, weight: FloatArray) -> FloatArray:
+def _gram(first: Any, second: Any, weight: FloatArray | None = None) -> FloatArray:
     """Products of all columns, by blocks of rows."""
-    total: FloatArray = np.zeros((first.shape[1], second.shape[1]))
-    for start in range(0, weight.size, BLOCK):
+    total: FloatArray = np.zeros((first.shape[1], *second.shape[1:]))
+    for start in range(0, len(second) if weight is None else weight.size, BLOCK):
         rows = slice(start, start + BLOCK)
-        weighted = weight[rows, None] * second[rows]
+        weighted = second[rows] if weight is None else weight[rows, None] * second[rows]
         product = first[rows].T @ weighted
         total += product if isinstance(product, np.ndarray) else product.toarray()
     return total
