@@ -20,16 +20,21 @@ is counted beside that, as it is for the profile (``window``).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.fft import fftshift, ifftshift, irfft2, rfft2
+from numpy.typing import NDArray
+from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix
+from memscal.deconvolution.fourier_ratio import Quotient
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import FloatArray
+
+ComplexArray: TypeAlias = NDArray[np.complex128]
 
 #: Windows below this have closed.
 _CLOSED = 1e-9
@@ -52,25 +57,21 @@ def field_errors(
     if effects:
         voltages = np.array([effect.voltage for effect in effects.values()])
         inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
-    x, y = fields.central.axes
-    if not deconvolution.divided:
-        # No lattice is needed: as fine as the narrowest kernels.
-        x, y = (_evenly(axis, _PER_WIDTH / estimate.gaussian.sigma) for axis in (x, y))
+    # As fine as the narrowest kernels: on some nodes of a lattice, the central one among them.
+    finest = estimate.gaussian.sigma / _PER_WIDTH
+    x, y = (
+        axis[axis.size // 2 % (every := max(int(finest / (axis[1] - axis[0])), 1)) :: every]
+        for axis in fields.central.axes
+    )
     on_lattice = RectBivariateSpline(g.y, g.x, g.image)(
         np.clip(y, g.y[0], g.y[-1]), np.clip(x, g.x[0], g.x[-1])
     )
     on_lattice[np.hypot.outer(y, x) >= fields.support] = 0.0
     changes = _divided if deconvolution.divided else _of_posterior
-    variances = changes(solution, deconvolution, _kernels(estimate, x, y), on_lattice, inputs)
+    variances = changes(solution, deconvolution, (x, y), on_lattice, inputs)
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
     planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
     return np.maximum.accumulate(np.maximum(planes, 0.0))
-
-
-def _evenly(axis: FloatArray, per_metre: float) -> FloatArray:
-    """An axis with at most so many nodes."""
-    count = min(axis.size, int(np.ceil(np.ptp(axis) * per_metre)) + 4)
-    return np.linspace(axis[0], axis[-1], count)
 
 
 def _kernels(
@@ -98,12 +99,13 @@ def _kernels(
 def _of_posterior(
     solution: Solution,
     deconvolution: Deconvolution,
-    kernels: Callable[[FloatArray], FloatArray],
+    axes: tuple[FloatArray, FloatArray],
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate, a = solution.estimate, deconvolution.conversion_constant
+    kernels = _kernels(estimate, *axes)
     gain, integrals = estimate.weighed.gain, estimate.basis.integrals
     variances = []
     for columns in (estimate.scattered(gain), np.hstack([estimate.fixed_root, gain @ inputs])):
@@ -112,10 +114,71 @@ def _of_posterior(
     return np.array(variances)
 
 
+@dataclass(frozen=True, eq=False)
+class _Band:
+    """The wavenumbers that a division passes: Fourier sums of few components, by matrices."""
+
+    ratio: ComplexArray  # (ky, kx): A G over the transform of the field of voltages
+    window: FloatArray
+    # Waves of each wavenumber at nodes about the centre, and at the rows and columns of the points.
+    at_nodes: tuple[ComplexArray, ComplexArray]  # (ky, m), (kx, n)
+    at_points: tuple[ComplexArray, ComplexArray]
+    nodes: tuple[NDArray[np.intp], NDArray[np.intp]]  # the nodes' rows and columns of the lattice
+    twice: FloatArray  # (kx,): components of negative kx are the conjugates of the others
+    every: int  # nodes of the lattice for each of the nodes
+    count: int  # nodes of the lattice
+
+    @classmethod
+    def of(cls, fields: Any, quotient: Quotient, axes: tuple[FloatArray, FloatArray]) -> _Band:
+        """Return the band in which the window of a quotient is open; ``axes``: x and y of nodes."""
+        grid, window = fields.central, quotient.window
+        stress = grid.forward(fields.stress.values)
+        open_ = window > _CLOSED
+        ratio = np.divide(window, stress, out=np.zeros_like(stress), where=open_)
+        rows, columns = (np.flatnonzero(open_.any(axis=axis)) for axis in (1, 0))
+        dy, dx = grid.spacing
+        m, n = fields.confinement.shape
+        angles = 2 * np.pi * fftfreq(m)[rows], 2 * np.pi * rfftfreq(n)[columns]
+        (x, y), index = axes, fields.index
+        at = [np.rint(axis / step).astype(np.intp) for axis, step in ((y, dy), (x, dx))]
+        nodes, points = [], []
+        for angle, offset, places in zip(angles, at, index, strict=True):
+            between = np.arange(places.min(), places.max() + 1)
+            nodes.append(np.exp(-1j * np.multiply.outer(angle, offset)))
+            points.append(np.exp(-1j * np.multiply.outer(angle, between)))
+        every = round((x[1] - x[0]) / dx) * round((y[1] - y[0]) / dy)
+        return cls(
+            ratio=ratio[np.ix_(rows, columns)],
+            window=window[np.ix_(rows, columns)],
+            at_nodes=(nodes[0], nodes[1]),
+            at_points=(points[0], points[1]),
+            nodes=(at[0] + m // 2, at[1] + n // 2),
+            twice=np.where(columns == 0, 1.0, 2.0),
+            every=every,
+            count=m * n,
+        )
+
+    def passed(self, kernels: FloatArray) -> FloatArray:
+        """What the window passes of kernels (nodes, q)."""
+        rows, columns = self.at_nodes
+        planes = kernels.T.reshape(-1, rows.shape[1], columns.shape[1])
+        return self._at_nodes(self.window * (rows @ planes @ columns.T) * self.every)
+
+    def divided(self, planes: FloatArray) -> FloatArray:
+        """Divide fields (q, m, n), zero but at the points: A G at the nodes, (nodes, q)."""
+        rows, columns = self.at_points
+        return self._at_nodes(self.ratio * (rows @ planes @ columns.T))
+
+    def _at_nodes(self, spectra: ComplexArray) -> FloatArray:
+        rows, columns = self.at_nodes
+        planes = (rows.conj().T @ spectra @ (self.twice[:, None] * columns.conj())).real
+        return np.asarray(planes.reshape(len(planes), -1).T / self.count)
+
+
 def _divided(
     solution: Solution,
     deconvolution: Deconvolution,
-    kernels: Callable[[FloatArray], FloatArray],
+    axes: tuple[FloatArray, FloatArray],
     g: FloatArray,
     inputs: FloatArray,
 ) -> FloatArray:
@@ -123,27 +186,23 @@ def _divided(
     fields: Any = solution.fields
     estimate, smoothed = solution.estimate, solution.smoothed
     grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
-    shape, fit = fields.confinement.shape, estimate.gaussian
-    window, stress = deconvolution.quotient.window, grid.forward(fields.stress.values)
-    ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
+    kernels, radius = _kernels(estimate, *axes), np.hypot.outer(*axes[::-1]).ravel()
+    band = _Band.of(fields, deconvolution.quotient, axes)
     share = fields.share(smoothed)
     noise = estimate.noise**2 / estimate.outlier_weight
     # Nodes where G is stated.
-    x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in grid.axes)
+    x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in axes)
     inside = np.flatnonzero(np.logical_and.outer(y, x))
-    taper, g = fields.confinement.ravel(), g.ravel()[inside]
+    taper, g = fields.taper(radius), g.ravel()[inside]
+    index = [places - places.min() for places in fields.index]
+    box = tuple(int(places.max()) + 1 for places in index)
 
-    def placed(values: FloatArray) -> FloatArray:
-        """Put columns (n, q) of the points on the lattice, (q, m, n)."""
-        planes = np.zeros((values.shape[1], *shape))
-        for plane, column in zip(planes, values.T, strict=True):
-            np.add.at(plane, fields.index, share * column)
-        return planes
-
-    def filtered(planes: FloatArray, spectrum: FloatArray = ratio) -> FloatArray:
-        """Filter planes (q, m, n) to A G within its support: (nodes, q)."""
-        plane = fftshift(irfft2(spectrum * rfft2(planes), s=shape), axes=(1, 2))
-        return plane.reshape(len(planes), -1).T
+    def divided(voltages: FloatArray) -> FloatArray:
+        """Put columns (n, q) of the points on the lattice, and divide: (nodes, q)."""
+        planes = np.zeros((voltages.shape[1], *box))
+        for plane, column in zip(planes, voltages.T, strict=True):
+            np.add.at(plane, tuple(index), share * column)
+        return band.divided(planes)
 
     # The posterior mean and its kernels: what of them the window takes away; and what an error of
     # the parameters moves, of what was fitted around the raster and of the frame that G is seen in.
@@ -153,44 +212,48 @@ def _divided(
     sums, of_frame = np.empty(count + 1), np.empty(count)
     for some in _chunks(count):
         columns = kernels(unit := np.eye(count)[:, some])
-        passed = filtered(ifftshift(columns.T.reshape(-1, *shape), axes=(1, 2)), window)
-        moved = passed - filtered(placed(estimate.basis.voltages(estimate.model, fit, unit)))
+        passed = band.passed(columns)
+        moved = passed - divided(estimate.basis.voltages(estimate.model, estimate.gaussian, unit))
         beside[:, some], of_frame[some] = moved[inside], taper @ moved
         columns -= taper[:, None] * passed
         lost[:, some], sums[some] = columns[inside], columns.sum(axis=0)
-    mean = fields.kernel(estimate.radial)
-    columns = mean.ravel() - taper * filtered(ifftshift(mean)[None], window)[:, 0]
-    lost[:, -1], sums[-1] = columns[inside], columns.sum()
-    own = np.zeros(shape)
+    # The mean is the Gaussian fit and its corrections.
+    mean = estimate.radial(radius) + estimate.oval_kernel(*axes).ravel()
+    left = mean - taper * band.passed(mean[:, None])[:, 0]
+    lost[:, -1], sums[-1] = left[inside], left.sum()
+    own, shape = np.zeros(fields.confinement.shape), fields.confinement.shape
     np.add.at(own, fields.index, share**2 * noise)
-    squared = rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own)
-    variance = fftshift(irfft2(squared, s=shape)).ravel()[inside]
-    for left, right in gain.parts:
+    stress = grid.forward(fields.stress.values)
+    window = deconvolution.quotient.window
+    ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
+    squared = fftshift(irfft2(rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own), s=shape))
+    variance = squared[np.ix_(*band.nodes)].ravel()[inside]
+    for gains, right in gain.parts:
         of_points: Any = np.eye(share.size) if right is None else right
         for some in _chunks(of_points.shape[1]):
-            moved = filtered(placed(noise[:, None] * of_points[:, some]))[inside]
-            variance += 2 * np.sum((beside @ left[:, some]) * moved, axis=1)
+            moved = divided(noise[:, None] * of_points[:, some])[inside]
+            variance += 2 * np.sum((beside @ gains[:, some]) * moved, axis=1)
     spread = square_root(gain.covariance(np.sqrt(noise)))
     for some in _chunks(count):
         variance += np.sum((beside @ spread[:, some]) ** 2, axis=1)
     # A is the sum of A G over the nodes.
     back = irfft2(np.conj(ratio) * rfft2(ifftshift(fields.confinement)), s=shape)
-    of_frame = (of_frame[None, :] @ gain).dense()[0]
-    of_a, taper = grid.cell_area * (share * back[fields.index] + of_frame), taper[inside]
+    by_frame = band.every * (of_frame[None, :] @ gain).dense()[0]
+    of_a, taper = grid.cell_area * (share * back[fields.index] + by_frame), taper[inside]
 
     def changed(voltages: FloatArray) -> FloatArray:
         fitted = beside @ (gain @ voltages)
-        return np.asarray(taper[:, None] * (filtered(placed(voltages))[inside] + fitted))
+        return np.asarray(taper[:, None] * (divided(voltages)[inside] + fitted))
 
     with_a = changed((noise * of_a)[:, None])[:, 0]
     variance = taper**2 * variance - 2 * g * with_a + g**2 * float(of_a**2 @ noise)
     rest = np.sum((changed(inputs) - np.outer(g, of_a @ inputs)) ** 2, axis=1)
     root = np.zeros((count + 1, count + 1))
     root[:-1, :-1], root[-1, -1] = square_root(estimate.covariance), 1.0
-    sums = grid.cell_area * (sums @ root)
+    sums = grid.cell_area * band.every * (sums @ root)
     for some in _chunks(count + 1):
         rest += np.sum((lost @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)
-    planes = np.zeros((2, fields.confinement.size))
+    planes = np.zeros((2, radius.size))
     planes[:, inside] = np.stack([variance, rest]) / a**2
     return planes
 

@@ -250,7 +250,8 @@ class RasterFields:
         """Return a kernel on its support."""
         step = float(self.grid.x[1] - self.grid.x[0])
         # Odd, so that the kernel's zero stays a point of the lattice.
-        refinement = max(5, int(np.ceil(step / (2 * self.step))) | 1)
+        least, finer = (int(np.ceil(step / (each * self.step))) | 1 for each in (2.0, 2.0 / 3))
+        refinement = max(min(5, finer), least)
         fine, values = self.grid.refined(kernel, refinement)
         if profile is not None:
             values = self._lifted(profile.radial, fine)

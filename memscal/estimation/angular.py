@@ -59,11 +59,13 @@ class AngularRings:
 
     def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
         """Voltages at the points, for centres (scans, 2) in m: (n, 8 q), in V."""
-        blurred, blocks = np.exp(-0.5 * (self.blur * model.k) ** 2)[:, None], []
-        for m in ORDERS:
-            rings = blurred * bessel(m, np.multiply.outer(model.k, self.radius))
-            blocks.append(model.around(m, rings, rings, centres))
-        return np.hstack(blocks)
+        rings = [(m, self.transform(m, model.k)) for m in ORDERS]
+        return np.hstack([model.around(m, each, each, centres) for m, each in rings])
+
+    def transform(self, m: int, k: FloatArray) -> FloatArray:
+        """Transforms of order m at ``k`` (rad/m), (k, q)."""
+        blurred = np.exp(-0.5 * (self.blur * k) ** 2)[:, None]
+        return np.asarray(blurred * bessel(m, np.multiply.outer(k, self.radius)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,16 +88,31 @@ class AngularDepartures:
         r, angle, rings = np.hypot(x, y), np.arctan2(y, x), self.rings
         step = rings.blur / _PER_BLUR
         table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
-        total, first = np.zeros((r.size, coefficients.shape[1])), 0
-        for i, amplitudes in enumerate(self.amplitudes):
+        total: FloatArray = np.zeros((r.size, coefficients.shape[1]))
+        for i, of_rings in enumerate(self._by_rings(coefficients)):
             m, turn = ORDERS[i // 2], (np.cos, np.sin)[i % 2]
-            rows = slice(first, first + amplitudes.shape[1])
-            profile = rings_of_order(m, table, rings.radius, rings.blur) @ (
-                amplitudes @ coefficients[rows]
-            )
-            total += turn(m * angle)[:, None] * CubicSpline(table, profile)(r)
-            first = rows.stop
+            profiles = rings_of_order(m, table, rings.radius, rings.blur) @ of_rings
+            total += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
         return total
+
+    def signal(
+        self, model: ForwardModel, centres: FloatArray, coefficients: FloatArray
+    ) -> FloatArray:
+        """Voltages of combinations (count, c) at the points, for centres in m: (n, c), in V."""
+        count, parts = coefficients.shape[1], self._by_rings(coefficients)
+        total: FloatArray = np.zeros((model.points.u.size, count))
+        for i, m in enumerate(ORDERS):
+            rings = self.rings.transform(m, model.k)
+            cosines, sines = (rings @ part for part in parts[2 * i : 2 * i + 2])
+            both = model.around(m, cosines, sines, centres)
+            total += both[:, :count] + both[:, count:]
+        return total
+
+    def _by_rings(self, coefficients: FloatArray) -> list[FloatArray]:
+        """Amplitudes (q, c) of the rings in combinations of the kernels, cosine and sine."""
+        ends = np.cumsum([amplitudes.shape[1] for amplitudes in self.amplitudes])
+        parts = zip(self.amplitudes, np.split(coefficients, ends[:-1]), strict=True)
+        return [amplitudes @ part for amplitudes, part in parts]
 
     def combined(self, rings: FloatArray) -> FloatArray:
         """Columns (n, count) of the kernels by those of the rings, (n, 8 q)."""

@@ -196,8 +196,9 @@ class DepartureBasis:
         count = fit.jacobian.shape[1]
         volts = fit.jacobian @ coefficients[:count]
         if self.angular:
-            columns = self.angular.combined(self.angular.rings.signal(model, fit.centre))
-            volts += columns @ coefficients[count : self.flat]
+            theirs = coefficients[count : self.flat]
+            around = self.angular.signal(model, fit.centre, theirs.reshape(len(theirs), -1))
+            volts += around.reshape(volts.shape)
         kernels = self.kernels(model.k)[:, self.flat :]
         return np.asarray(volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :]))
 
