@@ -59,10 +59,12 @@ def field_errors(
         inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
     # As fine as the narrowest kernels: on some nodes of a lattice, the central one among them.
     finest = estimate.gaussian.sigma / _PER_WIDTH
+    reach = np.inf if deconvolution.divided else fields.support + 4 * fields.step
     x, y = (
         axis[axis.size // 2 % (every := max(int(finest / (axis[1] - axis[0])), 1)) :: every]
         for axis in fields.central.axes
     )
+    x, y = (axis[np.abs(axis) <= max(reach, 4 * axis[axis.size // 2 + 1])] for axis in (x, y))
     on_lattice = RectBivariateSpline(g.y, g.x, g.image)(
         np.clip(y, g.y[0], g.y[-1]), np.clip(x, g.x[0], g.x[-1])
     )
@@ -162,17 +164,24 @@ class _Band:
         """What the window passes of kernels (nodes, q)."""
         rows, columns = self.at_nodes
         planes = kernels.T.reshape(-1, rows.shape[1], columns.shape[1])
-        return self._at_nodes(self.window * (rows @ planes @ columns.T) * self.every)
+        return self._at_nodes(self.window * self.every * _summed(planes, rows, columns))
 
     def divided(self, planes: FloatArray) -> FloatArray:
         """Divide fields (q, m, n), zero but at the points: A G at the nodes, (nodes, q)."""
         rows, columns = self.at_points
-        return self._at_nodes(self.ratio * (rows @ planes @ columns.T))
+        return self._at_nodes(self.ratio * _summed(planes, rows, columns))
 
     def _at_nodes(self, spectra: ComplexArray) -> FloatArray:
         rows, columns = self.at_nodes
-        planes = (rows.conj().T @ spectra @ (self.twice[:, None] * columns.conj())).real
-        return np.asarray(planes.reshape(len(planes), -1).T / self.count)
+        along = spectra @ (self.twice[:, None] * columns.conj() / self.count)
+        # The real part of the product.
+        planes = rows.real.T @ along.real + rows.imag.T @ along.imag
+        return np.asarray(planes.reshape(len(planes), -1).T)
+
+
+def _summed(planes: FloatArray, rows: ComplexArray, columns: ComplexArray) -> ComplexArray:
+    """Fourier sums (q, ky, kx) of real planes (q, m, n)."""
+    return np.asarray((rows.real @ planes + 1j * (rows.imag @ planes)) @ columns.T)
 
 
 def _divided(
@@ -195,14 +204,13 @@ def _divided(
     inside = np.flatnonzero(np.logical_and.outer(y, x))
     taper, g = fields.taper(radius), g.ravel()[inside]
     index = [places - places.min() for places in fields.index]
-    box = tuple(int(places.max()) + 1 for places in index)
+    box = [int(places.max()) + 1 for places in index]
+    node = index[0] * box[1] + index[1]
 
     def divided(voltages: FloatArray) -> FloatArray:
         """Put columns (n, q) of the points on the lattice, and divide: (nodes, q)."""
-        planes = np.zeros((voltages.shape[1], *box))
-        for plane, column in zip(planes, voltages.T, strict=True):
-            np.add.at(plane, tuple(index), share * column)
-        return band.divided(planes)
+        planes = [np.bincount(node, share * column, box[0] * box[1]) for column in voltages.T]
+        return band.divided(np.reshape(planes, (-1, *box)))
 
     # The posterior mean and its kernels: what of them the window takes away; and what an error of
     # the parameters moves, of what was fitted around the raster and of the frame that G is seen in.

@@ -35,8 +35,8 @@ ORDERS = (1, 2, 3, 4)
 #: In units of the Gaussian's width: blur of the rings, their distance, and where the envelope of
 #: their amplitudes falls; it is cut where it has fallen to 1e-5.
 _BLUR, _SPACING, _EXTENT, _CUT = 0.45, 0.3, 2.5, 2.2
-#: Radii of the tables, over the blur.
-_PER_BLUR = 10
+#: Radii of the tables, over the blur; a ring has ended so many of them farther out.
+_PER_BLUR, _BLURS = 10, 7.0
 #: Radial departures that move no voltage by this share of its noise are not told from angular ones.
 _RESOLVED = 0.1
 #: Expected sizes of an order, over the Gaussian's L2 norm.
@@ -85,15 +85,16 @@ class AngularDepartures:
         """Combinations (count, c) at positions from the centre, (n,) in m: (n, c), V/Pa/m^2."""
         from scipy.interpolate import CubicSpline
 
-        r, angle, rings = np.hypot(x, y), np.arctan2(y, x), self.rings
+        rings, total = self.rings, np.zeros((x.size, coefficients.shape[1]))
         step = rings.blur / _PER_BLUR
+        near = np.hypot(x, y) < rings.radius[-1] + _BLURS * rings.blur
+        r, angle = np.hypot(x[near], y[near]), np.arctan2(y[near], x[near])
         table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
-        total: FloatArray = np.zeros((r.size, coefficients.shape[1]))
         for i, of_rings in enumerate(self._by_rings(coefficients)):
             m, turn = ORDERS[i // 2], (np.cos, np.sin)[i % 2]
             profiles = rings_of_order(m, table, rings.radius, rings.blur) @ of_rings
-            total += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
-        return total
+            total[near] += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
+        return np.asarray(total)
 
     def signal(
         self, model: ForwardModel, centres: FloatArray, coefficients: FloatArray
