@@ -68,10 +68,10 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
     """Group points by place: equal positions, and of several passes those close to each other."""
     # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
     # an even lattice share a place too.
-    positions = np.stack([x, y], axis=1)
-    close, pairs = _neighbours(positions, repeat)
-    index = _linked(positions, pairs)
+    close = _close(x, y, repeat)
     columns, rows = (_clusters(values, close) for values in (x, y))
+    # Along a line the neighbours of a place are those in order.
+    index = columns if not np.ptp(y) else rows if not np.ptp(x) else _linked(x, y, close)
     steps = _typical_step(x, columns), _typical_step(y, rows)
     count = int(index.max()) + 1
     if 0.0 in steps or _nodes(columns, rows) <= _MOST_NODES * count:
@@ -118,34 +118,51 @@ def _even_axis(positions: FloatArray) -> EvenAxis | None:
     return None
 
 
-def _neighbours(positions: FloatArray, repeat: IntArray) -> tuple[float, IntArray]:
-    """Return which distance is close, and pairs of distinct positions that are."""
-    passes = np.unique(repeat)
-    if passes.size == 1:
-        return 0.0, np.zeros((0, 2), dtype=np.intp)
+def _close(x: FloatArray, y: FloatArray, repeat: IntArray) -> float:
+    """Return the distance within which readings of several passes share a place; 0 of one pass."""
+    order = np.argsort(repeat, kind="stable")
+    starts = np.flatnonzero(np.diff(repeat[order])) + 1
+    if not starts.size:
+        return 0.0
+    usual = []
+    for chosen in np.split(order, starts):
+        places = _distinct(x[chosen], y[chosen])[0]
+        if places.size > 1:
+            distances = _nearest(places)
+            least = int(_TWICE * (places.size - 1))
+            usual.append(float(np.partition(distances, least)[least]))
+    return max(_CLOSE * min(usual, default=0.0), _ROUNDING)
+
+
+def _distinct(x: FloatArray, y: FloatArray) -> tuple[NDArray[np.complex128], IntArray]:
+    """Return distinct positions x + iy in order of x, then y, and which of them each one is."""
+    places, index = np.unique(x + 1j * y, return_inverse=True)
+    return places, index
+
+
+def _nearest(places: NDArray[np.complex128]) -> FloatArray:
+    """Return the distance of each of several distinct positions to its nearest neighbour."""
+    if not np.ptp(places.imag) or not np.ptp(places.real):
+        gaps = np.concatenate([[np.inf], np.abs(np.diff(places)), [np.inf]])
+        return np.asarray(np.minimum(gaps[:-1], gaps[1:]))
     from scipy.spatial import KDTree
 
-    usual = []
-    for number in passes:
-        places = np.unique(positions[repeat == number], axis=0)
-        if len(places) > 1:
-            distances = KDTree(places).query(places, k=[2])[0]
-            usual.append(float(np.quantile(distances, _TWICE, method="lower")))
-    close = max(_CLOSE * min(usual, default=0.0), _ROUNDING)
-    pairs = KDTree(np.unique(positions, axis=0)).query_pairs(close, output_type="ndarray")
-    return close, np.asarray(pairs, dtype=np.intp)
+    plane = np.stack([places.real, places.imag], axis=1)
+    return np.asarray(KDTree(plane).query(plane, k=[2])[0])[:, 0]
 
 
-def _linked(positions: FloatArray, pairs: IntArray) -> IntArray:
-    """Number the groups of equal or paired positions; pairs index the distinct positions."""
-    distinct, index = np.unique(positions, axis=0, return_inverse=True)
-    index = index.reshape(-1)  # NumPy 2.0 kept an axis here
-    if not len(pairs):
-        return np.asarray(index)
+def _linked(x: FloatArray, y: FloatArray, close: float) -> IntArray:
+    """Number the groups of positions in a plane that are equal or, through others, close."""
+    places, index = _distinct(x, y)
+    if not close:
+        return index
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
 
-    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(distinct), len(distinct)))
+    plane = np.stack([places.real, places.imag], axis=1)
+    pairs = KDTree(plane).query_pairs(close, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(places.size, places.size))
     return np.asarray(connected_components(links, directed=False)[1][index], dtype=np.intp)
 
 
@@ -208,11 +225,11 @@ def require_rod_friction(friction: float | None) -> None:
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
-    values = np.asarray(stated)
+    values = numbers = np.asarray(stated)
     named = {"": 0, **BRANCHES}
-    numbers = np.array(
-        [named.get(v.strip().lower(), -1) if isinstance(v, str) else v for v in values.flat]
-    ).reshape(values.shape)
+    if values.dtype.kind not in "biuf":
+        words = [named.get(v.strip().lower(), -1) if isinstance(v, str) else v for v in values.flat]
+        numbers = np.array(words).reshape(values.shape)
     known = np.isin(numbers, list(named.values()))
     if not known.all():
         problem = f"{name} holds {values[~known][0]}, which names no branch."
