@@ -19,6 +19,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
+from memscal.model.sizes import MOST_CORRELATED, too_large
 from memscal.model.stress import StressProfile
 
 IntArray = NDArray[np.intp]
@@ -241,6 +242,10 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
 
 def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
     """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
+    if size > MOST_CORRELATED:
+        why = "The cube of their number is worked with."
+        cure = "Average neighbouring readings, or leave it out: their noise is then estimated."
+        raise too_large("u_zz_correlation", size, MOST_CORRELATED, "points", why=why, cure=cure)
     correlation = arrays.frozen_array(stated)
     if correlation.shape != (size, size) or not np.isfinite(correlation).all():
         raise InputError(

@@ -61,10 +61,11 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
+        opened = SafeFile(file, name, source, data)
     try:
         # The dataclasses check values without knowing where they come from.
         with placed(name):
-            yield SafeFile(file, name, source, data)
+            yield opened
     finally:
         with contextlib.suppress(Exception):
             file.close()

@@ -32,6 +32,8 @@ _MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT = 80, 20, 300
 _SAMPLE, _FIRST, _BLOCK = 250, 2**16, 2**22
 #: What may stand in a block that needs no care: no quote and no sign of a comment.
 _PLAIN = bytes({9, 10, *range(32, 127)} - {*b'"#%'})
+#: What ends a line, or is in UTF-8 the last byte of what does.
+_ENDS = b"\n\r\v\f\x1c\x1d\x1e\x85\xa8\xa9"
 
 
 class Wanted(NamedTuple):
@@ -51,8 +53,8 @@ class Table:
 
     def __init__(self, path: str | os.PathLike[str], delimiter: str | None, decimal: str | None):
         self._name = name = os.path.basename(os.fspath(path))
-        self._digest, self._latin = hashlib.sha256(), False
-        self._blocks = self._whole_lines(path)
+        self._path, self._digest, self._latin = path, hashlib.sha256(), False
+        self._blocks = self._whole_lines()
         head, lines = b"", list[str]()
         while len(lines) < _SAMPLE and (block := next(self._blocks, b"")):
             head += block
@@ -82,17 +84,12 @@ class Table:
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
         indices = [self._index(item.column) for item in wanted.values()]
-        parts = [self._numbers(self._first, indices, 0, wanted)]
-        count = len(self._first)
-        for block in self._blocks:
-            numbers = self._plain_numbers(block, indices)
-            if numbers is None:
-                lines = [line for line in self._lines(block) if not _is_comment(line)]
-                rows = _split(self._name, lines, self._delimiter)
-                self._width = max(self._width, *map(len, rows), 0)
-                numbers = self._numbers(rows, indices, count, wanted)
-            parts.append(numbers)
-            count += len(numbers[0])
+        most, count = self._most_rows(), 0
+        values = [np.empty(most) for _ in wanted]
+        for part in self._parts(indices, wanted):
+            for column, numbers in zip(values, part, strict=True):
+                column[count : count + numbers.size] = numbers
+            count += part[0].size
         self.source = SourceFile(self._name, self._digest.hexdigest())
         mark = "comma" if self.decimal == "," else "point"
         apart = f"separated by a {_DELIMITERS.get(self._delimiter, repr(self._delimiter))}"
@@ -102,13 +99,37 @@ class Table:
             *self._comments,
             f"Read {count} rows of {self._width} columns {apart}, with a decimal {mark}.",
         ]
-        by_column = [*zip(*parts, strict=True)]
-        parts.clear()
-        joined = (np.concatenate(by_column.pop(0)) for _ in indices)
         return {
-            name: to_si(values, item.unit, item.dimension, self.where(item.column))
-            for (name, item), values in zip(wanted.items(), joined, strict=True)
+            name: to_si(values.pop(0)[:count], item.unit, item.dimension, self.where(item.column))
+            for name, item in wanted.items()
         }
+
+    def _most_rows(self) -> int:
+        """Return how many rows there are at most; refuse a table of too many."""
+        ends = lines = 0
+        for piece in read_pieces(self._path, limit=MOST_TABLE_BYTES):
+            lines += piece.count(b"\n") or piece.count(b"\r")
+            ends += len(piece) - len(piece.translate(None, _ENDS))
+        if lines > MOST_ROWS:
+            cure = "Average neighbouring readings, or cut the table into several."
+            raise too_large(self._name, lines, MOST_ROWS, "lines", cure=cure)
+        return ends + 1
+
+    def _parts(
+        self, indices: list[int], wanted: Mapping[str, Wanted]
+    ) -> Iterator[list[FloatArray]]:
+        """Yield the columns of one block after another."""
+        yield self._numbers(self._first, indices, 0, wanted)
+        count = len(self._first)
+        for block in self._blocks:
+            numbers = self._plain_numbers(block, indices)
+            if numbers is None:
+                lines = [line for line in self._lines(block) if not _is_comment(line)]
+                rows = _split(self._name, lines, self._delimiter)
+                self._width = max(self._width, *map(len, rows), 0)
+                numbers = self._numbers(rows, indices, count, wanted)
+            yield numbers
+            count += numbers[0].size
 
     def unit_of(self, column_name: str | int, unit: str | None, option: str) -> str:
         """Return the unit of a column: the one given, or that of its head."""
@@ -140,10 +161,10 @@ class Table:
             )
         return number - 1
 
-    def _whole_lines(self, path: str | os.PathLike[str]) -> Iterator[bytes]:
+    def _whole_lines(self) -> Iterator[bytes]:
         """Yield a few lines, then blocks of whole lines."""
         rest, size = b"", _FIRST
-        for piece in read_pieces(path, limit=MOST_TABLE_BYTES):
+        for piece in read_pieces(self._path, limit=MOST_TABLE_BYTES):
             self._digest.update(piece)
             rest += piece
             while len(rest) > size:
@@ -230,14 +251,7 @@ def read_table(
 ) -> Table:
     """Read the head of a delimited text file; ``#`` or ``%`` begin a comment."""
     # The first line is the header where one of its cells is no number.
-    table = Table(path, delimiter, decimal)
-    if os.path.getsize(path) > 4 * MOST_ROWS:  # a row of two columns has four bytes or more
-        pieces = read_pieces(path, limit=MOST_TABLE_BYTES)
-        lines = sum(piece.count(b"\n") or piece.count(b"\r") for piece in pieces)
-        if lines > MOST_ROWS:
-            cure = "Average neighbouring readings, or cut the table into several."
-            raise too_large(os.path.basename(path), lines, MOST_ROWS, "lines", cure=cure)
-    return table
+    return Table(path, delimiter, decimal)
 
 
 def _is_comment(line: str) -> bool:
