@@ -435,14 +435,11 @@ def require_size(scans: Sequence[Scan]) -> None:
     raster = any(scan.planar for scan in scans)
     size, most = sum(scan.u_zz.size for scan in scans), MOST_OF_RASTER if raster else MOST_OF_LINES
     if size > most:
-        names = ", ".join(scan.source.file_name for scan in scans if scan.source)
-        what, of = (
-            names or "What is to be calibrated",
-            f"points {'in a plane' if raster else 'on lines'}",
-        )
+        named = ", ".join(scan.source.file_name for scan in scans if scan.source) or "The scan"
+        of = f"points {'in a plane' if raster else 'on lines'}"
         why = "Time and memory grow with their number."
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(what, size, most, of, why=why, cure=cure)
+        raise too_large(named, size, most, of, why=why, cure=cure)
 
 
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:

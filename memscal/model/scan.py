@@ -27,6 +27,9 @@ IntArray = NDArray[np.intp]
 #: Readings share a place where they are closer than this share of the distance that nine tenths
 #: of the readings of a pass keep from each other; a few may be read twice in one.
 _CLOSE, _TWICE = 0.1, 0.1
+#: Of many passes over a plane there are too many pairs of readings: positions are rounded to this
+#: share of what is close where there may be more pairs.
+_GRAIN, _MOST_PAIRS = 0.1, 20_000_000
 #: Distances below a nanometre are rounding.
 _ROUNDING = 1e-9
 #: Rows and columns make a raster if they cross at no more than this many nodes for each place.
@@ -72,7 +75,9 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
     close = _close(x, y, repeat)
     columns, rows = (_clusters(values, close) for values in (x, y))
     # Along a line the neighbours of a place are those in order.
-    index = columns if not np.ptp(y) else rows if not np.ptp(x) else _linked(x, y, close)
+    index = rows if np.ptp(y) else columns
+    if np.ptp(x) and np.ptp(y):
+        index = _linked(x, y, close, int(np.ptp(repeat)) + 1)
     steps = _typical_step(x, columns), _typical_step(y, rows)
     count = int(index.max()) + 1
     if 0.0 in steps or _nodes(columns, rows) <= _MOST_NODES * count:
@@ -127,42 +132,38 @@ def _close(x: FloatArray, y: FloatArray, repeat: IntArray) -> float:
         return 0.0
     usual = []
     for chosen in np.split(order, starts):
-        places = _distinct(x[chosen], y[chosen])[0]
+        # Without an index unique() hashes, which is slower.
+        places = np.unique(x[chosen] + 1j * y[chosen], return_index=True)[0]
         if places.size > 1:
-            distances = _nearest(places)
-            least = int(_TWICE * (places.size - 1))
-            usual.append(float(np.partition(distances, least)[least]))
+            usual.append(float(np.quantile(_nearest(places), _TWICE, method="lower")))
     return max(_CLOSE * min(usual, default=0.0), _ROUNDING)
 
 
-def _distinct(x: FloatArray, y: FloatArray) -> tuple[NDArray[np.complex128], IntArray]:
-    """Return distinct positions x + iy in order of x, then y, and which of them each one is."""
-    places, index = np.unique(x + 1j * y, return_inverse=True)
-    return places, index
-
-
 def _nearest(places: NDArray[np.complex128]) -> FloatArray:
-    """Return the distance of each of several distinct positions to its nearest neighbour."""
+    """Return the distance of each of several distinct positions x + iy to its nearest one."""
     if not np.ptp(places.imag) or not np.ptp(places.real):
         gaps = np.concatenate([[np.inf], np.abs(np.diff(places)), [np.inf]])
         return np.asarray(np.minimum(gaps[:-1], gaps[1:]))
     from scipy.spatial import KDTree
 
-    plane = np.stack([places.real, places.imag], axis=1)
+    plane = places.view(np.float64).reshape(-1, 2)
     return np.asarray(KDTree(plane).query(plane, k=[2])[0])[:, 0]
 
 
-def _linked(x: FloatArray, y: FloatArray, close: float) -> IntArray:
+def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IntArray:
     """Number the groups of positions in a plane that are equal or, through others, close."""
-    places, index = _distinct(x, y)
+    places, index = np.unique(x + 1j * y, return_inverse=True)
     if not close:
         return index
+    if places.size * passes > _MOST_PAIRS:
+        rounded = np.rint(places / (close * _GRAIN)) * (close * _GRAIN)
+        places, coarse = np.unique(rounded, return_inverse=True)
+        index = coarse[index]
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
-    plane = np.stack([places.real, places.imag], axis=1)
-    pairs = KDTree(plane).query_pairs(close, output_type="ndarray")
+    pairs = KDTree(places.view(np.float64).reshape(-1, 2)).query_pairs(close, output_type="ndarray")
     links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(places.size, places.size))
     return np.asarray(connected_components(links, directed=False)[1][index], dtype=np.intp)
 

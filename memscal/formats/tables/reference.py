@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.tables.text_table import Wanted, read_table
+from memscal.formats.tables.text_table import Table, Wanted
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
@@ -180,7 +180,7 @@ def read_reference_table(
     # the shear is S13 with axis 3 from the base to the surface.
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
-    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    table = Table(path, delimiter=delimiter, decimal=decimal)
     wanted = {"r": Wanted(r, r_unit, "length"), "sigma_zz": Wanted(sigma, sigma_unit, "stress")}
     if shear is not None:
         wanted["sigma_rz"] = Wanted(shear, sigma_unit, "stress")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.formats.tables.reference import require_sign
-from memscal.formats.tables.text_table import Wanted, read_table
+from memscal.formats.tables.text_table import Table, Wanted
 from memscal.formats.units import reading_of
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.indenter import Rod, RoundIndenter
@@ -62,7 +62,7 @@ def read_scan_table(
     # by default they are those of the columns' heads (x/mm). load_scatter, relative, and x_error,
     # in m, are independent from point to point.
     require_sign("sign of the voltage", u_sign)
-    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    table = Table(path, delimiter=delimiter, decimal=decimal)
     u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
     x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
     reading = reading_of(u_unit, table.where(u))

@@ -19,7 +19,13 @@ from memscal.model.indenter import Profile
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import BRANCHES
-from memscal.model.sizes import MOST_COLUMNS, MOST_ROWS, MOST_TABLE_BYTES, too_large
+from memscal.model.sizes import (
+    MOST_COLUMNS,
+    MOST_HDF5_BYTES,
+    MOST_ROWS,
+    MOST_TABLE_BYTES,
+    too_large,
+)
 
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
@@ -27,13 +33,13 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 _HEAD = re.compile(r"([^/(\[]+?)\s*(?:/(.+)|\((.+)\)|\[(.+)\])")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 _MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT = 80, 20, 300
-#: Rows from which delimiter, decimal mark and header are found; bytes that hold them, and bytes
+#: Lines from which delimiter, decimal mark and header are found; bytes that hold them, and bytes
 #: that are then cut into cells at once.
 _SAMPLE, _FIRST, _BLOCK = 250, 2**16, 2**22
 #: What may stand in a block that needs no care: no quote and no sign of a comment.
 _PLAIN = bytes({9, 10, *range(32, 127)} - {*b'"#%'})
-#: What ends a line, or is in UTF-8 the last byte of what does.
-_ENDS = b"\n\r\v\f\x1c\x1d\x1e\x85\xa8\xa9"
+
+Rows = list[tuple[str, ...]]
 
 
 class Wanted(NamedTuple):
@@ -46,14 +52,23 @@ class Wanted(NamedTuple):
 
 
 class Table:
-    """A table of a file whose head was read; its columns are read once, in blocks."""
+    """A delimited text file whose head was read; its columns are read once, in blocks.
+
+    ``#`` or ``%`` begin a comment. The first line is the header where a cell of it is no number.
+    """
 
     source: SourceFile
     notes: list[str]
 
-    def __init__(self, path: str | os.PathLike[str], delimiter: str | None, decimal: str | None):
-        self._name = name = os.path.basename(os.fspath(path))
-        self._path, self._digest, self._latin = path, hashlib.sha256(), False
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        delimiter: str | None = None,
+        decimal: str | None = None,
+    ) -> None:
+        self._path, self._name = path, os.path.basename(os.fspath(path))
+        self._digest, self._latin, self._width = hashlib.sha256(), False, 0
         self._blocks = self._whole_lines()
         head, lines = b"", list[str]()
         while len(lines) < _SAMPLE and (block := next(self._blocks, b"")):
@@ -62,31 +77,31 @@ class Table:
             lines = [line for line in written if not _is_comment(line)]
         if not lines:
             cure = "Give a table with one row per reading."
-            raise FormatError(f"{name} holds no table.", cure=cure)
+            raise FormatError(f"{self._name} holds no table.", cure=cure)
         self._comments = _head_comments(written)
         self._delimiter = delimiter or _find_delimiter(lines)
-        rows = _split(name, lines, self._delimiter)
-        empty = _MISSING | {*BRANCHES}
-        headed = not all(_NUMBER.fullmatch(cell) or cell.lower() in empty for cell in rows[0])
-        self._width = max(len(row) for row in rows)
+        rows = self._rows(lines)
+        numbers = _MISSING | {*BRANCHES}
+        headed = not all(_NUMBER.fullmatch(cell) or cell.lower() in numbers for cell in rows[0])
         header = rows[0] if headed else tuple(str(i + 1) for i in range(self._width))
         self.names = tuple(printable(cell, _MAX_NAME) for cell in header)
         self._first = rows[1:] if headed else rows
         if not self._first:
-            raise FormatError(f"{name} has a header, but no rows.", cure="Give a table with rows.")
+            cure = "Give a table with rows."
+            raise FormatError(f"{self._name} has a header, but no rows.", cure=cure)
         self.decimal = decimal or _find_decimal(self._first, self._delimiter)
-        spaces = self._delimiter == " "
-        marks = self.decimal.encode()[:1] + b"dD" + b"\t" * spaces
-        self._marks = bytes.maketrans(marks, b".EE" + b" " * spaces)
+        self._marks = bytes.maketrans(self.decimal.encode()[:1] + b"dD", b".EE")
 
     def columns(self, wanted: Mapping[str, Wanted]) -> dict[str, FloatArray]:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        indices = [self._index(item.column) for item in wanted.values()]
-        most, count = self._most_rows(), 0
-        values = [np.empty(most) for _ in wanted]
-        for part in self._parts(indices, wanted):
+        room, count = self._room(len(wanted)), 0
+        values = [np.empty(room) for _ in wanted]
+        for part in self._parts([*wanted.values()]):
+            if count + part[0].size > room:
+                cure = "Import it when it is complete."
+                raise FormatError(f"{self._name} grew while it was read.", cure=cure)
             for column, numbers in zip(values, part, strict=True):
                 column[count : count + numbers.size] = numbers
             count += part[0].size
@@ -103,33 +118,6 @@ class Table:
             name: to_si(values.pop(0)[:count], item.unit, item.dimension, self.where(item.column))
             for name, item in wanted.items()
         }
-
-    def _most_rows(self) -> int:
-        """Return how many rows there are at most; refuse a table of too many."""
-        ends = lines = 0
-        for piece in read_pieces(self._path, limit=MOST_TABLE_BYTES):
-            lines += piece.count(b"\n") or piece.count(b"\r")
-            ends += len(piece) - len(piece.translate(None, _ENDS))
-        if lines > MOST_ROWS:
-            cure = "Average neighbouring readings, or cut the table into several."
-            raise too_large(self._name, lines, MOST_ROWS, "lines", cure=cure)
-        return ends + 1
-
-    def _parts(
-        self, indices: list[int], wanted: Mapping[str, Wanted]
-    ) -> Iterator[list[FloatArray]]:
-        """Yield the columns of one block after another."""
-        yield self._numbers(self._first, indices, 0, wanted)
-        count = len(self._first)
-        for block in self._blocks:
-            numbers = self._plain_numbers(block, indices)
-            if numbers is None:
-                lines = [line for line in self._lines(block) if not _is_comment(line)]
-                rows = _split(self._name, lines, self._delimiter)
-                self._width = max(self._width, *map(len, rows), 0)
-                numbers = self._numbers(rows, indices, count, wanted)
-            yield numbers
-            count += numbers[0].size
 
     def unit_of(self, column_name: str | int, unit: str | None, option: str) -> str:
         """Return the unit of a column: the one given, or that of its head."""
@@ -161,6 +149,17 @@ class Table:
             )
         return number - 1
 
+    def _room(self, columns: int) -> int:
+        """Return for how many rows there must be room; refuse a table of too many."""
+        # A scan has up to three arrays more than columns, and its file must be read again.
+        most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
+        pieces = read_pieces(self._path, limit=MOST_TABLE_BYTES)
+        lines = sum(piece.count(b"\n") or piece.count(b"\r") for piece in pieces)
+        if lines > most:
+            cure = "Average neighbouring readings, or cut the table into several."
+            raise too_large(self._name, lines, most, f"lines of {columns} columns", cure=cure)
+        return 2 * lines + _SAMPLE  # some may have other ends; room that stays empty is no memory
+
     def _whole_lines(self) -> Iterator[bytes]:
         """Yield a few lines, then blocks of whole lines."""
         rest, size = b"", _FIRST
@@ -172,21 +171,22 @@ class Table:
                     yield rest[:end]
                     rest = rest[end:]
                 elif size == _BLOCK:
-                    cure = "Give a table with one row per reading."
-                    raise FormatError(f"{self._name} has lines of over {size:,} bytes.", cure=cure)
+                    raise too_large("A line", len(rest), _BLOCK, "bytes", cure="Give a table.")
                 size = _BLOCK
         if rest:
             yield rest
 
-    def _lines(self, block: bytes) -> list[str]:
-        """Return the lines that are not blank."""
-        if b"\0" in block:
-            raise FormatError(f"{self._name} is not a text file.", cure="Give a table as CSV.")
-        try:
-            text = block.decode("latin-1" if self._latin else "utf-8-sig")
-        except UnicodeDecodeError:
-            self._latin, text = True, block.decode("latin-1")
-        return [line for line in text.splitlines() if line.strip()]
+    def _parts(self, wanted: list[Wanted]) -> Iterator[list[FloatArray]]:
+        """Yield the columns of one block after another."""
+        indices = [self._index(item.column) for item in wanted]
+        yield self._numbers(self._first, indices, wanted, 0)
+        count = len(self._first)
+        for block in self._blocks:
+            if (numbers := self._plain_numbers(block, indices)) is None:
+                rows = self._rows([s for s in self._lines(block) if not _is_comment(s)])
+                numbers = self._numbers(rows, indices, wanted, count)
+            yield numbers
+            count += numbers[0].size
 
     def _plain_numbers(self, block: bytes, indices: list[int]) -> list[FloatArray] | None:
         """Return columns of a block of bare numbers in rows of one width; of others, nothing."""
@@ -200,34 +200,55 @@ class Table:
             block = block.replace(b" \n", b"\n").replace(b"\n ", b"\n").lstrip(b" ")
         delimiter = self._delimiter.encode()
         width, count = block.count(delimiter, 0, block.find(b"\n")) + 1, block.count(b"\n")
-        # Nothing but the ends of cells, as they follow each other in equal rows.
+        # The ends of the cells, as they follow each other in equal rows.
         ends = block.translate(None, _PLAIN.translate(None, delimiter + b"\n"))
         if max(indices) >= width or ends != (delimiter * (width - 1) + b"\n") * count:
             return None
         cells = block[:-1].replace(b"\n", delimiter).split(delimiter)
+        if b"" in cells:
+            if width == 1 or delimiter == b"\t":  # of a blank line, perhaps
+                return None
+            cells = [cell or b"nan" for cell in cells]
         self._width = max(self._width, width)
         try:
             return [np.fromiter(map(float, cells[i::width]), np.float64, count) for i in indices]
         except ValueError:
             return None
 
+    def _lines(self, block: bytes) -> list[str]:
+        """Return the lines that are not blank."""
+        if b"\0" in block:
+            raise FormatError(f"{self._name} is not a text file.", cure="Give a table as CSV.")
+        try:
+            text = block.decode("latin-1" if self._latin else "utf-8-sig")
+        except UnicodeDecodeError:
+            self._latin, text = True, block.decode("latin-1")
+        return [line for line in text.splitlines() if line.strip()]
+
+    def _rows(self, lines: list[str]) -> Rows:
+        rows = [line.split() for line in lines] if self._delimiter == " " else []
+        try:
+            rows = rows or [*csv.reader(lines, delimiter=self._delimiter, skipinitialspace=True)]
+        except (csv.Error, TypeError) as error:
+            raise FormatError(f"{self._name} cannot be cut into columns: {error}.") from error
+        self._width = max(self._width, *map(len, rows), 0)
+        if self._width > MOST_COLUMNS:
+            cure = "Leave out columns."
+            raise too_large(self._name, self._width, MOST_COLUMNS, "columns", cure=cure)
+        return [tuple(map(str.strip, row)) for row in rows]
+
     def _numbers(
-        self,
-        rows: list[tuple[str, ...]],
-        indices: list[int],
-        start: int,
-        wanted: Mapping[str, Wanted],
+        self, rows: Rows, indices: list[int], wanted: list[Wanted], start: int
     ) -> list[FloatArray]:
-        """Return columns of rows that were cut into cells; ``start`` rows stand before them."""
+        """Return columns of rows, before which ``start`` rows stand."""
         columns = []
-        for i, item in zip(indices, wanted.values(), strict=True):
+        for i, item in zip(indices, wanted, strict=True):
             cells = [row[i] if i < len(row) else "" for row in rows]
             try:
-                values = np.fromiter(map(float, cells), np.float64, len(cells))
+                numbers = [*map(float, cells)]
             except ValueError:
-                numbers = (self._number(cell, start + k, item) for k, cell in enumerate(cells))
-                values = np.fromiter(numbers, np.float64, len(cells))
-            columns.append(values)
+                numbers = [self._number(cell, start + k, item) for k, cell in enumerate(cells)]
+            columns.append(np.array(numbers, dtype=np.float64))
         return columns
 
     def _number(self, cell: str, k: int, item: Wanted) -> float:
@@ -244,14 +265,6 @@ class Table:
                 f"is not {' or '.join(['a number', *item.words])}.",
                 cure="Correct or remove this row, or state the decimal mark.",
             ) from error
-
-
-def read_table(
-    path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None
-) -> Table:
-    """Read the head of a delimited text file; ``#`` or ``%`` begin a comment."""
-    # The first line is the header where one of its cells is no number.
-    return Table(path, delimiter, decimal)
 
 
 def _is_comment(line: str) -> bool:
@@ -280,21 +293,7 @@ def _find_delimiter(lines: list[str]) -> str:
     return best
 
 
-def _split(name: str, lines: list[str], delimiter: str) -> list[tuple[str, ...]]:
-    rows = [line.split() for line in lines]
-    if delimiter != " ":
-        try:
-            rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True))
-        except (csv.Error, TypeError) as error:
-            raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
-    cut = [tuple(cell.strip() for cell in row) for row in rows]
-    if (width := max(map(len, cut), default=0)) > MOST_COLUMNS:
-        cure = "Leave out columns."
-        raise too_large(name, width, MOST_COLUMNS, "columns", cure=cure, error=FormatError)
-    return cut
-
-
-def _find_decimal(rows: list[tuple[str, ...]], delimiter: str) -> str:
+def _find_decimal(rows: Rows, delimiter: str) -> str:
     """A comma is the decimal mark only where cells hold one comma each and no point."""
     if delimiter == ",":
         return "."
@@ -304,7 +303,7 @@ def _find_decimal(rows: list[tuple[str, ...]], delimiter: str) -> str:
 
 def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
-    table = read_table(path)
+    table = Table(path)
     units = {1: r_unit, 2: z_unit}
     columns = table.columns({str(i): Wanted(i, unit, "length") for i, unit in units.items()})
     with placed(table.source.file_name):
