@@ -22,7 +22,7 @@ from memscal.calibration.uncertainty import InputEffect, Results, input_effects,
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError, MemscalError
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.points import loads_differ, scans_by_load
+from memscal.estimation.points import loads_differ, require_size, scans_by_load
 from memscal.estimation.reference import (
     at_load_of,
     film_of,
@@ -430,6 +430,7 @@ def prepare(
 ) -> Prepared:
     """Read and solve the references, and hold them against the scans; see :func:`calibrate`."""
     # ``law``: the film's, its ratio, and the friction of the rod, where they are asked for.
+    require_size(as_stated)
     as_stated = require_one_sensor(as_stated)
     references = _references(reference, as_stated, pixel_size)
     for scan, given in zip(as_stated, references, strict=True):

@@ -24,6 +24,7 @@ from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
 from memscal.model.scan import Places, Scan, places_of
+from memscal.model.sizes import MOST_OF_LINES, MOST_OF_RASTER, too_large
 
 #: Channels that measure the shear along x and along y.
 TANGENTIAL = ("xz", "yz")
@@ -449,6 +450,18 @@ def require_plausible(scan: Scan) -> None:
                 why=why,
                 cure=_cure({"radius": a, "span": span, "step": step, "width": width}, h),
             )
+
+
+def require_size(scans: Sequence[Scan]) -> None:
+    """Refuse more points than a calibration takes, before it does anything."""
+    raster = any(scan.planar for scan in scans)
+    size, most = sum(scan.u_zz.size for scan in scans), MOST_OF_RASTER if raster else MOST_OF_LINES
+    if size > most:
+        named = ", ".join(scan.source.file_name for scan in scans if scan.source) or "The scan"
+        of = f"points {'in a plane' if raster else 'on lines'}"
+        why = "Time and memory grow with their number."
+        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
+        raise too_large(named, size, most, of, why=why, cure=cure)
 
 
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:

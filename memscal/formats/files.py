@@ -9,8 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from memscal.errors import InputError, OutputError, UnsafeFileError
-
-MAX_FILE_BYTES = 256 * 2**20
+from memscal.model.sizes import MOST_FILE_BYTES, too_large
 
 _UNTOUCHED = "Nothing was written; what was there before is untouched."
 _CURES = {
@@ -137,8 +136,13 @@ def _output_error(target: Path, error: OSError) -> OutputError:
     return OutputError(problem, why=_UNTOUCHED, cure=cure)
 
 
-def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> bytes:
+def read_bytes(path: str | os.PathLike[str], *, limit: int = MOST_FILE_BYTES) -> bytes:
     """Read a regular file of bounded size, once, without ever waiting for another program."""
+    return b"".join(read_pieces(path, limit=limit))
+
+
+def read_pieces(path: str | os.PathLike[str], *, limit: int) -> Iterator[bytes]:
+    """Yield the same in pieces of up to 1 MiB; a file that grows meanwhile meets the limit, too."""
     shown = os.fspath(path)
     flags = os.O_RDONLY
     for name in ("O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY", "O_BINARY"):
@@ -155,30 +159,15 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> 
             why = "A folder, pipe or device could keep a program waiting for ever."
             cure = "Give the name of a file."
             raise UnsafeFileError(f"{shown} is not a regular file.", why=why, cure=cure)
-        if status.st_size > limit:
-            raise _too_large(shown, status.st_size, limit)
-        return _read_whole(descriptor, shown, limit)
-    finally:
-        os.close(descriptor)
-
-
-def _read_whole(descriptor: int, shown: str, limit: int) -> bytes:
-    """Read to the end; a file that grows meanwhile still meets the limit."""
-    chunks, size = [], 0
-    try:
-        while chunk := os.read(descriptor, min(2**20, limit + 1 - size)):
-            chunks.append(chunk)
-            size += len(chunk)
-            if size > limit:
-                raise _too_large(shown, size, limit)
+        size, total, piece = status.st_size, 0, b""
+        while max(size, total) <= limit:
+            yield piece
+            if not (piece := os.read(descriptor, 2**20)):
+                return
+            total += len(piece)
+        cure = "Check that it is the right file; leave out data that memscal does not need."
+        raise too_large(shown, max(size, total), limit, "bytes", cure=cure, error=UnsafeFileError)
     except OSError as error:
         raise InputError(f"{shown} cannot be read: {error.strerror}.") from error
-    return b"".join(chunks)
-
-
-def _too_large(shown: str, size: int, limit: int) -> UnsafeFileError:
-    return UnsafeFileError(
-        f"{shown} has {size:,} bytes, but at most {limit:,} are read.",
-        why="A scan or an apparatus function is far smaller.",
-        cure="Check that it is the right file; leave out data that memscal does not need.",
-    )
+    finally:
+        os.close(descriptor)

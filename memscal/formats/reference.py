@@ -19,13 +19,13 @@ from memscal.formats.units import to_si
 from memscal.formats.values import require_schema
 from memscal.model.arrays import require_positive
 from memscal.model.provenance import SourceFile
+from memscal.model.sizes import MOST_PIXELS, too_large
 from memscal.model.stress import IDEAL, IdealReference, StressField, StressProfile
 
 _NAMED = re.compile(rf"({'|'.join(IDEAL)})(?::(.*))?")
 _LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-zµμ]+)\s*")
 #: Files of pixels, which state no size of theirs; weights of red, green and blue in the luminance.
 _PIXELS = (".npy", ".png", ".tif", ".tiff")
-_MOST_PIXELS = 2**26
 _LUMINANCE = (0.299, 0.587, 0.114)
 
 
@@ -127,9 +127,9 @@ def _image(data: bytes) -> NDArray[Any]:
     from PIL import Image
 
     with Image.open(BytesIO(data), formats=("PNG", "TIFF")) as image:
-        if image.width * image.height > _MOST_PIXELS:
-            problem = f"The image has {image.width} x {image.height} pixels."
-            raise InputError(problem, cure="Cut out the field, or bin its pixels.")
+        if (side := max(image.size)) > MOST_PIXELS:
+            cure = "Cut out the field, or average neighbouring pixels."
+            raise too_large("The image", side, MOST_PIXELS, "pixels along a side", cure=cure)
         return np.asarray(image.convert("RGB") if image.mode == "P" else image)
 
 

@@ -118,6 +118,8 @@ def dimension_of(unit: str, where: str) -> str:
 
 def _scaled(numbers: FloatArray, power: int) -> FloatArray:
     """Multiply by a power of ten; dividing by 10^n rounds once, multiplying by 10^-n twice."""
+    if power == 0:
+        return numbers
     with np.errstate(over="ignore"):  # an absurd number becomes infinite, and is refused as such
         return np.asarray(numbers * 10.0**power if power >= 0 else numbers / 10.0**-power)
 

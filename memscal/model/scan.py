@@ -19,6 +19,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
+from memscal.model.sizes import MOST_CORRELATED, too_large
 from memscal.model.stress import StressProfile
 
 IntArray = NDArray[np.intp]
@@ -26,6 +27,9 @@ IntArray = NDArray[np.intp]
 #: Readings share a place where they are closer than this share of the distance that nine tenths
 #: of the readings of a pass keep from each other; a few may be read twice in one.
 _CLOSE, _TWICE = 0.1, 0.1
+#: Of many passes over a plane there are too many pairs of readings: positions are rounded to this
+#: share of what is close where there may be more pairs.
+_GRAIN, _MOST_PAIRS = 0.1, 20_000_000
 #: Distances below a nanometre are rounding.
 _ROUNDING = 1e-9
 #: Rows and columns make a raster if they cross at no more than this many nodes for each place.
@@ -68,10 +72,12 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
     """Group points by place: equal positions, and of several passes those close to each other."""
     # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
     # an even lattice share a place too.
-    positions = np.stack([x, y], axis=1)
-    close, pairs = _neighbours(positions, repeat)
-    index = _linked(positions, pairs)
+    close = _close(x, y, repeat)
     columns, rows = (_clusters(values, close) for values in (x, y))
+    # Along a line the neighbours of a place are those in order.
+    index = rows if np.ptp(y) else columns
+    if np.ptp(x) and np.ptp(y):
+        index = _linked(x, y, close, int(np.ptp(repeat)) + 1)
     steps = _typical_step(x, columns), _typical_step(y, rows)
     count = int(index.max()) + 1
     if 0.0 in steps or _nodes(columns, rows) <= _MOST_NODES * count:
@@ -118,34 +124,47 @@ def _even_axis(positions: FloatArray) -> EvenAxis | None:
     return None
 
 
-def _neighbours(positions: FloatArray, repeat: IntArray) -> tuple[float, IntArray]:
-    """Return which distance is close, and pairs of distinct positions that are."""
-    passes = np.unique(repeat)
-    if passes.size == 1:
-        return 0.0, np.zeros((0, 2), dtype=np.intp)
+def _close(x: FloatArray, y: FloatArray, repeat: IntArray) -> float:
+    """Return the distance within which readings of several passes share a place; 0 of one pass."""
+    order = np.argsort(repeat, kind="stable")
+    starts = np.flatnonzero(np.diff(repeat[order])) + 1
+    if not starts.size:
+        return 0.0
+    usual = []
+    for chosen in np.split(order, starts):
+        # Without an index unique() hashes, which is slower.
+        places = np.unique(x[chosen] + 1j * y[chosen], return_index=True)[0]
+        if places.size > 1:
+            usual.append(float(np.quantile(_nearest(places), _TWICE, method="lower")))
+    return max(_CLOSE * min(usual, default=0.0), _ROUNDING)
+
+
+def _nearest(places: NDArray[np.complex128]) -> FloatArray:
+    """Return the distance of each of several distinct positions x + iy to its nearest one."""
+    if not np.ptp(places.imag) or not np.ptp(places.real):
+        gaps = np.concatenate([[np.inf], np.abs(np.diff(places)), [np.inf]])
+        return np.asarray(np.minimum(gaps[:-1], gaps[1:]))
     from scipy.spatial import KDTree
 
-    usual = []
-    for number in passes:
-        places = np.unique(positions[repeat == number], axis=0)
-        if len(places) > 1:
-            distances = KDTree(places).query(places, k=[2])[0]
-            usual.append(float(np.quantile(distances, _TWICE, method="lower")))
-    close = max(_CLOSE * min(usual, default=0.0), _ROUNDING)
-    pairs = KDTree(np.unique(positions, axis=0)).query_pairs(close, output_type="ndarray")
-    return close, np.asarray(pairs, dtype=np.intp)
+    plane = places.view(np.float64).reshape(-1, 2)
+    return np.asarray(KDTree(plane).query(plane, k=[2])[0])[:, 0]
 
 
-def _linked(positions: FloatArray, pairs: IntArray) -> IntArray:
-    """Number the groups of equal or paired positions; pairs index the distinct positions."""
-    distinct, index = np.unique(positions, axis=0, return_inverse=True)
-    index = index.reshape(-1)  # NumPy 2.0 kept an axis here
-    if not len(pairs):
-        return np.asarray(index)
+def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IntArray:
+    """Number the groups of positions in a plane that are equal or, through others, close."""
+    places, index = np.unique(x + 1j * y, return_inverse=True)
+    if not close:
+        return index
+    if places.size * passes > _MOST_PAIRS:
+        rounded = np.rint(places / (close * _GRAIN)) * (close * _GRAIN)
+        places, coarse = np.unique(rounded, return_inverse=True)
+        index = coarse[index]
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
 
-    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(distinct), len(distinct)))
+    pairs = KDTree(places.view(np.float64).reshape(-1, 2)).query_pairs(close, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(places.size, places.size))
     return np.asarray(connected_components(links, directed=False)[1][index], dtype=np.intp)
 
 
@@ -208,11 +227,11 @@ def require_rod_friction(friction: float | None) -> None:
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
-    values = np.asarray(stated)
+    values = numbers = np.asarray(stated)
     named = {"": 0, **BRANCHES}
-    numbers = np.array(
-        [named.get(v.strip().lower(), -1) if isinstance(v, str) else v for v in values.flat]
-    ).reshape(values.shape)
+    if values.dtype.kind not in "biuf":
+        words = [named.get(v.strip().lower(), -1) if isinstance(v, str) else v for v in values.flat]
+        numbers = np.array(words).reshape(values.shape)
     known = np.isin(numbers, list(named.values()))
     if not known.all():
         problem = f"{name} holds {values[~known][0]}, which names no branch."
@@ -224,6 +243,10 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
 
 def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
     """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
+    if size > MOST_CORRELATED:
+        why = "The cube of their number is worked with."
+        cure = "Average neighbouring readings, or leave it out: their noise is then estimated."
+        raise too_large("u_zz_correlation", size, MOST_CORRELATED, "points", why=why, cure=cure)
     correlation = arrays.frozen_array(stated)
     if correlation.shape != (size, size) or not np.isfinite(correlation).all():
         raise InputError(

@@ -14,6 +14,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
+from memscal.model.sizes import MOST_PIXELS
 
 #: Ideal references with what their size is.
 IDEAL = {"disc": "radius", "slit": "width", "gaussian": "standard deviation", "point": ""}
@@ -98,7 +99,7 @@ class IdealReference:
 
 #: Sides of a field in pixels, what may be left at its border, how even its axes are, and the
 #: least share of its sum in that of its moduli.
-_FEWEST, _MOST, _BORDER, _EVEN, _LEAST = 8, 2048, 0.05, 1e-3, 1e-3
+_FEWEST, _BORDER, _EVEN, _LEAST = 8, 0.05, 1e-3, 1e-3
 #: Rings of a field, to a pixel, in which its mean is summed up; directions over half a turn.
 _RINGS, _WAYS = 16, 8
 
@@ -150,10 +151,10 @@ class StressField:
             object.__setattr__(self, name, axis)
             arrays.require_increasing(f"{name} of the field", axis)
             steps = np.diff(axis)
-            if not _FEWEST <= axis.size <= _MOST or np.ptp(steps) > _EVEN * steps.mean():
+            if not _FEWEST <= axis.size <= MOST_PIXELS or np.ptp(steps) > _EVEN * steps.mean():
                 problem = f"{name} of the field has {axis.size} values, or uneven ones"
                 cure = "Cut out what is not zero, and interpolate it to even pixels."
-                raise InputError(f"{problem}: not {_FEWEST} to {_MOST} even ones.", cure=cure)
+                raise InputError(f"{problem}: not {_FEWEST} to {MOST_PIXELS} even ones.", cure=cure)
         if (shape := np.shape(self.values)) != (expected := (self.y.size, self.x.size)):
             raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
         values = arrays.finite_vector("The field", np.ravel(self.values)).reshape(expected)

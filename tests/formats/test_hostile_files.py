@@ -184,10 +184,13 @@ def test_a_group_in_the_place_of_a_dataset_is_refused(edited: Edit):
 def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
     edited: Edit, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(hdf5_reader, "_MAX_TOTAL_BYTES", 1500)
+    monkeypatch.setattr(hdf5_reader, "MOST_HDF5_BYTES", 2**17)
 
     def make(group: h5py.Group) -> None:
-        group["u_zz"] = group["u_xz"]
+        group.create_dataset("u_zz", data=np.zeros(2**13), compression="gzip")  # 64 KiB
+        group["u_zz"].attrs["units"] = "mV"
+        del group["u_xz"]
+        group["u_xz"] = group["u_zz"]
         group["u_yz"] = group["u_xz"]
 
     with pytest.raises(UnsafeFileError, match="over the limit"):
@@ -298,8 +301,8 @@ def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path: Path)
 def test_a_file_over_the_size_limit_is_refused_unread(tmp_path: Path):
     path = tmp_path / "large.h5"
     with path.open("wb") as file:
-        file.truncate(2**28 + 1)  # sparse: it takes no room on the disk
-    with pytest.raises(UnsafeFileError, match="268,435,457 bytes"):
+        file.truncate(2**30 + 1)  # sparse: it takes no room on the disk
+    with pytest.raises(UnsafeFileError, match="1,073,741,825 bytes"):
         read_scan(path)
 
 

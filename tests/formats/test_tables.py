@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from memscal.errors import FormatError, InputError
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, read_scan_table
-from memscal.formats.tables.text_table import read_table
+from memscal.formats.tables.text_table import Table
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod
 
@@ -175,7 +175,7 @@ def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, decimal):
     found = scan_table(tmp_path, text)
     assert found.scan.x.tolist() == [0.5e-3, 1.5e-3]
     assert found.scan.u_zz.tolist() == [1.25e-3, 2.5e-3]
-    assert read_table(tmp_path / "table.csv").decimal == decimal
+    assert Table(tmp_path / "table.csv").decimal == decimal
 
 
 def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):

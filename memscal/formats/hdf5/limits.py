@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 
 from memscal.errors import UnsafeFileError
+from memscal.model.sizes import MOST_ARRAY_BYTES
 
 _DESCRIPTOR, _OBJECT = 16, 16  # _OBJECT: header of an object in a global heap
 _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
@@ -127,7 +128,7 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
             position += prefix + length
 
 
-MAX_DATASET_BYTES, MAX_TEXT_BYTES = 128 * 2**20, 4 * 2**20
+MAX_TEXT_BYTES = 4 * 2**20
 _MAX_RANK, _MAX_NUMBER_BYTES = 4, 16
 _MAX_CHUNKS, _MIN_CHUNK_LIMIT = 2**16, 2**20
 _UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
@@ -167,7 +168,7 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> None:
     if len(shape) > (0 if text else _MAX_RANK):
         expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
         raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
-    limit = MAX_TEXT_BYTES if text else MAX_DATASET_BYTES
+    limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
     if claimed_bytes(dataset) > limit:
         why = f"More than {limit:,} bytes are not read, however small the file is."
         raise refuse(where, f"claims {claimed_bytes(dataset):,} bytes", why)
@@ -203,7 +204,7 @@ def _check_filters(where: str, plist: Any) -> None:
 def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
     chunk = plist.get_chunk()
     size = int(math.prod(chunk)) * int(dataset.get_type().get_size())
-    if size > max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset)) or size > MAX_DATASET_BYTES:
+    if size > max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset)) or size > MOST_ARRAY_BYTES:
         problem = f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data"
         raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
     number = math.prod(-(-n // c) for n, c in zip(dataset.shape, chunk, strict=True))

@@ -23,6 +23,7 @@ from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
+from memscal.model.sizes import MOST_HDF5_BYTES
 
 
 @contextlib.contextmanager
@@ -44,7 +45,6 @@ def damage_named(
         raise FormatError(f"{problem}.", why=f"{why} ({reason}).", cure=cure) from error
 
 
-_MAX_TOTAL_BYTES = 512 * 2**20
 _MAX_ATTRIBUTE_BYTES, _MAX_ATTRIBUTE_ITEMS = 2**16, 64
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -52,7 +52,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 @contextlib.contextmanager
 def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     """Open an HDF5 file safely, for the time of a ``with`` block."""
-    data = read_bytes(path)
+    data = read_bytes(path, limit=MOST_HDF5_BYTES)
     name = os.path.basename(os.fspath(path))
     if not data.startswith(_SIGNATURE):
         why = "It does not begin with HDF5's signature."
@@ -61,10 +61,11 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
+        opened = SafeFile(file, name, source, data)
     try:
         # The dataclasses check values without knowing where they come from.
         with placed(name):
-            yield SafeFile(file, name, source, data)
+            yield opened
     finally:
         with contextlib.suppress(Exception):
             file.close()
@@ -78,7 +79,7 @@ class SafeFile:
         self.source = source
         self._data = data
         self._opened: dict[str, Any] = {"/": file["/"].id}
-        self._budget = _MAX_TOTAL_BYTES
+        self._budget = MOST_HDF5_BYTES
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
         self._listed: frozenset[str] | None = None
@@ -171,7 +172,7 @@ class SafeFile:
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size
         if self._budget < 0:
-            why = f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file."
+            why = f"At most {MOST_HDF5_BYTES:,} bytes are read from one file."
             raise refuse(self.where(path), "brings the data of this file over the limit", why)
 
     def _check_length(self, path: str, length: int) -> None:

@@ -145,7 +145,7 @@ def _attributes(node: Node) -> dict[str, Any]:
     return {"units": node.units, **node.attributes} if isinstance(node, Number) else {}
 
 
-def _canonical(value: Any) -> tuple[str, list[int], bytes]:
+def _canonical(value: Any) -> tuple[str, list[int], bytes | memoryview]:
     if value is None or isinstance(value, Group):
         return "group", [], b""
     if isinstance(value, str):
@@ -153,7 +153,7 @@ def _canonical(value: Any) -> tuple[str, list[int], bytes]:
     value = value.values if isinstance(value, Number) else value
     kind = "integer" if value.dtype.kind in "iu" else "float"
     stored = np.ascontiguousarray(value, dtype="<i8" if kind == "integer" else "<f8")
-    return kind, list(value.shape), stored.tobytes()
+    return kind, list(value.shape), stored.reshape(-1).data
 
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")

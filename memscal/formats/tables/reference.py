@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.tables.text_table import read_table
+from memscal.formats.tables.text_table import Table, Wanted
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
@@ -180,11 +180,14 @@ def read_reference_table(
     # the shear is S13 with axis 3 from the base to the surface.
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
-    table = read_table(path, delimiter=delimiter, decimal=decimal)
-    columns = {"r": table.quantity(r, r_unit, "length")}
-    columns["sigma_zz"] = sign * table.quantity(sigma, sigma_unit, "stress")
+    table = Table(path, delimiter=delimiter, decimal=decimal)
+    wanted = {"r": Wanted(r, r_unit, "length"), "sigma_zz": Wanted(sigma, sigma_unit, "stress")}
     if shear is not None:
-        columns["sigma_rz"] = shear_sign * table.quantity(shear, sigma_unit, "stress")
+        wanted["sigma_rz"] = Wanted(shear, sigma_unit, "stress")
+    columns = table.columns(wanted)
+    columns["sigma_zz"] = sign * columns["sigma_zz"]
+    if shear is not None:
+        columns["sigma_rz"] = shear_sign * columns["sigma_rz"]
     samples = Samples(
         columns=columns,
         source=table.source,

@@ -1,23 +1,24 @@
 """Scans from tables with one row per reading."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.formats.tables.reference import require_sign
-from memscal.formats.tables.text_table import Table, read_table
+from memscal.formats.tables.text_table import Table, Wanted
 from memscal.formats.units import reading_of
-from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.quantities import dimension_in
 from memscal.model.scan import BRANCHES, Scan, branch_numbers, places_of
 
 Column = str | int
+Columns = dict[str, NDArray[Any]]
 
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
 #: so large a share of them was probably repeated.
@@ -61,20 +62,35 @@ def read_scan_table(
     # by default they are those of the columns' heads (x/mm). load_scatter, relative, and x_error,
     # in m, are independent from point to point.
     require_sign("sign of the voltage", u_sign)
-    table = read_table(path, delimiter=delimiter, decimal=decimal)
-    notes = [*table.notes]
-    channels = {n: c for n, c in (("u_zz", u), ("u_xz", u_xz), ("u_yz", u_yz)) if c is not None}
+    table = Table(path, delimiter=delimiter, decimal=decimal)
     u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
     x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
     reading = reading_of(u_unit, table.where(u))
     of_unit = dimension_in("voltage", reading)
-    columns = {n: table.quantity(c, u_unit, of_unit) for n, c in channels.items()}
-    columns["u_zz"] = u_sign * columns["u_zz"]
-    notes += ["The sign of u_zz was changed."] if u_sign < 0 else []
+    of_quantities = {
+        "u_zz": (u, u_unit, of_unit),
+        "u_xz": (u_xz, u_unit, of_unit),
+        "u_yz": (u_yz, u_unit, of_unit),
+        "normal_load": (load_column, load_unit, "force"),
+        "x": (x, x_unit, "length"),
+        "y": (y, x_unit, "length"),
+    }
+    wanted = {
+        name: Wanted(column, unit, dimension)
+        for name, (column, unit, dimension) in of_quantities.items()
+        if column is not None
+    }
+    numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
+    wanted |= {f"repeat {i}": Wanted(c, words=BRANCHES) for i, c in enumerate(numbering)}
+    if branch is not None:
+        wanted["branch"] = Wanted(branch, words=BRANCHES)
+    columns: Columns = table.columns(wanted)
+    notes = [*table.notes]
+    if u_sign < 0:
+        columns["u_zz"] *= -1
+        notes.append("The sign of u_zz was changed.")
     if reading.si != "V":
         notes.append(f"The readings are in {u_unit}.")
-    if load_column is not None:
-        columns["normal_load"] = table.quantity(load_column, load_unit, "force")
     if load is None and "normal_load" in columns:
         load = float(np.nanmedian(columns["normal_load"]))
         notes.append(f"The nominal load is the median of the column: {load:g} N.")
@@ -83,32 +99,28 @@ def read_scan_table(
             problem = "The scatter of the loads is given, but no load."
             raise InputError(problem, cure="Give the load in N, or its column.")
         columns["normal_load"] = np.full(columns["u_zz"].shape, load)
-    columns["x"] = table.quantity(x, x_unit, "length")
-    if y is not None:
-        columns["y"] = table.quantity(y, x_unit, "length")
-    if repeat is not None:
-        columns["repeat"] = _lines(table, repeat, notes)
+    if numbering:
+        columns["repeat"] = _lines(columns, numbering, notes)
     if branch is not None:
-        numbers = np.nan_to_num(table.column(branch, BRANCHES))
-        columns["branch"] = branch_numbers(table.where(branch), numbers).astype(np.float64)
+        columns["branch"] = branch_numbers(table.where(branch), np.nan_to_num(columns["branch"]))
     columns = _placed(columns, notes)
     notes += _counted(columns)
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
         indenter = stated.get("indenter")
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), indenter)
-    arrays = _as_rows(columns)
-    loads = arrays.get("normal_load")
+    columns = _as_rows(columns)
+    loads = columns.get("normal_load")
     scan = Scan(
-        x=arrays["x"],
-        y=arrays.get("y"),
-        repeat=None if "repeat" not in arrays else arrays["repeat"].astype(np.int64),
-        branch=None if branch is None else arrays["branch"].astype(np.int64),
-        x_errors=None if x_error is None else np.full(arrays["x"].size, x_error),
-        u_zz=arrays["u_zz"],
+        x=columns["x"],
+        y=columns.get("y"),
+        repeat=columns.get("repeat"),
+        branch=columns.get("branch"),
+        x_errors=None if x_error is None else np.full(columns["x"].size, x_error),
+        u_zz=columns["u_zz"],
         normal_load=loads,
         normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
-        channels={name: arrays[name] for name in ("u_xz", "u_yz") if name in arrays},
+        channels={name: columns[name] for name in ("u_xz", "u_yz") if name in columns},
         load=load,
         unit=reading.si,
         notes="\n".join(marked_texts(messages)),
@@ -118,38 +130,41 @@ def read_scan_table(
     return ImportedScan(scan, tuple(messages))
 
 
-def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) -> FloatArray:
+def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> NDArray[Any]:
     """Number the line of each row: by one column, or by the combinations of several."""
-    columns = [repeat] if isinstance(repeat, str | int) else list(repeat)
-    values = np.stack([table.column(column, BRANCHES) for column in columns])
-    if len(columns) == 1:
-        return np.asarray(values[0])
-    finite = np.isfinite(values).all(axis=0)
-    combinations, number = np.unique(values[:, finite], axis=1, return_inverse=True)
+    values = [columns.pop(f"repeat {i}") for i in range(len(numbering))]
+    if len(values) == 1:
+        return values[0]
+    finite = np.logical_and.reduce([np.isfinite(column) for column in values])
+    number = np.zeros(int(finite.sum()), dtype=np.intp)
+    for column in values:
+        distinct, index = np.unique(column[finite], return_inverse=True)
+        number = np.unique(number * distinct.size + index, return_inverse=True)[1]
     lines = np.full(finite.size, np.nan)
-    lines[finite] = 1 + number.reshape(-1)  # NumPy 2.0 kept an axis here
-    names = " and ".join(repr(column) for column in columns)
-    notes.append(f"{combinations.shape[1]} lines: one for each combination of the columns {names}.")
+    lines[finite] = 1 + number
+    names = " and ".join(repr(column) for column in numbering)
+    combinations = int(number.max(initial=-1)) + 1
+    notes.append(f"{combinations} lines: one for each combination of the columns {names}.")
     return lines
 
 
-def _placed(columns: Mapping[str, FloatArray], notes: list[str]) -> dict[str, FloatArray]:
+def _placed(columns: Columns, notes: list[str]) -> Columns:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
     stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
-    finite = np.isfinite(stated).all(axis=0)
+    finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
     if not finite.all():
         notes.append(f"{int((~finite).sum())} rows without a position were left out.")
-    kept = {name: values[finite] for name, values in columns.items()}
-    if "repeat" in kept:
-        kept["repeat"] = np.unique(kept["repeat"], return_inverse=True)[1].astype(np.float64)
-    return kept
+        columns = {name: values[finite] for name, values in columns.items()}
+    if "repeat" in columns:
+        columns["repeat"] = np.unique(columns["repeat"], return_inverse=True)[1]
+    return columns
 
 
-def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
+def _counted(columns: Columns) -> list[str]:
     x, y = columns["x"], columns.get("y", np.zeros(columns["x"].size))
-    repeat = columns.get("repeat", np.zeros(x.size)).astype(np.intp)
+    repeat = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
     places = places_of(x, y, repeat)
     number = int(repeat.max()) + 1
     in_repeats = f" in {number} repeats" if number > 1 else ""
@@ -185,29 +200,34 @@ def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
     return notes
 
 
-def _as_rows(columns: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
+def _as_rows(columns: Columns) -> Columns:
     """Make rows of repeats over exactly the same positions; leave all other columns as they are."""
     if "repeat" not in columns or "y" in columns:
         return columns
-    number = int(columns["repeat"].max()) + 1
+    readings = np.bincount(columns["repeat"])
+    if np.any(readings != readings[0]):
+        return columns
     order = np.lexsort((columns["x"], columns["repeat"]))
-    if number > 1 and order.size % number:
+    x = columns["x"][order].reshape(readings.size, -1)
+    if np.any(np.diff(x[0]) == 0) or np.any(x != x[0]):
         return columns
-    rows = {name: values[order].reshape(number, -1) for name, values in columns.items()}
-    x = rows.pop("x")
-    if np.any(np.diff(x[0]) == 0) or np.any(x != x[0]) or np.any(np.diff(rows.pop("repeat"))):
-        return columns
-    return {"x": x[0], **rows}
+    # A column goes as its rows come: of ten million readings not all are held twice.
+    names = [name for name in columns if name not in ("x", "repeat")]
+    return {"x": x[0], **{name: columns.pop(name)[order].reshape(x.shape) for name in names}}
 
 
 def _mixed_loads(
-    loads: FloatArray, repeat: FloatArray | None, indenter: RoundIndenter | None
+    loads: NDArray[Any], repeat: NDArray[Any] | None, indenter: RoundIndenter | None
 ) -> list[Message]:
     """Warn of lines at several loads: only a rod's voltage is proportional to its load."""
-    line = np.zeros(loads.size) if repeat is None else repeat
-    of_lines = [loads[(line == i) & np.isfinite(loads)] for i in np.unique(line)]
-    mixed = [v for v in of_lines if v.size and np.ptp(v) > _MIXED * np.median(v)]
-    if indenter is None or isinstance(indenter, Rod) or not mixed:
+    if indenter is None or isinstance(indenter, Rod):
+        return []
+    line = np.zeros(loads.size, dtype=np.intp) if repeat is None else repeat
+    order = np.argsort(line, kind="stable")
+    of_lines = np.split(loads[order], np.flatnonzero(np.diff(line[order])) + 1)
+    stated = [v[np.isfinite(v)] for v in of_lines]
+    mixed = [v for v in stated if v.size and np.ptp(v) > _MIXED * np.median(v)]
+    if not mixed:
         return []
     text = (
         f"The loads of a line go from {mixed[0].min():.4g} to {mixed[0].max():.4g} N, "

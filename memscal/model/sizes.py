@@ -1,0 +1,22 @@
+"""Sizes up to which memscal works, checked before any work; docs/files.md states them."""
+
+from memscal.errors import InputError
+
+#: Points that a calibration takes: of lines, of a raster, and with a stated correlation of noise,
+#: of which the cube of their number is worked with.
+MOST_OF_LINES, MOST_OF_RASTER, MOST_CORRELATED = 2_000_000, 1_000_000, 4_000
+#: Rows and columns of a table, and pixels along a side of a reference that is a field.
+MOST_ROWS, MOST_COLUMNS, MOST_PIXELS = 20_000_000, 1_000, 2_048
+#: Bytes of a table, of an HDF5 file and of all that is read from one, of one array in it, and of
+#: any other file (a mesh, an image).
+MOST_TABLE_BYTES, MOST_HDF5_BYTES, MOST_ARRAY_BYTES, MOST_FILE_BYTES = (
+    2**32, 2**30, 8 * MOST_ROWS, 2**28
+)  # fmt: skip
+
+
+def too_large(
+    what: str, size: int, most: int, of: str, *, cure: str, why: str = "",
+    error: type[InputError] = InputError,
+) -> InputError:  # fmt: skip
+    """Return the error for what exceeds a size: it states the size, the limit and what to do."""
+    return error(f"{what} has {size:,} {of}, but at most {most:,} are taken.", why=why, cure=cure)

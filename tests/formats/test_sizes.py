@@ -1,0 +1,161 @@
+"""Large tables and scans: read in blocks with the same result, or refused before any work."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.builders import make_film
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+import memscal
+from memscal.calibration import calibrate as calibration
+from memscal.errors import FormatError, InputError
+from memscal.estimation import points
+from memscal.formats.tables import text_table
+from memscal.formats.tables.scan import read_scan_table
+from memscal.formats.tables.text_table import Table, Wanted
+from memscal.model import scan as scan_module
+from memscal.model.scan import BRANCHES, places_of
+
+COLUMNS = {"x": Wanted("x", "mm", "length"), "u": Wanted("u"), "n": Wanted("n", words=BRANCHES)}
+
+
+def content(path: Path, names: str, decimal: str, delimiter: str) -> Any:
+    """Columns and notes of a table, or the words of its error."""
+    try:
+        table = Table(path, decimal=decimal, delimiter=delimiter)
+        columns = table.columns({name: COLUMNS[name] for name in names})
+        return {name: values.tolist() for name, values in columns.items()}, table.notes
+    except InputError as error:
+        return str(error)
+
+
+CELLS = st.one_of(
+    st.floats(-1e6, 1e6).map(repr),
+    st.integers(-99, 99).map(str),
+    st.sampled_from(["", "nan", "-", "1D-3", "2e5", " 7", "7 ", "+.5", "3.", "inf", "1_0", "é"]),
+    st.sampled_from(['"5"', '"a"', "approach", "word", "#", "1 2", "0x1", "1,5", "1.5.5"]),
+)
+PLAIN = st.integers(-9999, 9999).map(lambda number: f"{number / 64}")
+ROWS = st.one_of(
+    *(st.lists(cells, min_size=3, max_size=3) for cells in (PLAIN, PLAIN, PLAIN, CELLS)),
+    st.lists(PLAIN, min_size=2, max_size=5),
+    st.sampled_from([[], ["# 1", "2", "3"], [" ", "", ""], ["% 1"]]),
+)
+
+
+@settings(max_examples=200)
+@given(
+    table=st.lists(ROWS, max_size=30), delimiter=st.sampled_from(";,\t| "),
+    decimal=st.sampled_from(".,"), end=st.sampled_from(["\n", "\r\n", "\r"]),
+    encoding=st.sampled_from(["utf-8", "latin-1"]), names=st.sampled_from(["xun", "u"]),
+)  # fmt: skip
+def test_blocks_give_what_the_whole_table_gives(
+    tmp_path_factory: pytest.TempPathFactory, table, delimiter, decimal, end, encoding, names
+):
+    """In small blocks, of which those of plain numbers take another way, and in one."""
+    regular = [["0.5", "1", "2"]] * 40
+    lines = [delimiter.join(row).replace(".", decimal) for row in regular + table + regular * 3]
+    text = end.join([delimiter.join("xun"), *lines])
+    path = tmp_path_factory.mktemp("t") / "table.csv"
+    path.write_bytes(text.encode(encoding, "replace"))
+    whole = content(path, names, decimal, delimiter)
+    for block in (256, 512):
+        with pytest.MonkeyPatch.context() as patch:
+            for name, value in (("_FIRST", 64), ("_SAMPLE", 3), ("_BLOCK", block)):
+                patch.setattr(text_table, name, value)
+            found = content(path, names, decimal, delimiter)
+        if isinstance(whole, str):
+            # Of several wrong cells that of the first block is named.
+            assert found == whole or "data row" in found
+        else:
+            np.testing.assert_equal(found, whole)
+
+
+def big_table(path: Path, rows: int, wrong: int = -1) -> Path:
+    x = np.linspace(-8.0, 8.0, rows)
+    lines = [f"{place:.6f},{np.exp(-place * place):.6f}" for place in x.tolist()]
+    if wrong >= 0:
+        lines[wrong] = "1.0,overload"
+    path.write_text("\n".join(["x/mm,u/mV", *lines]))
+    return path
+
+
+def test_a_wrong_cell_far_down_is_named_by_its_row(tmp_path: Path):
+    table = big_table(tmp_path / "t.csv", 60_000, wrong=54_320)
+    with pytest.raises(FormatError, match="column 'u', data row 54321: 'overload' is not a number"):
+        read_scan_table(table, x="x", u="u")
+
+
+IMPORT = """
+import resource, sys
+from memscal.formats.scan import write_scan
+from memscal.formats.tables.scan import read_scan_table
+found = read_scan_table(sys.argv[1], x="x", u="u").scan
+write_scan(found, sys.argv[1] + ".h5")
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def test_a_million_rows_take_little_memory(tmp_path: Path):
+    """Ten arrays of eight million bytes: text and cells are never held as a whole."""
+    pytest.importorskip("resource")
+
+    def kilobytes(rows: int) -> int:
+        table = big_table(tmp_path / f"{rows}.csv", rows)
+        command = [sys.executable, "-c", IMPORT, str(table)]
+        peak = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        return int(peak) // (1024 if sys.platform == "darwin" else 1)
+
+    assert kilobytes(1_000_000) - kilobytes(100) < 100_000
+
+
+@pytest.mark.parametrize("pairs", [0, 20_000_000], ids=["rounded", "by pairs"])
+def test_places_along_a_line_are_those_along_the_same_line_in_the_plane(monkeypatch, pairs):
+    monkeypatch.setattr(scan_module, "_MOST_PAIRS", pairs)
+    rng = np.random.default_rng(0)
+    passes = np.repeat(np.arange(30), 40)
+    along = np.tile(np.arange(40) * 1e-4, 30) + rng.normal(0, 1e-6, passes.size)
+    shuffled = rng.permutation(passes.size)
+    along, passes = along[shuffled], passes[shuffled]
+    line = places_of(along, np.zeros_like(along), passes)
+    plane = places_of(0.6 * along, 0.8 * along, passes)
+    assert line.count == 40
+    np.testing.assert_array_equal(line.index, plane.index)
+
+
+def test_what_is_too_large_is_refused_with_size_limit_and_cure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(text_table, "MOST_ROWS", 100)
+    with pytest.raises(InputError, match=r"has 120 lines of 2 columns, but at most 100(.|\n)*Aver"):
+        read_scan_table(big_table(tmp_path / "t.csv", 120), x="x", u="u")
+    Image.new("L", (2049, 9)).save(tmp_path / "field.png")
+    with pytest.raises(InputError, match=r"2,049 pixels along a side, but at most 2,048"):
+        memscal.read_reference(tmp_path / "field.png", pixel_size=1e-6)
+    correlation = np.broadcast_to(0.0, (4001, 4001))
+    with pytest.raises(InputError, match=r"4,001 points, but at most 4,000(.|\n)*Average"):
+        replace(memscal.simulate(points=4001), u_zz_correlation=correlation)
+
+
+@pytest.mark.parametrize(("limit", "words"), [
+    ("MOST_OF_LINES", "130 points on lines, but at most 129"),
+    ("MOST_OF_RASTER", "1,089 points in a plane, but at most 129"),
+])  # fmt: skip
+def test_a_calibration_of_too_many_points_does_nothing(monkeypatch, limit, words):
+    scans: Any = [memscal.simulate(points=65, seed=seed) for seed in (1, 2)]
+    if limit == "MOST_OF_RASTER":
+        axis = np.linspace(-4e-3, 4e-3, 33)
+        film, rod = make_film(), memscal.Rod(radius=0.25e-3)
+        u = np.exp(-np.add.outer(axis**2, axis**2) / 1e-6)
+        scans = memscal.Scan(x=axis, y=axis, u_zz=u, load=1.0, film=film, indenter=rod)
+    monkeypatch.setattr(points, limit, 129)
+    monkeypatch.setattr(calibration, "reference_profile", lambda *_: pytest.fail("it went on"))
+    with pytest.raises(InputError, match=rf"{words}(.|\n)*Average neighbouring readings"):
+        memscal.calibrate(scans)
