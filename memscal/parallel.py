@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from contextlib import contextmanager
 from functools import cache
+from itertools import islice
 from numbers import Integral
+from threading import Lock, Thread, get_ident
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from memscal.errors import InputError
+from memscal.errors import InputError, MemscalError
 
 if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures import Executor, Future, ProcessPoolExecutor
+    from multiprocessing.connection import Connection
+    from multiprocessing.context import SpawnContext
 
     from threadpoolctl import ThreadpoolController
 
@@ -60,8 +66,14 @@ def single_threaded() -> Iterator[None]:
             yield
 
 
-#: Windows refuses more.
-_MOST_WORKERS = 61
+#: Windows refuses more than 61.
+_MOST_WORKERS = 61 if sys.platform == "win32" else 512
+
+
+def cores() -> int:
+    """Return how many cores this process may use, of which a machine can have more."""
+    available = getattr(os, "sched_getaffinity", None)
+    return min(len(available(0)) if available else os.cpu_count() or 1, _MOST_WORKERS)
 
 
 def require_workers(workers: Any) -> None:
@@ -76,30 +88,170 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes, started afresh: one forked from one with threads may hang."""
     # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
 
     unset = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
     _SET_BY_POOL.update(unset)
+    context, script = _fresh_interpreters()
+    theirs, ours = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(
+        workers, mp_context=context, initializer=_begin_worker, initargs=(theirs, script)
+    )
     try:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with workers_that_last():
             yield pool
+            pool.shutdown()
     finally:
+        ours.close()  # ends the workers at once, where their work is not wanted any more
+        pool.shutdown(cancel_futures=True)
+        theirs.close()
         _SET_BY_POOL.difference_update(unset)
         for name in unset:
             os.environ.pop(name, None)
 
 
-#: Items that a process takes at a time.
+_OF_SCRIPT = ("init_main_from_name", "init_main_from_path")
+_STARTING = Lock()
+
+
+def _fresh_interpreters() -> tuple[SpawnContext, dict[str, Any]]:
+    """Return a context of processes that do not run this one's script, and where the script is."""
+    from multiprocessing import spawn
+    from multiprocessing.context import SpawnContext
+
+    context: Any = SpawnContext()
+    context.Process, data = _process, spawn.get_preparation_data("")
+    return context, {key: data[key] for key in _OF_SCRIPT if key in data}
+
+
+def _process(*args: Any, **kwargs: Any) -> Any:
+    from multiprocessing.context import SpawnProcess
+
+    process: Any = SpawnProcess(*args, **kwargs)
+    process._Popen = _start_without_script
+    return process
+
+
+def _start_without_script(process: Any) -> Any:
+    """Start a process that does not import the script, which needs no guard therefore."""
+    # A script without ``if __name__ == "__main__":`` would start processes of its own, and fail.
+    from multiprocessing import spawn
+    from multiprocessing.context import SpawnProcess
+
+    with _STARTING:
+        prepared, ours = spawn.get_preparation_data, get_ident()
+
+        def without_script(name: str) -> dict[str, object]:
+            left_out = _OF_SCRIPT if get_ident() == ours else ()
+            return {k: v for k, v in prepared(name).items() if k not in left_out}
+
+        spawn.get_preparation_data = without_script
+        try:
+            return SpawnProcess._Popen(process)
+        finally:
+            spawn.get_preparation_data = prepared
+
+
+class _Script(ModuleType):
+    """``__main__`` of a worker: the parent's script, run when a class or function of it is met."""
+
+    def __init__(self, script: Mapping[str, Any]) -> None:
+        super().__init__("__main__")
+        self.__dict__["__script__"] = script
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        from multiprocessing import current_process, spawn
+
+        process: Any = current_process()
+        process._inheriting = True  # refuses processes that the script would start
+        try:
+            spawn.prepare(self.__script__)
+        finally:
+            del process._inheriting
+        return getattr(sys.modules["__main__"], name)
+
+
+def _begin_worker(lifeline: Connection, script: Mapping[str, Any]) -> None:
+    """Prepare a worker to end with its parent, whose end of the pipe closes with it."""
+    import signal
+
+    def watch() -> None:
+        try:
+            lifeline.poll(None)
+        finally:
+            os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's affair
+    if script:
+        sys.modules["__main__"] = _Script(script)
+    Thread(target=watch, daemon=True).start()
+
+
+#: Items that a task has at the most.
 _LARGEST_CHUNK = 16
+#: Tasks in flight for each worker, and workers of an executor that does not say how many it has.
+_TASKS, _WORKERS = 4, 64
 
 
-def in_processes(function: Callable[..., Any], items: Sequence[Any], workers: int) -> Iterator[Any]:
+def shared(
+    function: Callable[[Any], Any],
+    items: Iterable[Any],
+    *,
+    workers: int,
+    executor: Executor | None = None,
+) -> Iterator[Any]:
     """Yield what a function returns for each item, in their order; one worker is this process."""
-    workers = min(workers, len(items))
-    if workers < 2:
+    # Items are taken as workers become free, so that neither they nor results pile up.
+    chunk = _LARGEST_CHUNK
+    if executor is not None:
+        workers = getattr(executor, "_max_workers", None) or _WORKERS
+    if isinstance(items, Sized):
+        chunk = max(2, min(chunk, len(items) // (4 * workers)))
+        workers = min(workers, -(-len(items) // chunk))
+    if executor is not None:
+        with workers_that_last():
+            yield from _in_chunks(function, items, executor, chunk, _TASKS * workers)
+    elif workers < 2:
         yield from map(function, items)
-        return
-    chunk = max(1, min(_LARGEST_CHUNK, len(items) // (4 * workers)))
-    with worker_pool(workers) as pool:
-        yield from pool.map(function, items, chunksize=chunk)
+    else:
+        with worker_pool(workers) as pool:
+            yield from _in_chunks(function, items, pool, chunk, _TASKS * workers)
+
+
+def _in_chunks(
+    function: Callable[[Any], Any], items: Iterable[Any], executor: Executor, chunk: int, most: int
+) -> Iterator[Any]:
+    source = iter(items)
+    tasks: deque[Future[list[Any]]] = deque()
+    chunks = iter(lambda: list(islice(source, chunk)), [])
+    try:
+        while True:
+            for some in islice(chunks, most - len(tasks)):
+                tasks.append(executor.submit(_each, function, some))
+            if not tasks:
+                return
+            yield from tasks.popleft().result()
+    finally:
+        for task in tasks:
+            task.cancel()
+
+
+def _each(function: Callable[[Any], Any], items: list[Any]) -> list[Any]:
+    return [function(item) for item in items]
+
+
+@contextmanager
+def workers_that_last() -> Iterator[None]:
+    """Say in our words that a worker has ended before its work was done."""
+    from concurrent.futures import BrokenExecutor
+
+    try:
+        yield
+    except BrokenExecutor as failure:
+        raise MemscalError(
+            "A worker process ended before its work was done.",
+            why="It was killed, ran out of memory, or could not load a class of your script.",
+            cure="Give fewer workers, and keep classes of your own in a module that it imports.",
+        ) from failure
