@@ -193,6 +193,8 @@ def _begin_worker(lifeline: Connection, script: Mapping[str, Any]) -> None:
 _LARGEST_CHUNK = 16
 #: Tasks in flight for each worker, and workers of an executor that does not say how many it has.
 _TASKS, _WORKERS = 4, 64
+#: Seconds that a cluster has to answer.
+_CONNECTING = 30
 
 
 def shared(
@@ -240,6 +242,28 @@ def _in_chunks(
 
 def _each(function: Callable[[Any], Any], items: list[Any]) -> list[Any]:
     return [function(item) for item in items]
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
+    """Yield the executor of a Dask cluster, and what counts its threads, which come and go."""
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        problem = "Dask (distributed) is not installed."
+        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
+        raise MemscalError(problem, cure=cure) from error
+    try:
+        client = Client(address, timeout=_CONNECTING)
+    except (OSError, ValueError) as error:
+        cure = "Give the address that the scheduler states, such as tcp://node1:8786."
+        raise InputError(f"No scheduler answers at {address}: {error}", cure=cure) from error
+    with client:
+        executor = client.get_executor()
+        try:
+            yield executor, lambda: sum(client.nthreads().values())
+        finally:
+            executor.shutdown(wait=False)  # takes back what waits
 
 
 @contextmanager

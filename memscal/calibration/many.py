@@ -1,14 +1,13 @@
 """Calibration of many scans, in processes: a result or an error for each."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from inspect import signature
 from os import PathLike
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
-from memscal.apparatus import ApparatusFunction
 from memscal.calibration.calibrate import calibrate
 from memscal.deconvolution.division import chosen_method
 from memscal.errors import InputError, MemscalError
@@ -18,6 +17,8 @@ from memscal.model.checks import Message, QualityCheck
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import cores, shared
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -126,12 +127,10 @@ def calibrate_many(
     return shared(task, sized, workers=cores(), executor=executor)
 
 
-def calibrated(
-    scan: Scans, name: str, options: Mapping[str, Any]
-) -> ApparatusFunction | MemscalError:
-    """Return the apparatus function of a scan, or the error that its result then is."""
+def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
+    """Return a result, or the error of the scan of that name, which is a result too."""
     try:
-        return calibrate(scan, **options).apparatus
+        return work()
     except MemscalError as failure:
         return failure
     except Exception as failure:  # noqa: BLE001 - the rest must go on
@@ -145,7 +144,7 @@ def calibrated(
 def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:
     """Calibrate one scan; an error is part of its result."""
     index, scan = item
-    apparatus = calibrated(scan, f"Scan {index}", options)
+    apparatus = attempted(f"Scan {index}", lambda: calibrate(scan, **options).apparatus)
     if isinstance(apparatus, MemscalError):
         return FleetCalibration(index=index, budget={}, error=apparatus)
     return FleetCalibration(

@@ -82,7 +82,7 @@ class Counting(ThreadPoolExecutor):
 
 
 def test_scans_are_taken_as_workers_become_free_and_several_are_a_task(monkeypatch) -> None:
-    monkeypatch.setattr(fleet, "calibrated", lambda *_: memscal.MemscalError("not needed here"))
+    monkeypatch.setattr(fleet, "attempted", lambda *_: memscal.MemscalError("not needed"))
     taken = 0
 
     def endless() -> Iterator[str]:
