@@ -6,7 +6,7 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from itertools import islice
 from numbers import Integral
@@ -19,7 +19,6 @@ from memscal.errors import InputError, MemscalError
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future, ProcessPoolExecutor
     from multiprocessing.connection import Connection
-    from multiprocessing.context import SpawnContext
 
     from threadpoolctl import ThreadpoolController
 
@@ -83,20 +82,26 @@ def require_workers(workers: Any) -> None:
         raise InputError(problem, cure="Give one process per core, at the most.")
 
 
+_OF_SCRIPT = ("init_main_from_name", "init_main_from_path")
+_STARTING = Lock()
+
+
 @contextmanager
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes, started afresh: one forked from one with threads may hang."""
-    # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import spawn
+    from multiprocessing.context import SpawnContext
 
+    # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     unset = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
     _SET_BY_POOL.update(unset)
-    context, script = _fresh_interpreters()
+    context: Any = SpawnContext()
+    context.Process, data = _process, spawn.get_preparation_data("")
     theirs, ours = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_begin_worker, initargs=(theirs, script)
-    )
+    told = theirs, {key: data[key] for key in _OF_SCRIPT if key in data}
+    pool = ProcessPoolExecutor(workers, context, initializer=_begin_worker, initargs=told)
     try:
         with workers_that_last():
             yield pool
@@ -110,21 +115,8 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             os.environ.pop(name, None)
 
 
-_OF_SCRIPT = ("init_main_from_name", "init_main_from_path")
-_STARTING = Lock()
-
-
-def _fresh_interpreters() -> tuple[SpawnContext, dict[str, Any]]:
-    """Return a context of processes that do not run this one's script, and where the script is."""
-    from multiprocessing import spawn
-    from multiprocessing.context import SpawnContext
-
-    context: Any = SpawnContext()
-    context.Process, data = _process, spawn.get_preparation_data("")
-    return context, {key: data[key] for key in _OF_SCRIPT if key in data}
-
-
 def _process(*args: Any, **kwargs: Any) -> Any:
+    """Return a process that does not import the script of this one, which needs no guard then."""
     from multiprocessing.context import SpawnProcess
 
     process: Any = SpawnProcess(*args, **kwargs)
@@ -133,8 +125,6 @@ def _process(*args: Any, **kwargs: Any) -> Any:
 
 
 def _start_without_script(process: Any) -> Any:
-    """Start a process that does not import the script, which needs no guard therefore."""
-    # A script without ``if __name__ == "__main__":`` would start processes of its own, and fail.
     from multiprocessing import spawn
     from multiprocessing.context import SpawnProcess
 
@@ -189,12 +179,10 @@ def _begin_worker(lifeline: Connection, script: Mapping[str, Any]) -> None:
     Thread(target=watch, daemon=True).start()
 
 
-#: Items that a task has at the most.
-_LARGEST_CHUNK = 16
-#: Tasks in flight for each worker, and workers of an executor that does not say how many it has.
-_TASKS, _WORKERS = 4, 64
-#: Seconds that a cluster has to answer.
-_CONNECTING = 30
+#: Items that a task has at the most; tasks in flight for each worker.
+_LARGEST_CHUNK, _TASKS = 16, 4
+#: Workers of an executor that does not say how many it has; seconds that a cluster has to answer.
+_WORKERS, _CONNECTING = 64, 30
 
 
 def shared(
@@ -206,38 +194,29 @@ def shared(
 ) -> Iterator[Any]:
     """Yield what a function returns for each item, in their order; one worker is this process."""
     # Items are taken as workers become free, so that neither they nor results pile up.
-    chunk = _LARGEST_CHUNK
+    chunk, source, tasks = _LARGEST_CHUNK, iter(items), deque["Future[list[Any]]"]()
     if executor is not None:
         workers = getattr(executor, "_max_workers", None) or _WORKERS
     if isinstance(items, Sized):
         chunk = max(2, min(chunk, len(items) // (4 * workers)))
         workers = min(workers, -(-len(items) // chunk))
-    if executor is not None:
-        with workers_that_last():
-            yield from _in_chunks(function, items, executor, chunk, _TASKS * workers)
-    elif workers < 2:
-        yield from map(function, items)
-    else:
-        with worker_pool(workers) as pool:
-            yield from _in_chunks(function, items, pool, chunk, _TASKS * workers)
-
-
-def _in_chunks(
-    function: Callable[[Any], Any], items: Iterable[Any], executor: Executor, chunk: int, most: int
-) -> Iterator[Any]:
-    source = iter(items)
-    tasks: deque[Future[list[Any]]] = deque()
     chunks = iter(lambda: list(islice(source, chunk)), [])
-    try:
-        while True:
-            for some in islice(chunks, most - len(tasks)):
-                tasks.append(executor.submit(_each, function, some))
-            if not tasks:
-                return
-            yield from tasks.popleft().result()
-    finally:
-        for task in tasks:
-            task.cancel()
+    with ExitStack() as stack:
+        if executor is None and workers < 2:
+            yield from map(function, source)
+            return
+        stack.enter_context(workers_that_last())
+        pool = executor or stack.enter_context(worker_pool(workers))
+        try:
+            while True:
+                some = islice(chunks, _TASKS * workers - len(tasks))
+                tasks.extend(pool.submit(_each, function, chunk) for chunk in some)
+                if not tasks:
+                    return
+                yield from tasks.popleft().result()
+        finally:
+            for task in tasks:
+                task.cancel()
 
 
 def _each(function: Callable[[Any], Any], items: list[Any]) -> list[Any]:
@@ -249,12 +228,11 @@ def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
     """Yield the executor of a Dask cluster, and what counts its threads, which come and go."""
     try:
         from distributed import Client
-    except ModuleNotFoundError as error:
-        problem = "Dask (distributed) is not installed."
-        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
-        raise MemscalError(problem, cure=cure) from error
-    try:
+
         client = Client(address, timeout=_CONNECTING)
+    except ModuleNotFoundError as error:
+        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
+        raise MemscalError("Dask (distributed) is not installed.", cure=cure) from error
     except (OSError, ValueError) as error:
         cure = "Give the address that the scheduler states, such as tcp://node1:8786."
         raise InputError(f"No scheduler answers at {address}: {error}", cure=cure) from error

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import json
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, is_dataclass
@@ -17,12 +18,12 @@ from memscal.calibration.many import attempted
 from memscal.errors import MemscalError, OutputError
 from memscal.formats.files import ensure_writable, read_bytes
 from memscal.formats.fleet import (
+    DIGEST,
     FleetScan,
     fleet_row,
     manifest_scans,
     parquet,
     read_shard,
-    sha256_of,
     shard_paths,
     write_shard,
 )
@@ -77,7 +78,7 @@ class Batch:
     @cached_property
     def options_sha256(self) -> str:
         """Digest of the options, and of the contents of references."""
-        return sha256_of([_statement(self.options), self.artifacts])
+        return _sha256_of([_statement(self.options), self.artifacts])
 
     @property
     def folder(self) -> Path:
@@ -102,21 +103,17 @@ class Batch:
         if not count:
             cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
             raise MemscalError(f"{self.source} holds no scans.", cure=cure)
-        there = self.results.exists()
-        if there and not (resume or (self.results.is_dir() and not any(self.results.iterdir()))):
-            raise OutputError(
-                f"The folder {self.results} exists already.",
-                why="It may hold results, which are not replaced.",
-                cure="Continue them with --resume, or give another folder.",
-            )
+        stays = "It may hold results, which are not replaced."
+        with suppress(FileNotFoundError, NotADirectoryError):
+            if not resume and any(self.results.iterdir()):
+                cure = "Continue them with --resume, or give another folder."
+                raise OutputError(f"The folder {self.results} exists.", why=stays, cure=cure)
         shards = -(-count // self.shard_size)
         numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(self.results)]
         if max(numbers, default=0) >= shards:
-            raise OutputError(
-                f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}.",
-                why="Results of another batch would stay beside those of this one.",
-                cure="Resume with the manifest and the --shard-size that it was begun with.",
-            )
+            problem = f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}."
+            cure = "Resume with the manifest and the --shard-size that it was begun with."
+            raise OutputError(problem, why=stays, cure=cure)
         try:
             (self.results / "shards").mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -129,35 +126,34 @@ class Batch:
     def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
         """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""
         shards, tasks = self.shards(), set[Future[ShardOutcome]]()
-        lost: list[BaseException] = []
+        lost: list[str] = []
         try:
             while True:
-                tasks |= {executor.submit(run_shard, self, s) for s in _up_to(most, shards, tasks)}
+                some = islice(shards, max(0, most() - len(tasks)))
+                tasks |= {executor.submit(run_shard, self, shard) for shard in some}
                 if not tasks:
                     break
                 done, tasks = wait(tasks, return_when=FIRST_COMPLETED)
                 for task in done:
-                    failure = task.exception()
-                    if isinstance(failure, MemscalError | BrokenExecutor):
-                        raise failure
-                    if failure is None:
+                    try:
                         yield task.result()
-                    else:
-                        lost.append(failure)
+                    except (MemscalError, BrokenExecutor):
+                        raise
+                    except Exception as failure:  # noqa: BLE001 - of a cluster: workers that died
+                        lost.append(type(failure).__name__)
         finally:
             for task in tasks:
                 task.cancel()
         if lost:
-            names = "; ".join(sorted({type(failure).__name__ for failure in lost}))
             raise MemscalError(
-                f"{len(lost)} shards were not calibrated: their workers were lost ({names}).",
+                f"The workers of {len(lost)} shards were lost ({', '.join(sorted(set(lost)))}).",
                 why="They were killed or ran out of memory, with one shard several times.",
                 cure="Give the workers more memory, and run the same command with --resume.",
-            ) from lost[0]
+            )
 
 
-def _up_to(most: Callable[[], int], shards: Iterable[Shard], tasks: set[Any]) -> Iterable[Shard]:
-    return islice(shards, max(0, most() - len(tasks)))
+def _sha256_of(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def _statement(value: Any) -> Any:
@@ -177,37 +173,32 @@ def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
         problem = f"A worker has memscal {__version__}, the batch {batch.version}."
         raise MemscalError(problem, cure="Install the same version everywhere.")
     path = batch.table(shard)
-    if path.exists():
-        rows = _kept_rows(batch, shard, path)
-        if rows is not None:
-            return _outcome(rows, kept=True)
-    rows = [_row(batch, shard, i) for i in range(len(shard.scans))]
-    write_shard(path, rows, _digest(batch, shard, [row["input_sha256"] for row in rows]))
-    return _outcome(rows, kept=False)
-
-
-def _outcome(rows: list[dict[str, Any]], *, kept: bool) -> ShardOutcome:
+    rows = _kept_rows(batch, shard, path) if path.exists() else []
+    kept = bool(rows)
+    if not kept:
+        rows = [_row(batch, shard, i) for i in range(len(shard.scans))]
+        write_shard(path, rows, _digest(batch, shard, [row["input_sha256"] for row in rows]))
     errors = sum(row["error"] is not None for row in rows)
     failed = sum(not row["passed"] for row in rows) - errors
     return ShardOutcome(len(rows), errors, failed, kept)
 
 
-def _kept_rows(batch: Batch, shard: Shard, path: Path) -> list[dict[str, Any]] | None:
+def _kept_rows(batch: Batch, shard: Shard, path: Path) -> list[dict[str, Any]]:
     """Return what a shard's file says, if it opens whole and its digest is that of this work."""
     with suppress(MemscalError):
         table = read_shard(path)
-        stated = table.schema.metadata[b"memscal_shard_sha256"].decode()
+        stated = table.schema.metadata[DIGEST.encode()].decode()
         inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
         if stated == _digest(batch, shard, inputs):
             rows: list[dict[str, Any]] = table.select(["passed", "error"]).to_pylist()
             return rows
-    return None
+    return []
 
 
 def _digest(batch: Batch, shard: Shard, inputs: list[str | None]) -> str:
     """Return the digest of version, options, and of the contents and places of the scans."""
     listed = [[scan.path, scan.wafer_x, scan.wafer_y] for scan in shard.scans]
-    return sha256_of([batch.version, batch.options_sha256, shard.first, listed, inputs])
+    return _sha256_of([batch.version, batch.options_sha256, shard.first, listed, inputs])
 
 
 def _sha256_of_file(path: Path) -> str | None:
@@ -226,8 +217,7 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     scan = attempted(item.path, lambda: read_scan(path))
     if isinstance(scan, MemscalError):
         return row | _of_error(scan)
-    row |= {"sensor": scan.sensor.name, "start_time": scan.start_time}
-    row |= {name: getattr(scan.sensor, name) for name in ("model", "serial_number", "channel")}
+    row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}
     apparatus = attempted(item.path, lambda: calibrate(scan, **batch.options).apparatus)
     if isinstance(apparatus, MemscalError):
         return row | _of_error(apparatus)

@@ -92,22 +92,17 @@ def command(
         out.note("The shards that are done stay: --resume does the rest.")
         raise
     errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
-    kept, seconds = sum(outcome.kept for outcome in outcomes), monotonic() - start
+    kept, seconds = sum(outcome.kept for outcome in outcomes), round(monotonic() - start, 1)
+    counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
+    counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
     if as_json:
-        counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
-        shards = {"written": len(outcomes) - kept, "kept": kept}
-        counts |= {"errors": errors}
-        stated = {"schema_version": "1", "results": str(results), **counts, "shards": shards}
-        out.emit_json(stated | {"seconds": round(seconds, 1)})
+        stated = {"schema_version": "1", "results": str(results), **counts, "seconds": seconds}
+        out.emit_json(stated)
     else:
-        rows = [
-            ("calibrated, all checks passed", str(total - errors - failed)),
-            ("calibrated, a check failed", str(failed)),
-            ("not calibrated", str(errors)),
-            ("shards written, and kept", f"{len(outcomes) - kept}, {kept}"),
-            ("time", _span(seconds)),
-        ]
-        out.emit_tables(Table(f"{total} scans", ("", ""), rows))
+        rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
+        out.emit_tables(
+            Table(f"Batch of {source.name}", ("", ""), [*rows, ("time", _span(seconds))])
+        )
     out.message(f"Written: {results}")
     if not errors + failed:
         return DONE
@@ -122,16 +117,17 @@ def _outcomes(
     """Yield the outcomes of a batch, and show how far it is."""
     start = said = monotonic()
     done = calibrated = 0
-    terminal = sys.stderr is not None and sys.stderr.isatty()
     with ExitStack() as stack:
         executor, most = _workers(stack, workers, scheduler)
         show = stack.enter_context(out.working(f"Calibrating {total} scans"))
         for outcome in batch.run(executor, most):
             done += outcome.scans
             calibrated += 0 if outcome.kept else outcome.scans
-            text = _progress(done, total, calibrated / (monotonic() - start))
+            text, rate = f"{done} of {total} scans", calibrated / (monotonic() - start)
+            if rate:
+                text += f", {rate:.3g} a second, {_span((total - done) / rate)} left"
             show(text)
-            if not terminal and monotonic() - said >= _EVERY:
+            if not sys.stderr.isatty() and monotonic() - said >= _EVERY:
                 out.message(text)
                 said = monotonic()
             yield outcome
@@ -150,13 +146,6 @@ def _workers(
     if not threads():
         out.note("The cluster has no workers yet.")
     return executor, lambda: 2 * threads() + 8
-
-
-def _progress(done: int, total: int, rate: float) -> str:
-    text = f"{done} of {total} scans"
-    if rate > 0:
-        text += f", {rate:.3g} a second, {_span((total - done) / rate)} left"
-    return text
 
 
 def _span(seconds: float) -> str:

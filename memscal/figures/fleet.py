@@ -60,8 +60,8 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
 
 
 def _failures(axes: Axes, fleet: FleetResults) -> None:
-    bars = [(name.replace("_", " "), n, "failed") for name, n in failures(fleet).most_common()]
-    bars += [(kind, n, "muted") for kind, n in error_classes(fleet).most_common()]
+    bars = [(name.replace("_", " "), n, "failed") for name, n in failures(fleet).items()]
+    bars += [(kind, n, "muted") for kind, n in error_classes(fleet).items()]
     bars = sorted(bars, key=lambda bar: -bar[1])[:_MOST_BARS][::-1]
     axes.set_xlabel("sensors (grey: errors, not calibrated)")
     if not bars:

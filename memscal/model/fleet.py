@@ -40,26 +40,9 @@ class FleetResults(Result):
     errors: Mapping[int, tuple[str, str]]
     unit: str
 
-    def __repr__(self) -> str:
-        """Return the numbers of sensors."""
-        return f"<FleetResults: {len(self.paths)} sensors, {len(self.errors)} errors>"
-
-    @property
-    def deviations(self) -> dict[str, FloatArray]:
-        """Robust z of A and sigma: distances from the median over the robust deviation."""
-        names = ("conversion_constant", "gaussian_sigma")
-        return {name: robust_z(getattr(self, name)) for name in names}
-
 
 def robust_spread(values: FloatArray) -> float:
     """Return the scaled median absolute deviation, NaN of no values."""
     if not values.size:
         return float("nan")
     return _TO_SIGMA * float(np.median(np.abs(values - np.median(values))))
-
-
-def robust_z(values: FloatArray) -> FloatArray:
-    """Return distances from the median over the robust spread, zero where there is none."""
-    finite = values[np.isfinite(values)]
-    spread = robust_spread(finite)
-    return (values - np.median(finite)) / spread if spread > 0 else np.zeros_like(values)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from helpers.console import Run
+from helpers.console import Outcome, Run
 from helpers.scans import simulated
 
 import memscal
@@ -60,6 +60,11 @@ def copy(results: Path, fleet: Path, folder: Path) -> Path:
 def arguments(source: Path, results: Path, *further: str) -> list[str]:
     sizes = ["--shard-size", str(SHARD), "--workers", "1", *further]
     return ["batch", str(source), "-o", str(results), *sizes]
+
+
+def shards_of(outcome: Outcome) -> tuple[int, int]:
+    """How many shards were written, and how many kept."""
+    return outcome.json["shards_written"], outcome.json["shards_kept"]
 
 
 def batch(*given: Path | str) -> subprocess.Popen[bytes]:
@@ -138,14 +143,14 @@ def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
     process.wait()
     assert len(done) < COUNT / SHARD
     resumed = run(*arguments(fleet / "wafer.csv", halfway, "--resume", "--json"))
-    assert resumed.exits(1).json["shards"]["kept"] >= 1
+    assert shards_of(resumed.exits(1))[1] >= 1
     pd.testing.assert_frame_equal(tables(halfway), tables(results), rtol=1e-9)
 
 
 def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy: Path, run: Run) -> None:
     shards = sorted((copy / "results" / "shards").iterdir())
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--json")
-    assert run(*line).json["shards"] == {"written": 0, "kept": 6}
+    assert shards_of(run(*line)) == (0, 6)
     shards[0].write_bytes(shards[0].read_bytes()[:-1000])
     flipped = bytearray(shards[1].read_bytes())
     flipped[100] ^= 1
@@ -153,16 +158,16 @@ def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy: Path, 
     shutil.copy(shards[4], shards[2])
     changed = replace(memscal.read_scan(copy / "scans" / "s07.h5"), load_uncertainty=0.5)
     memscal.write_scan(changed, copy / "scans" / "s07.h5", overwrite=True)
-    assert run(*line).json["shards"] == {"written": 4, "kept": 2}
+    assert shards_of(run(*line)) == (4, 2)
     rows = tables(copy / "results")
     assert list(rows["place"]) == list(range(COUNT))
     assert rows["conversion_constant_errors"][7] > 5 * rows["conversion_constant_errors"][6]
-    assert run(*line, "--method", "bayesian").json["shards"] == {"written": 6, "kept": 0}
+    assert shards_of(run(*line, "--method", "bayesian")) == (6, 0)
 
 
 def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run: Run) -> None:
     manifest, old = copy / "wafer.csv", copy / "results"
-    run(*arguments(manifest, old)).exits(4, "exists already", "--resume")
+    run(*arguments(manifest, old)).exits(4, "results exists", "--resume")
     run(*arguments(manifest, old, "--resume", "--shard-size", "4")).exits(4, "begun with")
     run(*arguments(manifest, old, "--scheduler", "tcp://a:1")).exits(2, "exclude each other")
     run(*arguments(copy / "none.csv", copy / "new")).exits(3, "neither a folder nor")
