@@ -225,7 +225,7 @@ def _each(function: Callable[[Any], Any], items: list[Any]) -> list[Any]:
 
 @contextmanager
 def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
-    """Yield the executor of a Dask cluster, and what counts its threads, which come and go."""
+    """Yield the executor of a Dask cluster, and how many tasks keep its threads busy just now."""
     try:
         from distributed import Client
 
@@ -239,7 +239,7 @@ def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
     with client:
         executor = client.get_executor()
         try:
-            yield executor, lambda: sum(client.nthreads().values())
+            yield executor, lambda: 2 * sum(client.nthreads().values()) + 8
         finally:
             executor.shutdown(wait=False)  # takes back what waits
 

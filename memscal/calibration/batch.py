@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -77,8 +76,12 @@ class Batch:
 
     @cached_property
     def options_sha256(self) -> str:
-        """Digest of the options, and of the contents of references."""
-        return _sha256_of([_statement(self.options), self.artifacts])
+        """Digest of the options; a reference counts by the digest of its file."""
+        stated = {
+            name: value.source or value.form if isinstance(value, StressProfile) else value
+            for name, value in self.options.items()
+        }
+        return _sha256_of((stated, self.artifacts))
 
     @property
     def folder(self) -> Path:
@@ -152,19 +155,8 @@ class Batch:
             )
 
 
-def _sha256_of(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
-
-
-def _statement(value: Any) -> Any:
-    """Return an option's value as JSON can say it: references by their digests."""
-    if isinstance(value, StressProfile):
-        return value.source.sha256 if value.source else repr(value.form)
-    if isinstance(value, Mapping):
-        return {str(key): _statement(item) for key, item in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return [type(value).__name__, asdict(value)]
-    return value if isinstance(value, str | int | float | bool | None) else str(value)
+def _sha256_of(value: object) -> str:
+    return hashlib.sha256(repr(value).encode()).hexdigest()
 
 
 def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
@@ -172,33 +164,32 @@ def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
     if batch.version != __version__:
         problem = f"A worker has memscal {__version__}, the batch {batch.version}."
         raise MemscalError(problem, cure="Install the same version everywhere.")
-    path = batch.table(shard)
-    rows = _kept_rows(batch, shard, path) if path.exists() else []
+    rows = _kept_rows(batch, shard)
     kept = bool(rows)
     if not kept:
         rows = [_row(batch, shard, i) for i in range(len(shard.scans))]
-        write_shard(path, rows, _digest(batch, shard, [row["input_sha256"] for row in rows]))
+        digest = _digest(batch, shard, [row["input_sha256"] for row in rows])
+        write_shard(batch.table(shard), rows, digest)
     errors = sum(row["error"] is not None for row in rows)
     failed = sum(not row["passed"] for row in rows) - errors
     return ShardOutcome(len(rows), errors, failed, kept)
 
 
-def _kept_rows(batch: Batch, shard: Shard, path: Path) -> list[dict[str, Any]]:
+def _kept_rows(batch: Batch, shard: Shard) -> list[dict[str, Any]]:
     """Return what a shard's file says, if it opens whole and its digest is that of this work."""
-    with suppress(MemscalError):
-        table = read_shard(path)
-        stated = table.schema.metadata[DIGEST.encode()].decode()
-        inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
-        if stated == _digest(batch, shard, inputs):
-            rows: list[dict[str, Any]] = table.select(["passed", "error"]).to_pylist()
-            return rows
+    if batch.table(shard).exists():
+        with suppress(MemscalError):
+            table = read_shard(batch.table(shard))
+            inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
+            if table.schema.metadata.get(DIGEST.encode()) == _digest(batch, shard, inputs).encode():
+                rows: list[dict[str, Any]] = table.select(["passed", "error"]).to_pylist()
+                return rows
     return []
 
 
 def _digest(batch: Batch, shard: Shard, inputs: list[str | None]) -> str:
     """Return the digest of version, options, and of the contents and places of the scans."""
-    listed = [[scan.path, scan.wafer_x, scan.wafer_y] for scan in shard.scans]
-    return _sha256_of([batch.version, batch.options_sha256, shard.first, listed, inputs])
+    return _sha256_of((batch.version, batch.options_sha256, shard, inputs))
 
 
 def _sha256_of_file(path: Path) -> str | None:

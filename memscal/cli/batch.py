@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
@@ -18,8 +18,6 @@ from memscal.cli.options import FILE, json_option, option
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     from memscal.calibration.batch import Batch, ShardOutcome
 
 #: Seconds between two lines about the progress, where it is not shown on a terminal.
@@ -115,10 +113,16 @@ def _outcomes(
     batch: Batch, workers: int | None, scheduler: str | None, total: int
 ) -> Iterator[ShardOutcome]:
     """Yield the outcomes of a batch, and show how far it is."""
+    from memscal.parallel import cluster, cores, worker_pool
+
     start = said = monotonic()
     done = calibrated = 0
     with ExitStack() as stack:
-        executor, most = _workers(stack, workers, scheduler)
+        if scheduler:
+            executor, most = stack.enter_context(cluster(scheduler))
+        else:
+            count = workers or cores()
+            executor, most = stack.enter_context(worker_pool(count)), lambda: 2 * count
         show = stack.enter_context(out.working(f"Calibrating {total} scans"))
         for outcome in batch.run(executor, most):
             done += outcome.scans
@@ -127,25 +131,10 @@ def _outcomes(
             if rate:
                 text += f", {rate:.3g} a second, {_span((total - done) / rate)} left"
             show(text)
-            if not sys.stderr.isatty() and monotonic() - said >= _EVERY:
+            if not (sys.stderr and sys.stderr.isatty()) and monotonic() - said >= _EVERY:
                 out.message(text)
                 said = monotonic()
             yield outcome
-
-
-def _workers(
-    stack: ExitStack, workers: int | None, scheduler: str | None
-) -> tuple[Executor, Callable[[], int]]:
-    """Return what calibrates, and how many shards it may have in flight."""
-    from memscal.parallel import cluster, cores, worker_pool
-
-    if scheduler is None:
-        count = workers or cores()
-        return stack.enter_context(worker_pool(count)), lambda: 2 * count
-    executor, threads = stack.enter_context(cluster(scheduler))
-    if not threads():
-        out.note("The cluster has no workers yet.")
-    return executor, lambda: 2 * threads() + 8
 
 
 def _span(seconds: float) -> str:

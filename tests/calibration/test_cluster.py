@@ -14,7 +14,6 @@ from distributed import Client, LocalCluster
 
 import memscal
 from memscal.cli import main
-from memscal.parallel import cluster
 
 SCANS = 24
 
@@ -79,10 +78,3 @@ def test_a_batch_outlives_a_worker_that_is_killed(
     assert code == int(not rows["passed"].all()), capsys.readouterr().err
     assert list(rows["place"]) == list(range(SCANS))
     assert rows["error"].isna().all()
-
-
-def test_the_threads_of_a_cluster_are_counted(workers: LocalCluster) -> None:
-    with cluster(workers.scheduler_address) as (_, threads):
-        while threads() < 2:  # the killed one comes back
-            sleep(0.1)
-        assert threads() == 2
