@@ -12,7 +12,7 @@ from memscal.figures.style import COLOURS, drawable, legend_above, panels_of
 from memscal.model.arrays import FloatArray
 from memscal.model.fleet import ROBUST_LIMIT, FleetResults, robust_spread
 from memscal.summaries.declared import power_of_ten
-from memscal.summaries.fleet_results import counts, error_classes, failures, tables
+from memscal.summaries.fleet_results import error_classes, failures, tables, verdict
 
 _MOST_BINS, _MOST_BARS = 60, 12
 #: Markers that are drawn as an image, which keeps a page of many sensors small.
@@ -114,11 +114,6 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
 
 def fleet_page(fleet: FleetResults, name: str) -> str:
     """Return the summary of a fleet as a self-contained HTML page."""
-    number = counts(fleet)
-    verdict = (
-        f"{number['passed']} of {number['sensors']} sensors passed every check, "
-        f"{number['failed_checks']} failed one, {number['errors']} were not calibrated."
-    )
     caption = (
         "a, b: distributions of A and of the Gaussian width fitted to the scan. c: sensors that "
         "failed each check, and errors by class. d: A over the wafer, or along the batch."
@@ -126,8 +121,8 @@ def fleet_page(fleet: FleetResults, name: str) -> str:
     first, second, *further = tables(fleet)
     sections = {
         "Values": first.html() + second.html(),
-        "Figure": html_figure(fleet_figure(fleet), f"Panels: {caption} {verdict}", caption),
+        "Figure": html_figure(fleet_figure(fleet), f"Panels: {caption} {verdict(fleet)}", caption),
         "Failures and outliers": "\n".join(t.html() for t in further if t.rows) or "<p>None.</p>",
     }
-    failed = number["passed"] < number["sensors"]
-    return html_page(f"Calibrations of {name}", verdict, sections, failed=failed)
+    title, failed = f"Calibrations of {name}", bool(fleet.failed)
+    return html_page(title, verdict(fleet), sections, failed=failed)

@@ -20,6 +20,13 @@ def counts(fleet: FleetResults) -> dict[str, int]:
     return numbers | {"errors": errors}
 
 
+def verdict(fleet: FleetResults) -> str:
+    """Return the counts as a sentence."""
+    number = counts(fleet)
+    failed = f"{number['failed_checks']} failed one, {number['errors']} were not calibrated"
+    return f"{number['passed']} of {number['sensors']} sensors passed every check, {failed}."
+
+
 def failures(fleet: FleetResults) -> dict[str, int]:
     """Return how many sensors failed each check."""
     return dict(Counter(c for checks in fleet.failed.values() for c in checks).most_common())
