@@ -19,9 +19,9 @@ from memscal.formats.files import ensure_writable, read_bytes
 from memscal.formats.fleet import (
     DIGEST,
     FleetScan,
+    arrow,
     fleet_row,
     manifest_scans,
-    parquet,
     read_shard,
     shard_paths,
     write_shard,
@@ -101,7 +101,7 @@ class Batch:
 
     def prepare(self, *, resume: bool) -> int:
         """Make the folder of results, if it may be used, and return the number of scans."""
-        parquet()
+        arrow()
         count = sum(1 for _ in manifest_scans(self.source))
         if not count:
             cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
@@ -204,11 +204,12 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     item, path = shard.scans[i], batch.folder / shard.scans[i].path
     row: dict[str, Any] = {"place": shard.first + i, **asdict(item), "passed": False}
     row |= {"calibrated_at": timestamp(), "options_sha256": batch.options_sha256}
-    row |= {"version": batch.version, "error": None, "input_sha256": _sha256_of_file(path)}
+    row |= {"version": batch.version, "error": None}
     scan = attempted(item.path, lambda: read_scan(path))
     if isinstance(scan, MemscalError):
-        return row | _of_error(scan)
+        return row | _of_error(scan) | {"input_sha256": _sha256_of_file(path)}
     row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}
+    row["input_sha256"] = scan.source and scan.source.sha256
     apparatus = attempted(item.path, lambda: calibrate(scan, **batch.options).apparatus)
     if isinstance(apparatus, MemscalError):
         return row | _of_error(apparatus)

@@ -90,20 +90,19 @@ _TEXTS = (
 _CHECK, _UNCERTAINTY = ("value", "limit", "p_value"), ("quantity", "source")
 
 
-def parquet() -> Any:
-    """Return the module pyarrow.parquet, or say how to get it."""
+def arrow() -> Any:
+    """Return the module pyarrow, or say how to get it."""
     try:
         import pyarrow.parquet
     except ModuleNotFoundError as error:
         cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
         raise MemscalError("pyarrow, which writes Parquet, is not installed.", cure=cure) from error
-    return pyarrow.parquet
+    return pyarrow
 
 
 def _schema(readings: Iterable[Reading]) -> Any:
     """Return names, types and units of the columns, for sensors with readings in some units."""
-    import pyarrow as pa
-
+    pa = arrow()
     single, text, double = pa.float32(), pa.string(), pa.float64()
     check = {"name": text, "passed": pa.bool_(), **dict.fromkeys(_CHECK, single)}
     source = {**dict.fromkeys(_UNCERTAINTY, text), "errors": single}
@@ -149,25 +148,23 @@ def fleet_row(data: ApparatusData) -> dict[str, Any]:
 
 def write_shard(path: Path, rows: Sequence[Mapping[str, Any]], digest: str) -> None:
     """Write a table whole or not at all; its metadata state the digest of what it is made from."""
-    import pyarrow as pa
-
+    pa = arrow()
     about = {"memscal_schema": FLEET_SCHEMA, "memscal_schema_version": FLEET_SCHEMA_VERSION}
     about |= {"memscal_version": __version__, DIGEST: digest}
     readings = {row["reading"] for row in rows if "reading" in row} or {VOLTS}
     table = pa.Table.from_pylist(list(rows), _schema(readings).with_metadata(about))
     packing = {"compression": "zstd", "use_dictionary": False, "write_page_checksum": True}
     sink = pa.BufferOutputStream()
-    parquet().write_table(table, sink, **packing)
+    pa.parquet.write_table(table, sink, **packing)
     atomic_write_bytes(path, memoryview(sink.getvalue()), overwrite=True)
 
 
 def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
     """Read columns of a table, by default all; refuse a file that is damaged or another's."""
-    import pyarrow as pa
-
+    pa = arrow()
     try:
         buffer = pa.BufferReader(read_bytes(path))
-        file = parquet().ParquetFile(buffer, page_checksum_verification=True)
+        file = pa.parquet.ParquetFile(buffer, page_checksum_verification=True)
         stated = file.schema_arrow.metadata or {}
         if stated.get(b"memscal_schema") != FLEET_SCHEMA.encode():
             raise FormatError(f"{path} is a Parquet file, but none of memscal batch.")

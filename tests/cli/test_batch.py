@@ -147,7 +147,10 @@ def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
     pd.testing.assert_frame_equal(tables(halfway), tables(results), rtol=1e-9)
 
 
-def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy: Path, run: Run) -> None:
+def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
+    copy: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("memscal.cli.batch._EVERY", 0)
     shards = sorted((copy / "results" / "shards").iterdir())
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--json")
     assert shards_of(run(*line)) == (0, 6)
@@ -162,7 +165,8 @@ def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy: Path, 
     rows = tables(copy / "results")
     assert list(rows["place"]) == list(range(COUNT))
     assert rows["conversion_constant_errors"][7] > 5 * rows["conversion_constant_errors"][6]
-    assert shards_of(run(*line, "--method", "bayesian")) == (6, 0)
+    anew = run(*line, "--method", "bayesian").exits(1, "2 of 12 scans, ", " a second, ", " s left")
+    assert shards_of(anew) == (6, 0)
 
 
 def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run: Run) -> None:
@@ -192,13 +196,14 @@ def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet: Path, fold
     assert listed == ["c,d.nxs", "'a.h5'"]
 
 
-@pytest.mark.parametrize(("module", "option"), [
-    ("pyarrow", ()), ("distributed", ("--scheduler", "tcp://127.0.0.1:9")),
+@pytest.mark.parametrize(("module", "line"), [
+    ("pyarrow", "batch {scans} -o new"), ("pyarrow", "summary {results}"),
+    ("distributed", "batch {scans} -o new --scheduler tcp://127.0.0.1:9"),
 ])  # fmt: skip
-def test_a_missing_extra_is_named(module, option, monkeypatch, fleet, folder, run: Run) -> None:
+def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, folder, run: Run):
     monkeypatch.setitem(sys.modules, module, None)
-    line = ["batch", fleet / "scans", "-o", folder / "results", *option]
-    run(*line).exits(3, "is not installed", 'pip install "memscal[fleet]"')
+    words = line.format(scans=fleet / "scans", results=results).split()
+    run(*words).exits(3, "is not installed", 'pip install "memscal[fleet]"')
 
 
 def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch, fleet, folder, run: Run) -> None:
