@@ -15,6 +15,7 @@ from memscal.cli import output as out
 from memscal.cli.calibrate import calibration_options, calibration_settings
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
 from memscal.cli.options import FILE, json_option, option
+from memscal.errors import MemscalError
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def command(
     total, start = batch.prepare(resume=resume), monotonic()
     try:
         outcomes = list(_outcomes(batch, workers, scheduler, total))
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, MemscalError):
         out.note("The shards that are done stay: --resume does the rest.")
         raise
     errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
@@ -129,7 +130,7 @@ def _outcomes(
             calibrated += 0 if outcome.kept else outcome.scans
             text, rate = f"{done} of {total} scans", calibrated / (monotonic() - start)
             if rate:
-                text += f", {rate:.3g} a second, {_span((total - done) / rate)} left"
+                text += f", {_span((total - done) / rate)} left, {rate:.3g} a second"
             show(text)
             if not (sys.stderr and sys.stderr.isatty()) and monotonic() - said >= _EVERY:
                 out.message(text)
