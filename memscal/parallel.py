@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from contextlib import ExitStack, contextmanager
 from functools import cache
+from itertools import islice
 from numbers import Integral
+from threading import Lock, Thread, get_ident
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from memscal.errors import InputError
+from memscal.errors import InputError, MemscalError
 
 if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures import Executor, Future, ProcessPoolExecutor
+    from multiprocessing.connection import Connection
 
     from threadpoolctl import ThreadpoolController
 
@@ -60,8 +65,14 @@ def single_threaded() -> Iterator[None]:
             yield
 
 
-#: Windows refuses more.
-_MOST_WORKERS = 61
+#: Windows refuses more than 61.
+_MOST_WORKERS = 61 if sys.platform == "win32" else 512
+
+
+def cores() -> int:
+    """Return how many cores this process may use, of which a machine can have more."""
+    available = getattr(os, "sched_getaffinity", None)
+    return min(len(available(0)) if available else os.cpu_count() or 1, _MOST_WORKERS)
 
 
 def require_workers(workers: Any) -> None:
@@ -71,35 +82,178 @@ def require_workers(workers: Any) -> None:
         raise InputError(problem, cure="Give one process per core, at the most.")
 
 
+_OF_SCRIPT = ("init_main_from_name", "init_main_from_path")
+_STARTING = Lock()
+
+
 @contextmanager
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes, started afresh: one forked from one with threads may hang."""
-    # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    from multiprocessing import spawn
+    from multiprocessing.context import SpawnContext
 
+    # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     unset = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
     _SET_BY_POOL.update(unset)
+    context: Any = SpawnContext()
+    context.Process, data = _process, spawn.get_preparation_data("")
+    theirs, ours = context.Pipe(duplex=False)
+    told = theirs, {key: data[key] for key in _OF_SCRIPT if key in data}
+    pool = ProcessPoolExecutor(workers, context, initializer=_begin_worker, initargs=told)
     try:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with workers_that_last():
             yield pool
+            pool.shutdown()
     finally:
+        ours.close()  # ends the workers at once, where their work is not wanted any more
+        pool.shutdown(cancel_futures=True)
+        theirs.close()
         _SET_BY_POOL.difference_update(unset)
         for name in unset:
             os.environ.pop(name, None)
 
 
-#: Items that a process takes at a time.
-_LARGEST_CHUNK = 16
+def _process(*args: Any, **kwargs: Any) -> Any:
+    """Return a process that does not import the script of this one, which needs no guard then."""
+    from multiprocessing.context import SpawnProcess
+
+    process: Any = SpawnProcess(*args, **kwargs)
+    process._Popen = _start_without_script
+    return process
 
 
-def in_processes(function: Callable[..., Any], items: Sequence[Any], workers: int) -> Iterator[Any]:
+def _start_without_script(process: Any) -> Any:
+    from multiprocessing import spawn
+    from multiprocessing.context import SpawnProcess
+
+    with _STARTING:
+        prepared, ours = spawn.get_preparation_data, get_ident()
+
+        def without_script(name: str) -> dict[str, object]:
+            left_out = _OF_SCRIPT if get_ident() == ours else ()
+            return {k: v for k, v in prepared(name).items() if k not in left_out}
+
+        spawn.get_preparation_data = without_script
+        try:
+            return SpawnProcess._Popen(process)
+        finally:
+            spawn.get_preparation_data = prepared
+
+
+class _Script(ModuleType):
+    """``__main__`` of a worker: the parent's script, run when a class or function of it is met."""
+
+    def __init__(self, script: Mapping[str, Any]) -> None:
+        super().__init__("__main__")
+        self.__dict__["__script__"] = script
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        from multiprocessing import current_process, spawn
+
+        process: Any = current_process()
+        process._inheriting = True  # refuses processes that the script would start
+        try:
+            spawn.prepare(self.__script__)
+        finally:
+            del process._inheriting
+        return getattr(sys.modules["__main__"], name)
+
+
+def _begin_worker(lifeline: Connection, script: Mapping[str, Any]) -> None:
+    """Prepare a worker to end with its parent, whose end of the pipe closes with it."""
+    import signal
+
+    def watch() -> None:
+        try:
+            lifeline.poll(None)
+        finally:
+            os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's affair
+    if script:
+        sys.modules["__main__"] = _Script(script)
+    Thread(target=watch, daemon=True).start()
+
+
+#: Items that a task has at the most; tasks in flight for each worker.
+_LARGEST_CHUNK, _TASKS = 16, 4
+#: Workers of an executor that does not say how many it has; seconds that a cluster has to answer.
+_WORKERS, _CONNECTING = 64, 30
+
+
+def shared(
+    function: Callable[[Any], Any],
+    items: Iterable[Any],
+    *,
+    workers: int,
+    executor: Executor | None = None,
+) -> Iterator[Any]:
     """Yield what a function returns for each item, in their order; one worker is this process."""
-    workers = min(workers, len(items))
-    if workers < 2:
-        yield from map(function, items)
-        return
-    chunk = max(1, min(_LARGEST_CHUNK, len(items) // (4 * workers)))
-    with worker_pool(workers) as pool:
-        yield from pool.map(function, items, chunksize=chunk)
+    # Items are taken as workers become free, so that neither they nor results pile up.
+    chunk, source, tasks = _LARGEST_CHUNK, iter(items), deque["Future[list[Any]]"]()
+    if executor is not None:
+        workers = getattr(executor, "_max_workers", None) or _WORKERS
+    if isinstance(items, Sized):
+        chunk = max(2, min(chunk, len(items) // (4 * workers)))
+        workers = min(workers, -(-len(items) // chunk))
+    chunks = iter(lambda: list(islice(source, chunk)), [])
+    with ExitStack() as stack:
+        if executor is None and workers < 2:
+            yield from map(function, source)
+            return
+        stack.enter_context(workers_that_last())
+        pool = executor or stack.enter_context(worker_pool(workers))
+        try:
+            while True:
+                some = islice(chunks, _TASKS * workers - len(tasks))
+                tasks.extend(pool.submit(_each, function, chunk) for chunk in some)
+                if not tasks:
+                    return
+                yield from tasks.popleft().result()
+        finally:
+            for task in tasks:
+                task.cancel()
+
+
+def _each(function: Callable[[Any], Any], items: list[Any]) -> list[Any]:
+    return [function(item) for item in items]
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
+    """Yield the executor of a Dask cluster, and how many tasks keep its threads busy just now."""
+    try:
+        from distributed import Client
+
+        client = Client(address, timeout=_CONNECTING)
+    except ModuleNotFoundError as error:
+        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
+        raise MemscalError("Dask (distributed) is not installed.", cure=cure) from error
+    except (OSError, ValueError) as error:
+        cure = "Give the address that the scheduler states, such as tcp://node1:8786."
+        raise InputError(f"No scheduler answers at {address}: {error}", cure=cure) from error
+    with client:
+        executor = client.get_executor()
+        try:
+            yield executor, lambda: 2 * sum(client.nthreads().values()) + 8
+        finally:
+            executor.shutdown(wait=False)  # takes back what waits
+
+
+@contextmanager
+def workers_that_last() -> Iterator[None]:
+    """Say in our words that a worker has ended before its work was done."""
+    from concurrent.futures import BrokenExecutor
+
+    try:
+        yield
+    except BrokenExecutor as failure:
+        raise MemscalError(
+            "A worker process ended before its work was done.",
+            why="It was killed, ran out of memory, or could not load a class of your script.",
+            cure="Give fewer workers, and keep classes of your own in a module that it imports.",
+        ) from failure

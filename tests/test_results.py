@@ -172,7 +172,7 @@ def test_draws_and_scans_are_rows_of_data_frames(drawn: memscal.MonteCarlo, scan
     draws = drawn.to_dataframe()
     np.testing.assert_allclose(draws["gaussian_sigma (m)"], drawn.samples[:, 1])
     assert draws.shape == drawn.samples.shape
-    fleet = memscal.calibrate_many([scan, "missing.h5"])
+    fleet = list(memscal.calibrate_many([scan, "missing.h5"]))
     rows = pandas.concat([result.to_dataframe() for result in fleet])
     assert list(rows.index) == [0, 1]
     u = fleet[0].parameters.uncertainty("conversion_constant")

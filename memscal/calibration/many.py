@@ -1,10 +1,12 @@
 """Calibration of many scans, in processes: a result or an error for each."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
+from inspect import signature
 from os import PathLike
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from memscal.calibration.calibrate import calibrate
 from memscal.deconvolution.division import chosen_method
@@ -14,14 +16,17 @@ from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.result import Result
 from memscal.model.scan import Scan
-from memscal.parallel import in_processes, require_workers
+from memscal.parallel import cores, shared
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FleetCalibration(Result):
     """The calibration of one scan of many, without its fields, or its error.
 
-    ``pandas.concat(result.to_dataframe() for result in results)`` is the table of all scans.
+    ``pandas.concat(result.to_dataframe() for result in results)`` is the table of all scans; of
+    some hundred thousand files ``memscal batch`` writes one.
 
     Parameters
     ----------
@@ -69,29 +74,35 @@ class FleetCalibration(Result):
 
 
 def calibrate_many(
-    scans: Iterable[Scans], *, workers: int = 1, **options: Any
-) -> list[FleetCalibration]:
+    scans: Iterable[Scans], executor: Executor | None = None, **options: Any
+) -> Iterator[FleetCalibration]:
     """Calibrate with many scans, each by itself.
+
+    Scans are taken as workers become free, a few at a time, so that their number does not count
+    in memory.  A script needs no ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     scans : iterable of Scan, path, or sequence of them
-        Scans or their files; a sequence within counts as one, and is fitted together.
-    workers : int, default 1
-        Processes that share the work.  Where these are more than one, a script needs the usual
-        ``if __name__ == "__main__":``.
+        Scans or their files, which a generator may yield; a sequence within counts as one, and is
+        fitted together.
+    executor : concurrent.futures.Executor, optional
+        What calibrates: a pool of processes or threads, or that of a cluster, such as
+        ``dask.distributed.Client(...).get_executor()``.  By default a process for each core.
     **options
         Options of :func:`memscal.calibrate`, the same for all.
 
     Returns
     -------
-    list of FleetCalibration
+    iterator of FleetCalibration
         One for each scan, in their order.  A scan that cannot be used has its error in place.
 
     Raises
     ------
     InputError
-        If the method, one of its options, or the number of processes is wrong.
+        If the method, one of its options, or the executor is wrong.
+    MemscalError
+        From the iterator, if a worker process is killed.
 
     Examples
     --------
@@ -101,32 +112,41 @@ def calibrate_many(
     >>> [result.passed for result in results]
     [True, True, True, False]
     """
-    require_workers(workers)
     if isinstance(scans, Scan | str | PathLike):
         cure = "Give a list of scans; calibrate one with memscal.calibrate(scan)."
         raise InputError("calibrate_many() was given one scan.", cure=cure)
+    if not (executor is None or callable(getattr(executor, "submit", None))):
+        problem = f"The executor is a {type(executor).__name__}, which takes no tasks."
+        raise InputError(problem, cure="Give a concurrent.futures.Executor, or leave it out.")
     method, seed = options.get("method", "white-noise"), options.get("seed", 0)
-    others = ("reference", "alternative", "channel", "method", "correlations", "seed", "relative")
-    of_method = {name: value for name, value in options.items() if name not in others}
+    of_calibrate = signature(calibrate).parameters
+    of_method = {name: value for name, value in options.items() if name not in of_calibrate}
     chosen_method(method, of_method, seed=seed)
-    task = partial(_calibrated, options=options)
-    return list(in_processes(task, list(enumerate(scans)), workers))
+    task, items = partial(_calibrated, options=options), enumerate(scans)
+    sized = list(items) if isinstance(scans, Sized) else items
+    return shared(task, sized, workers=cores(), executor=executor)
+
+
+def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
+    """Return a result, or the error of the scan of that name, which is a result too."""
+    try:
+        return work()
+    except MemscalError as failure:
+        return failure
+    except Exception as failure:  # noqa: BLE001 - the rest must go on
+        return MemscalError(
+            f"{name} met {type(failure).__name__}: {failure}",
+            why="This should have been refused with a reason.",
+            cure="Please report it, with the scan.",
+        )
 
 
 def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:
     """Calibrate one scan; an error is part of its result."""
     index, scan = item
-    try:
-        apparatus = calibrate(scan, **options).apparatus
-    except MemscalError as failure:
-        return FleetCalibration(index=index, budget={}, error=failure)
-    except Exception as failure:  # noqa: BLE001 - the rest must go on
-        error = MemscalError(
-            f"Scan {index} met {type(failure).__name__}: {failure}",
-            why="This should have been refused with a reason.",
-            cure="Please report it, with the scan.",
-        )
-        return FleetCalibration(index=index, budget={}, error=error)
+    apparatus = attempted(f"Scan {index}", lambda: calibrate(scan, **options).apparatus)
+    if isinstance(apparatus, MemscalError):
+        return FleetCalibration(index=index, budget={}, error=apparatus)
     return FleetCalibration(
         index=index,
         parameters=apparatus.parameters,

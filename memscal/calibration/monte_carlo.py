@@ -26,7 +26,7 @@ from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.scan import Scan
-from memscal.parallel import in_processes, require_workers, single_threaded
+from memscal.parallel import require_workers, shared, single_threaded
 
 
 @dataclass(frozen=True)
@@ -311,8 +311,7 @@ def monte_carlo(
     seed : int, default 0
         Every draw has a seed of its own, spawned from this one.
     workers : int, default 1
-        Processes that share the draws.  Where these are more than one, a script needs the usual
-        ``if __name__ == "__main__":``.
+        Processes that share the draws.
     progress : callable, optional
         Called with the number of draws that are done and the number of all draws.
 
@@ -343,7 +342,7 @@ def monte_carlo(
     model = DrawnScans(solution, effects, calibration.correlations, seed)
     rows: list[FloatArray] = []
     failures: list[str] = []
-    for done, result in enumerate(in_processes(model.result, range(draws), workers), start=1):
+    for done, result in enumerate(shared(model.result, range(draws), workers=workers), start=1):
         (failures if isinstance(result, str) else rows).append(result)
         if progress is not None:
             progress(done, draws)

@@ -16,7 +16,7 @@ import click
 from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, Quantity, force_option, json_option, option
+from memscal.cli.options import FILE, Quantity, force_option, json_option, option, options_of
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -127,68 +127,95 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     return [name for name in regulariser_names() if name.startswith(incomplete)]
 
 
+calibration_options = options_of(
+    option("--reference", FILE, metavar="FILE")(
+        "Stress at the base of the film (memscal-reference); or a source, for which film and rod "
+        "are not used: disc:R, slit:W, gaussian:S (radius, width, standard deviation: disc:0.5mm),"
+        " point. Or a field: HDF5, .npy, PNG, TIFF. By default the one in the scan, or else the "
+        "rod is solved on the film. With one that states no film the scan needs none."
+    ),
+    option("--pixel-size", metavar="LENGTH")(
+        "Size of the pixels of a reference that is an array or image, such as 5um."
+    ),
+    option("--alternative", FILE, metavar="FILE")(
+        "The same stress by another model of the film (memscal-reference): its difference is "
+        "counted as an uncertainty of the model's form, in place of the neo-Hookean film's."
+    ),
+    option("--film-law", click.Choice(common.FILM_LAWS))(
+        "Law of the film by which the rod is solved, taken as known. By default the one that scan "
+        "or reference state; else linear, and its difference from neo-hookean is counted "
+        "(model_form)."
+    ),
+    option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
+        "C2/C1 of --film-law mooney-rivlin."
+    ),
+    common.rod_friction_option(
+        "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite"
+        " strain. By default as the scan states it; else it sticks, and the difference is counted."
+    ),
+    option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
+        "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
+    ),
+    option("--channel", click.Choice(("zz", "xz", "yz")), "zz")(
+        "Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
+        "SCAN.xz.apparatus.h5."
+    ),
+    option("--method", metavar="NAME", shell_complete=_complete_method)(
+        "Whose A and G are written: bayesian (from the scan's points: the more precise, for "
+        "friction), or a division of the smoothed voltages by the stress: white-noise (the "
+        "paper's, as its exact expectation), white-noise-draw (one seeded draw, as published), "
+        "tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a plug-in's. The other of "
+        "bayesian and division is computed, too, and stands beside it.  [default: white-noise]"
+    ),
+    option("--centre", click.Choice(("common", "per-repeat")))(
+        "Whether the repeats of a scan share their centre, or each has a centre, baseline and "
+        "drift of its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
+    ),
+    option("--option options", multiple=True, metavar="NAME=VALUE")(
+        "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
+        "the rule chooses). May be repeated."
+    ),
+    option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]"),
+    option("--override", is_flag=True)(
+        "Go on although a reference is of another film, rod or load than its scan: recorded."
+    ),
+    option("--relative", is_flag=True)(
+        "For scans at constant depth or of unknown load: no load counts, A is relative, and states"
+        " no pascals."
+    ),
+)
+"""How a scan is calibrated: what :func:`calibration_settings` takes."""
+
+
+def calibration_settings(
+    *,
+    reference: Path | None,
+    pixel_size: str | None,
+    alternative: Path | None,
+    correlations: tuple[str, ...],
+    method: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    **others: Any,
+) -> dict[str, Any]:
+    """Return the options of :func:`memscal.calibrate` that options of the command line ask for."""
+    regulariser = _chosen_method(method, options, seed, others["channel"])
+    pairs = dict(_correlation(text) for text in correlations)
+    stress = None if reference is None else _read_reference(reference, pixel_size)
+    other = None if alternative is None else _read_reference(alternative)
+    chosen = {"reference": stress, "alternative": other, "method": regulariser, "seed": seed or 0}
+    return chosen | {"correlations": pairs, **others}
+
+
 @click.command("calibrate", epilog=EXAMPLES)
 @click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
 @option("-o --output", FILE, metavar="OUT")(
     "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
 )
-@option("--reference", FILE, metavar="FILE")(
-    "Stress at the base of the film (memscal-reference); or a source, for which film and rod are "
-    "not used: disc:R, slit:W, gaussian:S (radius, width, standard deviation: disc:0.5mm), point. "
-    "Or a field: HDF5, .npy, PNG, TIFF. By default the one in the scan, or else the rod is solved "
-    "on the film. With one that states no film the scan needs none."
-)
-@option("--pixel-size", metavar="LENGTH")(
-    "Size of the pixels of a reference that is an array or image, such as 5um."
-)
-@option("--alternative", FILE, metavar="FILE")(
-    "The same stress by another model of the film (memscal-reference): its difference is counted "
-    "as an uncertainty of the model's form, in place of the neo-Hookean film's."
-)
-@option("--film-law", click.Choice(common.FILM_LAWS))(
-    "Law of the film by which the rod is solved, taken as known. By default the one that scan or "
-    "reference state; else linear, and its difference from neo-hookean is counted (model_form)."
-)
-@option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
-    "C2/C1 of --film-law mooney-rivlin."
-)
-@common.rod_friction_option(
-    "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite "
-    "strain. By default as the scan states it; else it sticks, and the difference is counted."
-)
-@option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
-    "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
-)
-@option("--channel", click.Choice(("zz", "xz", "yz")), "zz")(
-    "Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
-    "SCAN.xz.apparatus.h5."
-)
-@option("--method", metavar="NAME", shell_complete=_complete_method)(
-    "Whose A and G are written: bayesian (from the scan's points: the more precise, for "
-    "friction), or a division of the smoothed voltages by the stress: white-noise (the paper's, "
-    "as its exact expectation), white-noise-draw (one seeded draw, as published), tikhonov, "
-    "wiener, unsupervised-wiener, richardson-lucy, or a plug-in's. The other of bayesian and "
-    "division is computed, too, and stands beside it.  [default: white-noise]"
-)
-@option("--centre", click.Choice(("common", "per-repeat")))(
-    "Whether the repeats of a scan share their centre, or each has a centre, baseline and drift of "
-    "its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
-)
+@calibration_options
 @option("--free", click.Choice(("thickness",)), multiple=True)(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
     "film of a stated law that is not linear; the stated thickness is its prior."
-)
-@option("--option options", multiple=True, metavar="NAME=VALUE")(
-    "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
-    "the rule chooses). May be repeated."
-)
-@option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]")
-@option("--override", is_flag=True)(
-    "Go on although a reference is of another film, rod or load than its scan: recorded."
-)
-@option("--relative", is_flag=True)(
-    "For scans at constant depth or of unknown load: no load counts, A is relative, and states no "
-    "pascals."
 )
 @json_option
 @option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
@@ -215,10 +242,6 @@ def command(
     output: Path | None,
     reference: Path | None,
     alternative: Path | None,
-    correlations: tuple[str, ...],
-    method: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
     as_json: bool,
     report: Path | None,
     figures: tuple[Path, ...],
@@ -246,27 +269,24 @@ def command(
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or out.beside(scans[0], ending)
     outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
-    regulariser = _chosen_method(method, options, seed, channel)
-    settings["correlations"] = dict(_correlation(text) for text in correlations)
-    data, profile = _read(scans, reference, settings.pop("pixel_size"))
-    other = None if alternative is None else _read_reference(alternative)
+    settings = calibration_settings(reference=reference, alternative=alternative, **settings)
+    data, seed = _read(scans, reference, settings["reference"]), settings["seed"]
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, other, regulariser, settings, outputs, as_json)
+        _rehearse(data, settings, outputs, as_json)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
 
-    chosen = {"method": regulariser, "seed": seed or 0, **settings}
-    with out.working(f"Calibrating by {regulariser.name}"):
-        calibration = calibrate(data, reference=profile, alternative=other, **chosen)
+    with out.working(f"Calibrating by {settings['method'].name}"):
+        calibration = calibrate(data, **settings)
     further: dict[str, Sweep | MonteCarlo] = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
-            further["sweep"] = calibration.sweep(seed=seed or 0)
+            further["sweep"] = calibration.sweep(seed=seed)
     if draws is not None:
-        further["monte_carlo"] = _drawn(calibration, draws, seed or 0)
+        further["monte_carlo"] = _drawn(calibration, draws, seed)
     with out.working("Drawing"):
         contents = {}
         if report is not None:
@@ -282,18 +302,17 @@ def command(
 
 
 def _read(
-    paths: tuple[Path, ...], reference: Path | None, pixel_size: str | None
-) -> tuple[list[Scan], StressProfile | None]:
+    paths: tuple[Path, ...], reference: Path | None, profile: StressProfile | None
+) -> list[Scan]:
     from memscal.estimation.reference import require_calibration_rod
     from memscal.formats.scan import read_scan
 
     scans = [read_scan(path) for path in paths]
-    profile = None if reference is None else _read_reference(reference, pixel_size)
     for scan, path in zip(scans, paths, strict=True):
         require_calibration_rod(scan, profile)
         if reference is not None and scan.reference is not None:
             out.note(f"{reference.name} is used in place of the reference in {path.name}.")
-    return scans, profile
+    return scans
 
 
 def _read_reference(path: Path, pixel_size: str | None = None) -> StressProfile:
@@ -314,9 +333,6 @@ def _read_reference(path: Path, pixel_size: str | None = None) -> StressProfile:
 
 def _rehearse(
     scans: list[Scan],
-    profile: StressProfile | None,
-    alternative: StressProfile | None,
-    regulariser: Method,
     settings: dict[str, Any],
     outputs: Sequence[Path],
     as_json: bool,
@@ -329,11 +345,12 @@ def _rehearse(
     from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
-    channel, plan = settings["channel"], (regulariser.name, outputs)
-    require_channel_method(channel, regulariser)
+    channel, plan = settings["channel"], (settings["method"].name, outputs)
+    require_channel_method(channel, settings["method"])
     law = settings["film_law"], settings["mooney_rivlin_ratio"], settings["rod_friction"]
     flags = {name: settings[name] for name in ("override", "relative")}
-    prepared = prepare(scans, profile, alternative, law, pixel_size=None, **flags)
+    references = settings["reference"], settings["alternative"]
+    prepared = prepare(scans, *references, law, pixel_size=None, **flags)
     out.show_messages(override_messages(prepared.overridden))
     separate, owners = list(prepared.scans), tuple(range(len(prepared.scans)))
     if settings["centre"] == "per-repeat":

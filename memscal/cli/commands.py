@@ -10,6 +10,8 @@ from memscal.version import __version__
 
 COMMANDS = {
     "calibrate": ("calibrate", "Find a sensor's apparatus function from a rod scan."),
+    "batch": ("batch", "Calibrate a folder of scans, or those of a manifest."),
+    "summary": ("summary", "Summarise the results of a batch: distributions, outliers, map."),
     "reference": ("reference", "Solve the stress at the base of a film under an indenter."),
     "apply": ("apply", "Turn contact scans into measured stress, load by load."),
     "restore": ("restore", "Restore the stress at the base of a film from a scan."),
@@ -69,7 +71,7 @@ Examples:
 \b
 Exit codes:
   0    done
-  1    done, but a quality check failed; the artifact is marked so
+  1    done, but a quality check failed, or a scan of a batch; the results say so
   2    wrong usage of a command
   3    the input was refused
   4    the output was not written; what was there before is untouched

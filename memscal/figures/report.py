@@ -1,13 +1,14 @@
-"""Report of a calibration as one HTML page, without other files, network or scripts."""
+"""Reports as HTML pages, of a calibration first, without other files, network or scripts."""
 
 import base64
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
 from string import Template
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from memscal.figures.calibration import calibration_figure, values_text
 from memscal.figures.style import render_figure
@@ -34,15 +35,29 @@ def html_report(data: ApparatusData) -> str:
         "What was measured on": _setting(data).html(),
         "Provenance": _provenance(data),
     }
+    return html_page(title, _verdict_text(data), sections, failed=not data.passed)
+
+
+def html_page(title: str, verdict: str, sections: Mapping[str, str], *, failed: bool) -> str:
+    """Return a page of a title, a verdict, and sections of HTML by their headings."""
     body = "\n".join(
         f"<section>\n<h2>{escape(heading)}</h2>\n{content}\n</section>"
         for heading, content in sections.items()
     )
-    kind = "verdict" if data.passed else "verdict failed"
-    verdict = f'<p class="{kind}" role="note">{escape(_verdict_text(data))}</p>'
-    heading = f"<h1>{escape(title)}</h1>\n{verdict}\n"
+    kind = "verdict failed" if failed else "verdict"
+    note = f'<p class="{kind}" role="note">{escape(verdict)}</p>'
+    heading = f"<h1>{escape(title)}</h1>\n{note}\n"
     page = Template(_PAGE.read_text(encoding="utf-8"))
     return page.substitute(title=escape(title), body=heading + body)
+
+
+def html_figure(figure: Figure, alt: str, caption: str) -> str:
+    """Return a figure with its caption, as an image that the page holds."""
+    svg = base64.b64encode(render_figure(figure, "svg")).decode("ascii")
+    return (
+        f'<figure>\n<img alt="{escape(alt)}" src="data:image/svg+xml;base64,{svg}">\n'
+        f"<figcaption>{escape(caption)}</figcaption>\n</figure>"
+    )
 
 
 def _verdict_text(data: ApparatusData) -> str:
@@ -129,7 +144,6 @@ def _provenance(data: ApparatusData) -> str:
 
 
 def _figure(data: ApparatusData) -> str:
-    svg = base64.b64encode(render_figure(calibration_figure(data), "svg")).decode("ascii")
     alt = (
         f"Panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
         f"the apparatus function with its band, linear and logarithmic; the transfer function "
@@ -142,7 +156,4 @@ def _figure(data: ApparatusData) -> str:
         "the Gaussian. f: transfer function; hatched, what the scan does not resolve. Of a scan "
         "over the plane, from g: voltage, residuals and G; at several loads a row for each."
     )
-    return (
-        f'<figure>\n<img alt="{escape(alt)}" src="data:image/svg+xml;base64,{svg}">\n'
-        f"<figcaption>{escape(caption)}</figcaption>\n</figure>"
-    )
+    return html_figure(calibration_figure(data), alt, caption)

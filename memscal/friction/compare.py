@@ -157,7 +157,7 @@ def compare(
     cache : path, optional
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
-        Processes that calculate contacts; more than one needs a script's ``__main__`` guard.
+        Processes that calculate contacts.
 
     Returns
     -------

@@ -46,6 +46,7 @@ SENSOR = record(
     "NXsensor",
     Quantity("name", "text", "name of the sensor", origin="sensor"),
     Quantity("model", "text", "model of the sensor", origin="sensor_model"),
+    Quantity("serial_number", "text", "serial number of the sensor"),
     Quantity("channel", "text", "channel of the sensor", origin="channel"),
 )
 _CONSTANT = Quantity("conversion_constant", _A, "conversion constant", "A", required=True)

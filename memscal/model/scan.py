@@ -291,6 +291,7 @@ class StressSensor:
     name: str = ""
     model: str = ""
     channel: str = "zz"
+    serial_number: str = ""
 
 
 class SetUp(NamedTuple):

@@ -17,6 +17,7 @@ from memscal import EvenGrid, Scan, StressProfile
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
+from memscal.parallel import worker_pool
 
 pytestmark = pytest.mark.benchmark
 
@@ -155,9 +156,11 @@ def test_two_processes_calibrate_faster_than_a_loop() -> None:
             memscal.calibrate(scan, method="evidence")
 
     memscal.calibrate(scans[0], method="evidence")
+
+    def fleet() -> None:
+        with worker_pool(2) as pool:
+            list(memscal.calibrate_many(scans, pool, method="evidence"))
+
     # The better of two: what else the machine does is not ours.
-    fleet = min(
-        once(lambda: memscal.calibrate_many(scans, workers=2, method="evidence")) for _ in range(2)
-    )
-    plain = min(once(loop) for _ in range(2))
-    show(f"{SCANS} scans on two processes, over a loop", fleet / plain, ALLOWED)
+    shared, plain = (min(once(job) for _ in range(2)) for job in (fleet, loop))
+    show(f"{SCANS} scans on two processes, over a loop", shared / plain, ALLOWED)

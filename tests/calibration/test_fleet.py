@@ -1,7 +1,15 @@
 import os
 import pickle
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +18,7 @@ from helpers.scans import simulated
 import memscal
 from memscal import FleetCalibration, Scan
 from memscal.calibration import many as fleet
-from memscal.parallel import worker_pool
+from memscal.parallel import shared, worker_pool
 
 
 def scans(count: int) -> list[Scan]:
@@ -22,28 +30,37 @@ def constant(result: FleetCalibration) -> float:
     return result.parameters["conversion_constant"]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_every_scan_says_what_it_says_by_itself(workers: int) -> None:
+EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor | None]]] = {
+    "default": nullcontext,
+    "threads": partial(ThreadPoolExecutor, 2),
+    "processes": partial(ProcessPoolExecutor, 2, mp_context=get_context("spawn")),
+}
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_every_scan_says_what_it_says_by_itself(kind: str) -> None:
     given = scans(5)
-    found = memscal.calibrate_many(given, workers=workers, method="bayesian")
-    assert [one.index for one in found] == list(range(5))
-    for one, scan in zip(found, given, strict=True):
+    with EXECUTORS[kind]() as executor:
+        results = list(memscal.calibrate_many(given, executor, method="bayesian"))
+    assert [result.index for result in results] == list(range(5))
+    for result, scan in zip(results, given, strict=True):
         alone = memscal.calibrate(scan, method="bayesian").apparatus
-        assert constant(one) == pytest.approx(alone.conversion_constant, rel=1e-9)
+        assert constant(result) == pytest.approx(alone.conversion_constant, rel=1e-9)
         covariance, g = alone.parameters.covariance, alone.radial_profile.g
-        np.testing.assert_allclose(one.parameters.covariance, covariance, rtol=1e-6, atol=1e-30)
-        np.testing.assert_allclose(one.radial_profile.g, g, rtol=1e-9, atol=1e-9 * g.max())
-        assert one.resolved_wavenumber == pytest.approx(alone.resolved_wavenumber, rel=1e-9)
-        assert [check.name for check in one.checks] == [check.name for check in alone.checks]
-        assert one.passed == alone.passed
+        np.testing.assert_allclose(result.parameters.covariance, covariance, rtol=1e-6, atol=1e-30)
+        np.testing.assert_allclose(result.radial_profile.g, g, rtol=1e-9, atol=1e-9 * g.max())
+        assert result.resolved_wavenumber == pytest.approx(alone.resolved_wavenumber, rel=1e-9)
+        assert [check.name for check in result.checks] == [check.name for check in alone.checks]
+        assert result.passed == alone.passed
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_bad_scan_has_its_error_in_place(workers: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["default", "threads"])
+def test_a_bad_scan_has_its_error_in_place(kind: str, tmp_path: Path) -> None:
     good = scans(3)
     flat = replace(good[0], u_zz=np.zeros_like(good[0].u_zz))
     given = [good[0], flat, good[1], tmp_path / "missing.h5", good[2]]
-    found = memscal.calibrate_many(given, workers=workers)
+    with EXECUTORS[kind]() as executor:
+        found = list(memscal.calibrate_many(given, executor))
     assert [one.error is None for one in found] == [True, False, True, False, True]
     assert "Every voltage of the scan" in found[1].error.problem
     assert found[1].error.cure == "Check the channel."
@@ -54,12 +71,73 @@ def test_a_bad_scan_has_its_error_in_place(workers: int, tmp_path: Path) -> None
     assert constant(found[2]) == pytest.approx(1e-7, rel=0.1)
 
 
+class Counting(ThreadPoolExecutor):
+    """Threads that count the tasks they are given."""
+
+    tasks = 0
+
+    def submit(self, *arguments: Any, **options: Any) -> Any:
+        self.tasks += 1
+        return super().submit(*arguments, **options)
+
+
+def test_scans_are_taken_as_workers_become_free_and_several_are_a_task(monkeypatch) -> None:
+    monkeypatch.setattr(fleet, "attempted", lambda *_: memscal.MemscalError("not needed"))
+    taken = 0
+
+    def endless() -> Iterator[str]:
+        nonlocal taken
+        while True:
+            taken += 1
+            yield "scan.h5"
+
+    with Counting(2) as executor:
+        results = memscal.calibrate_many(endless(), executor)
+        assert taken == 0
+        assert [next(results).index for _ in range(1000)] == list(range(1000))
+        assert 1000 <= taken < 1200
+        assert executor.tasks < taken / 10
+        results.close()
+        list(memscal.calibrate_many(["scan.h5"] * 20, executor))
+        assert executor.tasks < taken / 10 + 20
+
+
+SCRIPT = """
+import memscal
+from memscal.deconvolution.division import Tikhonov
+
+class Half(Tikhonov):
+    pass
+
+print("The script runs.")
+if {condition}:
+    scans = (memscal.simulate(points=33, noise=0.004, seed=seed) for seed in range(3))
+    print([result.error for result in memscal.calibrate_many(scans, **{options})])
+"""
+
+
+@pytest.mark.parametrize(("condition", "options", "most"), [
+    ("True", "{}", 1),
+    ("__name__ == '__main__'", "{'method': Half()}", 9),  # workers need a class of the script
+])  # fmt: skip
+def test_a_script_needs_no_guard(condition: str, options: str, most: int, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.format(condition=condition, options=options))
+    run = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    assert run.stdout.endswith("[None, None, None]\n")
+    assert 1 <= run.stdout.count("runs") <= most
+
+
 def test_what_is_no_error_of_ours_is_reported_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(scan: Scan, **_: object) -> object:
         raise ZeroDivisionError("float division by zero")
 
     monkeypatch.setattr(fleet, "calibrate", broken)
-    found = memscal.calibrate_many(scans(2))
+    with ThreadPoolExecutor(2) as executor:
+        found = list(memscal.calibrate_many(scans(2), executor))
     assert all(one.error is not None and "ZeroDivisionError" in str(one.error) for one in found)
 
 
@@ -67,7 +145,7 @@ def test_files_and_joint_scans_are_calibrated(tmp_path: Path) -> None:
     first, second = scans(2)
     path = tmp_path / "scan.h5"
     memscal.write_scan(first, path)
-    found = memscal.calibrate_many([path, [first, second]], method="bayesian")
+    found = list(memscal.calibrate_many([path, [first, second]], method="bayesian"))
     alone = memscal.calibrate(first, method="bayesian").apparatus
     joint = memscal.calibrate([first, second], method="bayesian").apparatus
     assert constant(found[0]) == pytest.approx(alone.conversion_constant, rel=1e-9)
@@ -76,16 +154,16 @@ def test_files_and_joint_scans_are_calibrated(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    *[({"workers": workers}, "workers is") for workers in (0, -1, 1.5, 1000)],
-    ({"method": "nonsense"}, "nonsense"), ({"method": "bayesian", "bogus": 1}, "bogus"),
+    ({"executor": 2}, "executor is a int"), ({"film_law": "linear", "bogus": 1}, "bogus"),
+    ({"method": "nonsense"}, "nonsense"), ({"method": "bayesian", "film_laws": "a"}, "film_laws"),
 ])  # fmt: skip
-def test_a_wrong_number_of_processes_method_or_option_is_refused_at_once(options, words) -> None:
+def test_a_wrong_executor_method_or_option_is_refused_at_once(options, words) -> None:
     with pytest.raises(memscal.MemscalError, match=words):
         memscal.calibrate_many(scans(2), **options)
 
 
 def test_one_scan_is_no_list_and_no_scans_are_no_results() -> None:
-    assert memscal.calibrate_many([], workers=2) == []
+    assert list(memscal.calibrate_many([])) == []
     with pytest.raises(memscal.MemscalError, match="one scan"):
         memscal.calibrate_many(scans(1)[0])
 
@@ -98,6 +176,28 @@ def test_a_scan_survives_pickling() -> None:
     assert again.indenter == scan.indenter
     assert dict(again.channels).keys() == {"u_xz"}
     assert not again.u_zz.flags.writeable
+
+
+def test_workers_end_when_their_parent_is_killed() -> None:
+    program = """
+import os, signal, time
+from memscal.parallel import worker_pool
+with worker_pool(2) as pool:
+    first = [pool.submit(os.getpid) for _ in range(2)][0].result(60)
+    sleeping = [pool.submit(time.sleep, 600) for _ in range(4)]
+    print(first, flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    # The pipe would stay open, and run() wait, if a worker went on.
+    command = [sys.executable, "-c", program]
+    run = subprocess.run(command, stdout=subprocess.PIPE, timeout=60, check=False)
+    assert run.returncode == -9
+    assert int(run.stdout)
+
+
+def test_a_worker_that_is_killed_is_an_error_of_ours() -> None:
+    with pytest.raises(memscal.MemscalError, match="A worker process ended"):
+        list(shared(os._exit, range(8), workers=2))
 
 
 def test_processes_are_told_one_thread_and_the_environment_is_put_back() -> None:

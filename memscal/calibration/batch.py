@@ -1,0 +1,226 @@
+"""Batch of calibrations: shards of scans, each a task and a Parquet file that proves its work."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from memscal.calibration.calibrate import calibrate
+from memscal.calibration.many import attempted
+from memscal.errors import MemscalError, OutputError
+from memscal.formats.files import ensure_writable, read_bytes
+from memscal.formats.fleet import (
+    DIGEST,
+    FleetScan,
+    arrow,
+    fleet_row,
+    manifest_scans,
+    read_shard,
+    shard_paths,
+    write_shard,
+)
+from memscal.formats.scan import read_scan
+from memscal.model.provenance import timestamp
+from memscal.model.stress import StressProfile
+from memscal.version import __version__
+
+_LONGEST_STEM = 80
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Scans that are calibrated as one task; ``first`` is the place of the first of them."""
+
+    number: int
+    first: int
+    scans: tuple[FleetScan, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of its table, and of its folder of artifacts."""
+        return f"shard-{self.number:06d}"
+
+
+@dataclass(frozen=True)
+class ShardOutcome:
+    """How many scans a shard has, how many of them have an error, and how many a failed check."""
+
+    scans: int
+    errors: int
+    failed: int
+    kept: bool  # its file was there already
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What is calibrated how: ``options`` are those of :func:`memscal.calibrate`.
+
+    ``source`` is a folder of scans, or a manifest; ``results`` the folder of the results.
+    ``artifacts`` are written of calibrations with a failed check (``failed``), of ``all``, or of
+    ``none``.
+    """
+
+    source: Path
+    results: Path
+    options: Mapping[str, Any]
+    artifacts: str
+    shard_size: int
+    version: str = __version__
+
+    @cached_property
+    def options_sha256(self) -> str:
+        """Digest of the options; a reference counts by the digest of its file."""
+        stated = {
+            name: value.source or value.form if isinstance(value, StressProfile) else value
+            for name, value in self.options.items()
+        }
+        return _sha256_of((stated, self.artifacts))
+
+    @property
+    def folder(self) -> Path:
+        """What the paths of the scans are relative to."""
+        return self.source if self.source.is_dir() else self.source.parent
+
+    def shards(self) -> Iterator[Shard]:
+        """Yield the shards in their order, listing the scans as they are needed."""
+        scans, number = manifest_scans(self.source), 0
+        while some := tuple(islice(scans, self.shard_size)):
+            yield Shard(number, number * self.shard_size, some)
+            number += 1
+
+    def table(self, shard: Shard) -> Path:
+        """Return the path of a shard's table."""
+        return self.results / "shards" / f"{shard.name}.parquet"
+
+    def prepare(self, *, resume: bool) -> int:
+        """Make the folder of results, if it may be used, and return the number of scans."""
+        arrow()
+        count = sum(1 for _ in manifest_scans(self.source))
+        if not count:
+            cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
+            raise MemscalError(f"{self.source} holds no scans.", cure=cure)
+        stays = "It may hold results, which are not replaced."
+        with suppress(FileNotFoundError, NotADirectoryError):
+            if not resume and any(self.results.iterdir()):
+                cure = "Continue them with --resume, or give another folder."
+                raise OutputError(f"The folder {self.results} exists.", why=stays, cure=cure)
+        shards = -(-count // self.shard_size)
+        numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(self.results)]
+        if max(numbers, default=0) >= shards:
+            problem = f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}."
+            cure = "Resume with the manifest and the --shard-size that it was begun with."
+            raise OutputError(problem, why=stays, cure=cure)
+        try:
+            (self.results / "shards").mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            cure = "Give a folder in which you may write."
+            problem = f"The folder {self.results} cannot be made: {error.strerror}."
+            raise OutputError(problem, cure=cure) from error
+        ensure_writable(self.results / "shards" / "proof")
+        return count
+
+    def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
+        """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""
+        shards, tasks = self.shards(), set[Future[ShardOutcome]]()
+        lost: list[str] = []
+        try:
+            while True:
+                some = islice(shards, max(0, most() - len(tasks)))
+                tasks |= {executor.submit(run_shard, self, shard) for shard in some}
+                if not tasks:
+                    break
+                done, tasks = wait(tasks, return_when=FIRST_COMPLETED)
+                for task in done:
+                    try:
+                        yield task.result()
+                    except (MemscalError, BrokenExecutor):
+                        raise
+                    except Exception as failure:  # noqa: BLE001 - of a cluster: workers that died
+                        lost.append(type(failure).__name__)
+        finally:
+            for task in tasks:
+                task.cancel()
+        if lost:
+            raise MemscalError(
+                f"The workers of {len(lost)} shards were lost ({', '.join(sorted(set(lost)))}).",
+                why="They were killed or ran out of memory, with one shard several times.",
+                cure="Give the workers more memory, and run the same command with --resume.",
+            )
+
+
+def _sha256_of(value: object) -> str:
+    return hashlib.sha256(repr(value).encode()).hexdigest()
+
+
+def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
+    """Calibrate the scans of a shard, unless its file is there and is of the same work."""
+    if batch.version != __version__:
+        problem = f"A worker has memscal {__version__}, the batch {batch.version}."
+        raise MemscalError(problem, cure="Install the same version everywhere.")
+    rows = _kept_rows(batch, shard)
+    kept = bool(rows)
+    if not kept:
+        rows = [_row(batch, shard, i) for i in range(len(shard.scans))]
+        digest = _digest(batch, shard, [row["input_sha256"] for row in rows])
+        write_shard(batch.table(shard), rows, digest)
+    errors = sum(row["error"] is not None for row in rows)
+    failed = sum(not row["passed"] for row in rows) - errors
+    return ShardOutcome(len(rows), errors, failed, kept)
+
+
+def _kept_rows(batch: Batch, shard: Shard) -> list[dict[str, Any]]:
+    """Return what a shard's file says, if it opens whole and its digest is that of this work."""
+    if batch.table(shard).exists():
+        with suppress(MemscalError):
+            table = read_shard(batch.table(shard))
+            inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
+            if table.schema.metadata.get(DIGEST.encode()) == _digest(batch, shard, inputs).encode():
+                rows: list[dict[str, Any]] = table.select(["passed", "error"]).to_pylist()
+                return rows
+    return []
+
+
+def _digest(batch: Batch, shard: Shard, inputs: list[str | None]) -> str:
+    """Return the digest of version, options, and of the contents and places of the scans."""
+    return _sha256_of((batch.version, batch.options_sha256, shard, inputs))
+
+
+def _sha256_of_file(path: Path) -> str | None:
+    """Return the digest of a file, ``None`` of one that cannot be read."""
+    with suppress(MemscalError):
+        return hashlib.sha256(read_bytes(path)).hexdigest()
+    return None
+
+
+def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
+    """Calibrate a scan and return its row; an error is a row, too."""
+    item, path = shard.scans[i], batch.folder / shard.scans[i].path
+    row: dict[str, Any] = {"place": shard.first + i, **asdict(item), "passed": False}
+    row |= {"calibrated_at": timestamp(), "options_sha256": batch.options_sha256}
+    row |= {"version": batch.version, "error": None}
+    scan = attempted(item.path, lambda: read_scan(path))
+    if isinstance(scan, MemscalError):
+        return row | _of_error(scan) | {"input_sha256": _sha256_of_file(path)}
+    row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}
+    row["input_sha256"] = scan.source and scan.source.sha256
+    apparatus = attempted(item.path, lambda: calibrate(scan, **batch.options).apparatus)
+    if isinstance(apparatus, MemscalError):
+        return row | _of_error(apparatus)
+    if batch.artifacts == "all" or (batch.artifacts == "failed" and not apparatus.passed):
+        name = f"{shard.first + i:07d}-{path.stem[:_LONGEST_STEM]}.apparatus.h5"
+        artifact = Path("artifacts", shard.name, name)
+        row["artifact"] = artifact.as_posix()
+        (batch.results / artifact).parent.mkdir(parents=True, exist_ok=True)
+        apparatus.save(batch.results / artifact, overwrite=True)
+    return row | fleet_row(apparatus)
+
+
+def _of_error(error: MemscalError) -> dict[str, str]:
+    return {"error_class": type(error).__name__, "error": str(error)}

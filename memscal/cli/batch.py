@@ -1,0 +1,146 @@
+"""``memscal batch``: many scans, each by itself, in shards, to Parquet tables."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from memscal.cli import output as out
+from memscal.cli.calibrate import calibration_options, calibration_settings
+from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.options import FILE, json_option, option
+from memscal.errors import MemscalError
+from memscal.summaries.table import Table
+
+if TYPE_CHECKING:
+    from memscal.calibration.batch import Batch, ShardOutcome
+
+#: Seconds between two lines about the progress, where it is not shown on a terminal.
+_EVERY = 60.0
+
+EXAMPLES = """\b
+Examples:
+  memscal batch scans -o results
+  memscal batch wafer.csv -o results --resume --method bayesian --artifacts none
+  memscal batch wafer.csv -o results --resume --scheduler tcp://node1:8786
+  memscal summary results
+"""
+
+
+@click.command("batch", epilog=EXAMPLES)
+@click.argument("source", type=FILE, metavar="FOLDER|MANIFEST")
+@option("-o --output results", FILE, metavar="RESULTS", required=True)(
+    "Folder of the results, which must not exist yet: tables (Parquet) in RESULTS/shards, "
+    "artifacts in RESULTS/artifacts."
+)
+@option("--resume", is_flag=True)(
+    "Continue in RESULTS: shards stay if their file is whole and is of the same scans, options and "
+    "version; the others are calibrated."
+)
+@option("--workers", click.IntRange(1, 512), metavar="N")(
+    "Processes on this machine.  [default: one for each core]"
+)
+@option("--scheduler", metavar="ADDRESS")(
+    "Scheduler of a Dask cluster, such as tcp://node1:8786, whose workers see the same files."
+)
+@option("--shard-size", click.IntRange(min=2), 256, metavar="SCANS")(
+    "Scans of a shard: a task, and a table. What is under way when a batch is killed is lost."
+)
+@option("--artifacts", click.Choice(("failed", "all", "none")), "failed")(
+    "Of which calibrations artifacts are written, too: of those with a failed check, all, or none."
+)
+@calibration_options
+@json_option
+@debug_option
+def command(
+    source: Path,
+    results: Path,
+    resume: bool,
+    workers: int | None,
+    scheduler: str | None,
+    shard_size: int,
+    artifacts: str,
+    as_json: bool,
+    **settings: Any,
+) -> int:
+    """Calibrate with every scan in a folder, or with those that a manifest lists.
+
+    A manifest is a text file with the path of a scan a line, relative to its own folder, or a CSV
+    file with a column path and optional wafer_x, wafer_y (mm), the sensor's place on its wafer.
+
+    Each scan is a row of a table: A, widths, uncertainties, checks, G(r), digests; a scan that
+    cannot be calibrated has its error there, and the exit code is 1. What is done stays when the
+    program is interrupted or killed: --resume does the rest.
+    """
+    if workers and scheduler:
+        raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
+    from memscal.calibration.batch import Batch
+
+    chosen = calibration_settings(**settings)
+    batch = Batch(source.resolve(), results.resolve(), chosen, artifacts, shard_size)
+    total, start = batch.prepare(resume=resume), monotonic()
+    try:
+        outcomes = list(_outcomes(batch, workers, scheduler, total))
+    except (KeyboardInterrupt, MemscalError):
+        out.note("The shards that are done stay: --resume does the rest.")
+        raise
+    errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
+    kept, seconds = sum(outcome.kept for outcome in outcomes), round(monotonic() - start, 1)
+    counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
+    counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
+    if as_json:
+        stated = {"schema_version": "1", "results": str(results), **counts, "seconds": seconds}
+        out.emit_json(stated)
+    else:
+        rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
+        out.emit_tables(
+            Table(f"Batch of {source.name}", ("", ""), [*rows, ("time", _span(seconds))])
+        )
+    out.message(f"Written: {results}")
+    if not errors + failed:
+        return DONE
+    what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
+    out.warn(f"{what}: memscal summary {results}")
+    return CHECK_FAILED
+
+
+def _outcomes(
+    batch: Batch, workers: int | None, scheduler: str | None, total: int
+) -> Iterator[ShardOutcome]:
+    """Yield the outcomes of a batch, and show how far it is."""
+    from memscal.parallel import cluster, cores, worker_pool
+
+    start = said = monotonic()
+    done = calibrated = 0
+    with ExitStack() as stack:
+        if scheduler:
+            executor, most = stack.enter_context(cluster(scheduler))
+        else:
+            count = workers or cores()
+            executor, most = stack.enter_context(worker_pool(count)), lambda: 2 * count
+        show = stack.enter_context(out.working(f"Calibrating {total} scans"))
+        for outcome in batch.run(executor, most):
+            done += outcome.scans
+            calibrated += 0 if outcome.kept else outcome.scans
+            text, rate = f"{done} of {total} scans", calibrated / (monotonic() - start)
+            if rate:
+                text += f", {_span((total - done) / rate)} left, {rate:.3g} a second"
+            show(text)
+            if not (sys.stderr and sys.stderr.isatty()) and monotonic() - said >= _EVERY:
+                out.message(text)
+                said = monotonic()
+            yield outcome
+
+
+def _span(seconds: float) -> str:
+    """Return a time in words: 12 s, 3 min, 2.5 h."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.0f} s"

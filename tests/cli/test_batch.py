@@ -1,0 +1,274 @@
+"""Batches: shards that prove their work, resumption, failures as rows, and their summary."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from helpers.console import Outcome, Run
+from helpers.scans import simulated
+
+import memscal
+from memscal.formats.fleet import read_fleet
+
+COUNT, SHARD = 12, 2
+FLAT, DRIFTING, NONSENSE, MISSING, LARGE = 2, 3, 5, 9, 11
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of scans, of which some cannot be used, and a manifest with places on a wafer."""
+    folder = tmp_path_factory.mktemp("fleet")
+    (folder / "scans").mkdir()
+    lines = ["# a wafer", "path, wafer_x (mm), wafer_y (mm), operator"]
+    for i in range(COUNT):
+        options = {"drift": 0.3 if i == DRIFTING else 0.0}
+        a = 1.5e-7 if i == LARGE else 1e-7
+        scan = simulated(noise=0.004, points=33, seed=i, conversion_constant=a, **options)
+        sensor = memscal.StressSensor(name=f"S{i}", serial_number=f"W7-{i:03}")
+        scan = replace(scan, sensor=sensor, u_zz=scan.u_zz * (i != FLAT))
+        lines.append(f"scans/s{i:02}.h5, {i % 4}, {i // 4}, me")
+        if i != MISSING:
+            memscal.write_scan(scan, folder / "scans" / f"s{i:02}.h5")
+    (folder / "scans" / f"s{NONSENSE:02}.h5").write_text("nonsense")
+    (folder / "wafer.csv").write_text("\n".join(lines))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(fleet: Path) -> Path:
+    """The results of an uninterrupted batch."""
+    assert batch(fleet / "wafer.csv", fleet / "results").wait() == 1
+    return fleet / "results"
+
+
+@pytest.fixture
+def copy(results: Path, fleet: Path, folder: Path) -> Path:
+    """A folder with the scans, their manifest and results, to be spoilt."""
+    shutil.copytree(fleet, folder / "fleet")
+    return folder / "fleet"
+
+
+def arguments(source: Path, results: Path, *further: str) -> list[str]:
+    sizes = ["--shard-size", str(SHARD), "--workers", "1", *further]
+    return ["batch", str(source), "-o", str(results), *sizes]
+
+
+def shards_of(outcome: Outcome) -> tuple[int, int]:
+    """How many shards were written, and how many kept."""
+    return outcome.json["shards_written"], outcome.json["shards_kept"]
+
+
+def batch(*given: Path | str) -> subprocess.Popen[bytes]:
+    """Start a batch as a process of its own."""
+    return subprocess.Popen([sys.executable, "-m", "memscal", *arguments(*given)])
+
+
+def tables(results: Path) -> pd.DataFrame:
+    return pd.read_parquet(results / "shards").drop(columns="calibrated_at")
+
+
+def test_a_row_says_what_a_calibration_says(results: Path, fleet: Path) -> None:
+    rows = pd.read_parquet(results / "shards")
+    assert list(rows["place"]) == list(range(COUNT))
+    path = fleet / "scans" / "s01.h5"
+    row, alone = rows.iloc[1], memscal.calibrate(path).apparatus
+    assert row["path"] == "scans/s01.h5"
+    assert (row["sensor"], row["serial_number"]) == ("S1", "W7-001")
+    assert row["input_sha256"] == alone.process.input_scan.sha256
+    assert (row["wafer_x"], row["wafer_y"], row["passed"]) == (1, 0, alone.passed)
+    u = alone.parameters.uncertainty
+    expected = {
+        "conversion_constant": alone.conversion_constant * 1e3,
+        "conversion_constant_errors": u("conversion_constant") * 1e3,
+        "gaussian_sigma": alone.gaussian_sigma * 1e3, "fwhm_errors": u("fwhm") * 1e3,
+        "noise_equivalent_area": alone.parameters["noise_equivalent_area"] * 1e6,
+        "resolved_wavenumber": alone.resolved_wavenumber * 1e-3,
+    }  # fmt: skip
+    assert dict(row[list(expected)]) == pytest.approx(expected, rel=1e-9)
+    np.testing.assert_allclose(row["g"], alone.radial_profile.g * 1e-6, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(row["r"], alone.radial_profile.r * 1e3, rtol=1e-6)
+    names, covariance = list(row["correlated"]), alone.parameters.only(row["correlated"]).covariance
+    pairs = list(zip(*np.triu_indices(len(names), 1), strict=True))
+    with_sigma = pairs.index((0, names.index("gaussian_sigma")))
+    expected_r = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    assert row["correlation"][with_sigma] == pytest.approx(expected_r, rel=1e-5)
+    of_a = {b["source"]: b["errors"] for b in row["budget"] if b["quantity"] == names[0]}
+    assert of_a["noise"] == pytest.approx(alone.budget[names[0]]["noise"] * 1e3, rel=1e-6)
+    for stored, check in zip(row["checks"], alone.checks, strict=True):
+        assert (stored["name"], stored["passed"]) == (check.name, check.passed)
+        assert stored["value"] == pytest.approx(check.value, rel=1e-6)
+
+
+def test_units_and_versions_stand_in_the_schema(results: Path) -> None:
+    schema = pq.read_schema(results / "shards" / "shard-000000.parquet")
+    units = {f.name: (f.metadata or {}).get(b"units", b"").decode() for f in schema}
+    assert (units["conversion_constant"], units["gaussian_sigma_errors"]) == ("mV/Pa", "mm")
+    assert (units["g"], units["wafer_x"], units["baseline"]) == ("1/mm^2", "mm", "mV")
+    assert schema.metadata[b"memscal_schema"] == b"memscal-fleet"
+    assert len(list((results / "shards").iterdir())) == COUNT / SHARD
+
+
+def test_what_fails_is_a_row_and_failed_checks_have_an_artifact(results: Path) -> None:
+    rows = pd.read_parquet(results / "shards")
+    errors = rows[rows["error"].notna()]
+    assert list(errors["place"]) == [FLAT, NONSENSE, MISSING]
+    assert list(errors["error_class"]) == ["InputError", "FormatError", "InputError"]
+    assert "Every voltage of the scan" in errors["error"][FLAT]
+    assert errors["sensor"][FLAT] == f"S{FLAT}"
+    kept = rows[rows["artifact"].notna()]
+    assert not kept["passed"].any()
+    assert set(kept["place"]) == set(rows["place"][~rows["passed"]]) - set(errors["place"])
+    a = memscal.load_apparatus(results / kept["artifact"][DRIFTING]).conversion_constant
+    assert a * 1e3 == pytest.approx(kept["conversion_constant"][DRIFTING], rel=1e-9)
+
+
+def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
+    fleet: Path, results: Path, run: Run, folder: Path
+) -> None:
+    halfway = folder / "results"
+    process = batch(fleet / "wafer.csv", halfway)
+    while not (done := list(halfway.glob("shards/*.parquet"))):
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert len(done) < COUNT / SHARD
+    resumed = run(*arguments(fleet / "wafer.csv", halfway, "--resume", "--json"))
+    assert shards_of(resumed.exits(1))[1] >= 1
+    pd.testing.assert_frame_equal(tables(halfway), tables(results), rtol=1e-9)
+
+
+def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
+    copy: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("memscal.cli.batch._EVERY", 0)
+    shards = sorted((copy / "results" / "shards").iterdir())
+    line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--json")
+    assert shards_of(run(*line)) == (0, 6)
+    shards[0].write_bytes(shards[0].read_bytes()[:-1000])
+    flipped = bytearray(shards[1].read_bytes())
+    flipped[100] ^= 1
+    shards[1].write_bytes(flipped)
+    shutil.copy(shards[4], shards[2])
+    changed = replace(memscal.read_scan(copy / "scans" / "s07.h5"), load_uncertainty=0.5)
+    memscal.write_scan(changed, copy / "scans" / "s07.h5", overwrite=True)
+    assert shards_of(run(*line)) == (4, 2)
+    rows = tables(copy / "results")
+    assert list(rows["place"]) == list(range(COUNT))
+    assert rows["conversion_constant_errors"][7] > 5 * rows["conversion_constant_errors"][6]
+    anew = run(*line, "--method", "bayesian").exits(1, "2 of 12 scans, ", " s left, ", " a second")
+    assert shards_of(anew) == (6, 0)
+
+
+def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run: Run) -> None:
+    manifest, old = copy / "wafer.csv", copy / "results"
+    run(*arguments(manifest, old)).exits(4, "results exists", "--resume")
+    run(*arguments(manifest, old, "--resume", "--shard-size", "4")).exits(4, "begun with")
+    run(*arguments(manifest, old, "--scheduler", "tcp://a:1")).exits(2, "exclude each other")
+    run(*arguments(copy / "none.csv", copy / "new")).exits(3, "neither a folder nor")
+    (copy / "empty").mkdir()
+    run(*arguments(copy / "empty", copy / "new")).exits(3, "holds no scans")
+    manifest.write_text("path,wafer_x,wafer_y\na.h5,left,0\n")
+    run(*arguments(manifest, copy / "new")).exits(3, "line 2", "'left'")
+    manifest.write_text("sensor,path\n7,\n")
+    run(*arguments(manifest, copy / "new")).exits(3, "line 2 has no path")
+    assert not (copy / "new").exists()
+
+
+def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet: Path, folder: Path) -> None:
+    from memscal.formats.fleet import manifest_scans
+
+    for name in ("b/1.h5", "b/1.apparatus.h5", "b/notes.txt", "a.h5", "c,d.nxs"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).touch()
+    assert [scan.path for scan in manifest_scans(folder)] == ["a.h5", "c,d.nxs", "b/1.h5"]
+    (folder / "list.txt").write_text("\ufeff# scans\nc,d.nxs\n\n'a.h5'\n", encoding="utf-8")
+    listed = [scan.path for scan in manifest_scans(folder / "list.txt")]
+    assert listed == ["c,d.nxs", "'a.h5'"]
+
+
+@pytest.mark.parametrize(("module", "line"), [
+    ("pyarrow", "batch {scans} -o new"), ("pyarrow", "summary {results}"),
+    ("distributed", "batch {scans} -o new --scheduler tcp://127.0.0.1:9"),
+])  # fmt: skip
+def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, folder, run: Run):
+    monkeypatch.setitem(sys.modules, module, None)
+    words = line.format(scans=fleet / "scans", results=results).split()
+    run(*words).exits(3, "is not installed", 'pip install "memscal[fleet]"')
+
+
+def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch, fleet, folder, run: Run) -> None:
+    monkeypatch.setattr("memscal.parallel._CONNECTING", 0.5)
+    line = ["batch", fleet / "scans", "-o", folder / "results", "--scheduler"]
+    run(*line, "tcp://127.0.0.1:9").exits(3, "No scheduler answers at tcp://127.0.0.1:9")
+
+
+def test_ctrl_c_ends_a_batch_at_once(fleet: Path, folder: Path) -> None:
+    process = batch(fleet / "wafer.csv", folder / "results")
+    while not (folder / "results" / "shards").exists():
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=30) == 130
+
+
+def test_a_summary_has_distributions_reasons_and_the_map(results: Path, folder: Path, run: Run):
+    page, picture = folder / "page.html", folder / "fleet.svg"
+    shown = run("summary", results, "-o", page, "--figure", picture).exits(0, "Written")
+    text, rows = page.read_text(encoding="utf-8"), pd.read_parquet(results / "shards")
+    assert all(word not in text.lower() for word in ("<script", "href=", 'src="http'))
+    passed = int(rows["passed"].sum())
+    assert f"{passed} of {COUNT} sensors passed every check" in text
+    for words in ("baseline drift", "Every voltage of the scan", "above the median"):
+        assert words in shown.out
+        assert words in text
+    assert "wafer (mm)" in picture.read_text(encoding="utf-8")
+    run("summary", results, "-o", page).exits(4, "exists already")
+
+
+def test_a_summary_as_json_is_that_of_the_tables(results: Path, folder: Path, run: Run) -> None:
+    told = run("summary", results, "-o", folder / "page.html", "--json").exits(0).json
+    rows = pd.read_parquet(results / "shards")
+    a = rows["conversion_constant"]
+    assert told["conversion_constant"]["median"] == pytest.approx(a.median())
+    spread = 1.4826 * (a - a.median()).abs().median()
+    assert told["conversion_constant"]["robust_deviation"] == pytest.approx(spread)
+    assert (told["sensors"], told["errors"]) == (COUNT, 3)
+    assert told["error_classes"] == {"InputError": 2, "FormatError": 1}
+    failed = [c["name"] for checks in rows["checks"].dropna() for c in checks if not c["passed"]]
+    assert told["checks"] == {name: failed.count(name) for name in failed}
+    (reason,) = [o["reason"] for o in told["outliers"] if o["path"] == f"scans/s{LARGE}.h5"]
+    z = (a[LARGE] - a.median()) / spread
+    assert reason.startswith(f"A {z:.1f} above the median")
+    assert json.dumps(told)
+
+
+def test_a_summary_of_no_batch_or_of_several_units_is_refused(copy: Path, run: Run) -> None:
+    run("summary", copy / "scans").exits(3, "holds no results of a batch")
+    path = copy / "results" / "shards" / "shard-000001.parquet"
+    table = pq.read_table(path)
+    field = table.schema.field("conversion_constant").with_metadata({"units": "nA/Pa"})
+    place = table.schema.get_field_index("conversion_constant")
+    pq.write_table(table.cast(table.schema.set(place, field)), path)
+    run("summary", copy / "results").exits(3, "mV/Pa, nA/Pa")
+    path.write_bytes(b"PAR1")
+    run("summary", copy / "results").exits(3, "is damaged", "--resume")
+
+
+def test_a_figure_of_a_fleet_without_places_or_results_is_drawn(results: Path) -> None:
+    fleet = read_fleet(results)
+    nowhere = np.full(COUNT, np.nan)
+    along = replace(fleet, wafer_x=nowhere, wafer_y=nowhere).plot()
+    assert "place in the batch" in [axes.get_xlabel() for axes in along.axes]
+    names = ("conversion_constant", "gaussian_sigma")
+    empty = replace(fleet, **dict.fromkeys(names, nowhere), failed={}, errors={})
+    assert len(empty.plot().axes) == len(fleet.plot().axes)
+    assert "Distributions" not in empty.summary()
