@@ -36,8 +36,8 @@ from memscal.model.arrays import FloatArray
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 
-#: Windows below this have closed.
-_CLOSED = 1e-9
+#: Windows below this have closed: what they pass of the noise's variance is no larger.
+_CLOSED = 1e-6
 #: Nodes of the posterior's errors for each Gaussian width; columns that are made at a time.
 _PER_WIDTH, _COLUMNS = 6.0, 16
 
@@ -122,17 +122,24 @@ class _Band:
 
     ratio: ComplexArray  # (ky, kx): A G over the transform of the field of voltages
     window: FloatArray
-    # Waves of each wavenumber at nodes about the centre, and at the rows and columns of the points.
+    # Waves of each wavenumber along both axes: at all nodes, where G is stated, and at the points.
     at_nodes: tuple[ComplexArray, ComplexArray]  # (ky, m), (kx, n)
+    at_g: tuple[ComplexArray, ComplexArray]
     at_points: tuple[ComplexArray, ComplexArray]
-    nodes: tuple[NDArray[np.intp], NDArray[np.intp]]  # the nodes' rows and columns of the lattice
+    nodes: tuple[NDArray[np.intp], NDArray[np.intp]]  # rows and columns of G in the lattice
     twice: FloatArray  # (kx,): components of negative kx are the conjugates of the others
     every: int  # nodes of the lattice for each of the nodes
     count: int  # nodes of the lattice
 
     @classmethod
-    def of(cls, fields: Any, quotient: Quotient, axes: tuple[FloatArray, FloatArray]) -> _Band:
-        """Return the band in which the window of a quotient is open; ``axes``: x and y of nodes."""
+    def of(
+        cls,
+        fields: Any,
+        quotient: Quotient,
+        axes: tuple[FloatArray, FloatArray],
+        stated: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    ) -> _Band:
+        """Return the band in which a window is open; ``axes``, ``stated``: x and y of nodes."""
         grid, window = fields.central, quotient.window
         stress = grid.forward(fields.stress.values)
         open_ = window > _CLOSED
@@ -153,8 +160,9 @@ class _Band:
             ratio=ratio[np.ix_(rows, columns)],
             window=window[np.ix_(rows, columns)],
             at_nodes=(nodes[0], nodes[1]),
+            at_g=(nodes[0][:, stated[1]], nodes[1][:, stated[0]]),
             at_points=(points[0], points[1]),
-            nodes=(at[0] + m // 2, at[1] + n // 2),
+            nodes=(at[0][stated[1]] + m // 2, at[1][stated[0]] + n // 2),
             twice=np.where(columns == 0, 1.0, 2.0),
             every=every,
             count=m * n,
@@ -164,15 +172,15 @@ class _Band:
         """What the window passes of kernels (nodes, q)."""
         rows, columns = self.at_nodes
         planes = kernels.T.reshape(-1, rows.shape[1], columns.shape[1])
-        return self._at_nodes(self.window * self.every * _summed(planes, rows, columns))
+        return self._at_g(self.window * self.every * _summed(planes, rows, columns))
 
     def divided(self, planes: FloatArray) -> FloatArray:
-        """Divide fields (q, m, n), zero but at the points: A G at the nodes, (nodes, q)."""
+        """Divide fields (q, m, n), zero but at the points: A G where it is stated, (nodes, q)."""
         rows, columns = self.at_points
-        return self._at_nodes(self.ratio * _summed(planes, rows, columns))
+        return self._at_g(self.ratio * _summed(planes, rows, columns))
 
-    def _at_nodes(self, spectra: ComplexArray) -> FloatArray:
-        rows, columns = self.at_nodes
+    def _at_g(self, spectra: ComplexArray) -> FloatArray:
+        rows, columns = self.at_g
         along = spectra @ (self.twice[:, None] * columns.conj() / self.count)
         # The real part of the product.
         planes = rows.real.T @ along.real + rows.imag.T @ along.imag
@@ -196,13 +204,13 @@ def _divided(
     estimate, smoothed = solution.estimate, solution.smoothed
     grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
     kernels, radius = _kernels(estimate, *axes), np.hypot.outer(*axes[::-1]).ravel()
-    band = _Band.of(fields, deconvolution.quotient, axes)
-    share = fields.share(smoothed)
-    noise = estimate.noise**2 / estimate.outlier_weight
     # Nodes where G is stated.
     x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in axes)
     inside = np.flatnonzero(np.logical_and.outer(y, x))
-    taper, g = fields.taper(radius), g.ravel()[inside]
+    band = _Band.of(fields, deconvolution.quotient, axes, (x, y))
+    share = fields.share(smoothed)
+    noise = estimate.noise**2 / estimate.outlier_weight
+    taper, g = fields.taper(radius[inside]), g.ravel()[inside]
     index = [places - places.min() for places in fields.index]
     box = [int(places.max()) + 1 for places in index]
     node = index[0] * box[1] + index[1]
@@ -222,24 +230,25 @@ def _divided(
         columns = kernels(unit := np.eye(count)[:, some])
         passed = band.passed(columns)
         moved = passed - divided(estimate.basis.voltages(estimate.model, estimate.gaussian, unit))
-        beside[:, some], of_frame[some] = moved[inside], taper @ moved
-        columns -= taper[:, None] * passed
-        lost[:, some], sums[some] = columns[inside], columns.sum(axis=0)
+        beside[:, some], of_frame[some] = moved, taper @ moved
+        taken = taper[:, None] * passed
+        lost[:, some] = columns[inside] - taken
+        sums[some] = columns.sum(axis=0) - taken.sum(axis=0)
     # The mean is the Gaussian fit and its corrections.
     mean = estimate.radial(radius) + estimate.oval_kernel(*axes).ravel()
-    left = mean - taper * band.passed(mean[:, None])[:, 0]
-    lost[:, -1], sums[-1] = left[inside], left.sum()
+    taken = taper * band.passed(mean[:, None])[:, 0]
+    lost[:, -1], sums[-1] = mean[inside] - taken, mean.sum() - taken.sum()
     own, shape = np.zeros(fields.confinement.shape), fields.confinement.shape
     np.add.at(own, fields.index, share**2 * noise)
     stress = grid.forward(fields.stress.values)
     window = deconvolution.quotient.window
     ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
     squared = fftshift(irfft2(rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own), s=shape))
-    variance = squared[np.ix_(*band.nodes)].ravel()[inside]
+    variance = squared[np.ix_(*band.nodes)].ravel()
     for gains, right in gain.parts:
         of_points: Any = np.eye(share.size) if right is None else right
         for some in _chunks(of_points.shape[1]):
-            moved = divided(noise[:, None] * of_points[:, some])[inside]
+            moved = divided(noise[:, None] * of_points[:, some])
             variance += 2 * np.sum((beside @ gains[:, some]) * moved, axis=1)
     spread = square_root(gain.covariance(np.sqrt(noise)))
     for some in _chunks(count):
@@ -247,11 +256,11 @@ def _divided(
     # A is the sum of A G over the nodes.
     back = irfft2(np.conj(ratio) * rfft2(ifftshift(fields.confinement)), s=shape)
     by_frame = band.every * (of_frame[None, :] @ gain).dense()[0]
-    of_a, taper = grid.cell_area * (share * back[fields.index] + by_frame), taper[inside]
+    of_a = grid.cell_area * (share * back[fields.index] + by_frame)
 
     def changed(voltages: FloatArray) -> FloatArray:
         fitted = beside @ (gain @ voltages)
-        return np.asarray(taper[:, None] * (divided(voltages)[inside] + fitted))
+        return np.asarray(taper[:, None] * (divided(voltages) + fitted))
 
     with_a = changed((noise * of_a)[:, None])[:, 0]
     variance = taper**2 * variance - 2 * g * with_a + g**2 * float(of_a**2 @ noise)

@@ -7,7 +7,7 @@ import numpy as np
 
 from memscal.calibration.drawn_scatter import draw_count, is_linear
 from memscal.calibration.stages import Solution
-from memscal.calibration.uncertainty import Results, input_effects, propagate
+from memscal.calibration.uncertainty import Results, changes_by, input_effects
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate, point_messages
@@ -144,7 +144,9 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         if not all(is_tabulated(f, *s.set_up[1:], s.rod_friction) for s, f in pairs):
             text = "The film is taken as linear elastic, as stated; no other law is counted."
             return [Message("film_law", text)]
-        changes = _changes(solution, [replace(scan, film=replace(f, law="")) for scan, f in pairs])
+        changes = _changes(
+            solution, results, [replace(scan, film=replace(f, law="")) for scan, f in pairs]
+        )
 
     def changed(by: str, sign: int) -> str:
         if by not in changes:
@@ -181,10 +183,14 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     return [Message("film_law", text)]
 
 
-def _changes(solution: Solution, scans: Sequence[Scan]) -> Mapping[str, FloatArray]:
+def _changes(
+    solution: Solution, results: Results, scans: Sequence[Scan]
+) -> Mapping[str, FloatArray]:
     """Changes of the parameters by one standard uncertainty of what these scans state."""
     effects = input_effects(scans, solution.stresses, solution.estimate)
-    return propagate(solution, solution.deconvolution, np.zeros(0), effects, {}).changes
+    parameters = results.parameters
+    changes = changes_by(effects, results.by_voltage, parameters.names, parameters.values)
+    return dict(zip(effects, changes, strict=True))
 
 
 #: Film properties by their names in messages, with their symbols; the share by which one that
@@ -213,7 +219,7 @@ def _unstated(solution: Solution, results: Results) -> list[Message]:
         shares = {f"{a}_uncertainty": _VARIED * getattr(film, a) for a, _ in varied.values()}
         films = [replace(s.set_up.film, **shares) for s in solution.scans]
         pairs = zip(solution.scans, films, strict=True)
-        changes = _changes(solution, [replace(s, film=film) for s, film in pairs])
+        changes = _changes(solution, results, [replace(s, film=film) for s, film in pairs])
         slopes = [
             f"d ln {symbol}/d ln {of} = {float(changes[a][row] / value / _VARIED):+.2f}"
             for a, of in varied.values()

@@ -212,6 +212,7 @@ class Results:
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
+    by_voltage: VoltageMap  # (p, n): derivatives of the parameters
     division: DivisionMap | None = None  # that was propagated
     field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
@@ -271,11 +272,8 @@ def propagate(
     if drawn is not None:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
-    scaled = [name.startswith("conversion_constant") for name in names]
-    voltages = np.array([effect.voltage for effect in effects.values()])
-    changes = by_voltage @ voltages.reshape(len(effects), -1).T
-    for (source, effect), column in zip(effects.items(), changes.T, strict=True):
-        column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
+    changes = changes_by(effects, by_voltage, names, values)
+    for (source, effect), column in zip(effects.items(), changes, strict=True):
         if effect.exact is not None:
             _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
         columns[source] = column[:, None]
@@ -294,8 +292,25 @@ def propagate(
         cross_covariance=stored[count:, :count],
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(np.hstack(scatter)[count:stop], axis=1),
+        by_voltage=by_voltage[:count],
         division=division,
     )
+
+
+def changes_by(
+    effects: Mapping[str, InputEffect],
+    by_voltage: VoltageMap,
+    names: Sequence[str],
+    values: FloatArray,
+) -> FloatArray:
+    """Changes by one standard uncertainty of each input, (inputs, m): of numbers of ``values``."""
+    # Beyond the named ones, of G and its transfer, which no factor changes.
+    voltages = np.array([effect.voltage for effect in effects.values()])
+    changes = (by_voltage @ voltages.reshape(len(effects), -1).T).T
+    scaled = [name.startswith("conversion_constant") for name in names]
+    for column, effect in zip(changes, effects.values(), strict=True):
+        column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
+    return changes
 
 
 def _replace_exactly(
