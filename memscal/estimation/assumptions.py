@@ -84,12 +84,15 @@ def _predict(
     """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
     rest = [root for i, root in roots.items() if i != out]
     (own, own_count), joined = roots[out], np.vstack([root for root, _ in rest])
-    count = sum(size for _, size in rest)
-    others, others_degrees = _residual(joined, count)
+    count = sum(number for _, number in rest)
+    # What a fold alone determines is zero in the others but for rounding.
+    size = np.linalg.norm(np.vstack([joined, own])[:, :-1], axis=0)
+    others, rank = _left_over(joined, size)
+    others_degrees = count - rank
     beside = np.vstack([np.zeros((len(joined), own[:, nuisances].shape[1])), own[:, nuisances]])
     whole = np.hstack([beside, np.vstack([joined, own])])
-    both, both_degrees = _residual(whole, count + own_count)
-    degrees = both_degrees - others_degrees
+    both, rank = _left_over(whole, np.append(size[nuisances], size))
+    degrees = count + own_count - rank - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
     value = max(both - others, 0.0) / degrees
@@ -97,12 +100,6 @@ def _predict(
         return float(chdtrc(degrees, degrees * value)), value, degrees, None
     value /= max(others / others_degrees, np.finfo(float).tiny)
     return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
-
-
-def _residual(root: FloatArray, count: int) -> tuple[float, int]:
-    """Residual sum of squares of the last column by the others, of ``count`` points; degrees."""
-    square, rank = _left_over(root, np.linalg.norm(root[:, :-1], axis=0))
-    return square, count - rank
 
 
 @dataclass(frozen=True)

@@ -306,10 +306,10 @@ def grouped(*keys: NDArray[Any]) -> NDArray[np.intp]:
 
 
 def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArray:
-    """Orthonormal basis of the columns' span; they are scaled first, and zeros are skipped."""
+    """Orthonormal basis of the columns' span; they are scaled by their size or norms first."""
     size = np.linalg.norm(design, axis=0) if size is None else size
-    scaled = design[:, size > 0] / size[size > 0]
+    scaled = design / np.where(size > 0, size, 1.0)
     if len(scaled) > DENSE:
-        return orthonormalised(scaled, _DEPENDENT)[0]
+        return orthonormalised(scaled, np.ones_like(size), _DEPENDENT)[0]
     left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(left[:, singular > _DEPENDENT * max(singular[0], 1.0)])
+    return np.asarray(left[:, singular > _DEPENDENT * singular[0]])

@@ -164,15 +164,15 @@ def triangular(columns: FloatArray) -> FloatArray:
 
 
 def orthonormalised(
-    columns: FloatArray, dependent: float = _DEPENDENT
+    columns: FloatArray, size: FloatArray | None = None, dependent: float = _DEPENDENT
 ) -> tuple[FloatArray, FloatArray]:
     """Orthonormal columns Q (n, r) of the same span, and R (r, f): the columns are Q R.
 
-    The columns are overwritten by Q.
+    The columns are overwritten by Q; what is dependent is judged by their ``size`` or norms, (f,).
     """
     root = triangular(columns)
-    scale = np.linalg.norm(root, axis=0)
-    scale[scale == 0] = 1.0
+    scale = np.linalg.norm(root, axis=0) if size is None else size
+    scale = np.where(scale > 0, scale, 1.0)
     _, singular, right = np.linalg.svd(root / scale, full_matrices=False)
     right = right[singular > dependent * singular[0]]
     singular = singular[: len(right)]
