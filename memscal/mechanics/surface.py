@@ -20,12 +20,11 @@ integrated with nodes that crowd there, others by a plain Gauss rule; both to ab
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ellipkm1, elliprd
 
 from memscal.model.arrays import FloatArray
 
@@ -40,7 +39,7 @@ class SurfaceCompliance:
     radial_by_pressure: FloatArray
     radial: FloatArray
 
-    @property
+    @cached_property
     def areas(self) -> FloatArray:
         r"""Integrals of the hats over the surface, in m^2: the load is ``areas @ p``."""
         left, right = self.r[:-1], self.r[1:]
@@ -79,6 +78,8 @@ def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[n
 
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.
 _ORDER = 8
+# Means that differ by less are equal after one more step; and a number that is nearly zero.
+_EQUAL, _TINY = 1e-9, 1e-100
 # Crowding: nodes v^5 with 24 Gauss points in v take the logarithm to 1e-12.
 _NEAR_ORDER = 24
 _CROWDING = 5
@@ -128,10 +129,24 @@ def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatA
     """Return L00 and L11; free of cancellation, also where x and s are close or far apart."""
     larger, smaller = np.maximum(x, s), np.minimum(x, s)
     complement = distance * (larger + smaller) / larger**2
-    # K - E = t^2 R_D(0, 1 - t^2, 1) / 3, Carlson's form.
-    difference = smaller / larger * elliprd(0.0, complement, 1.0) / 3
-    scale = 2 / (np.pi * larger)
-    return scale * ellipkm1(complement), scale * difference
+    # With the arithmetic-geometric mean M of 1 and sqrt(1 - t^2), K = pi/2M and K - E is K times
+    # the sum of 2^(n-1) c_n^2, c_0 = t (DLMF 19.8.6): of positive terms only.
+    mean, other, t = np.ones_like(complement), np.sqrt(complement), smaller / larger
+    total, share, largest = t / 2, 1 / np.maximum(t, _TINY), 1.0
+    while largest > _EQUAL:
+        # In place: allocation would take longer than the sums.
+        apart = mean - other
+        apart /= 2
+        largest = apart.max(initial=0.0)
+        other *= mean
+        np.sqrt(other, out=other)
+        mean -= apart
+        apart *= apart
+        apart *= share
+        total += apart
+        share *= 2
+    scale = 1 / (larger * mean)
+    return scale, scale * total
 
 
 def _near_integrals(

@@ -39,8 +39,9 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     spacing = reach / count
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
     local = np.full(r.size, spacing)
-    for edge in edges:
-        local = np.minimum(local, np.hypot(_FINEST * spacing, _GROWTH * (r - edge)))
+    if len(edges):
+        distance = np.min([np.abs(r - edge) for edge in edges], axis=0)
+        local = np.minimum(local, np.hypot(_FINEST * spacing, _GROWTH * distance))
     # Where the number of rings passed so far is whole, there is one.
     passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
@@ -112,9 +113,10 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     # Doubled until the contact ends within the rings; shortened until it fills a good part of them.
     reach = film.thickness
     while True:
-        rings = np.linspace(0.0, reach, _COARSE)
+        model = _even_film(film, reach)
+        rings = model.r
         try:
-            states = [point.state for point in _follow(request, HankelFilm(film, rings))]
+            states = [point.state for point in _follow(request, model)]
         except ConvergenceError:
             # A contact that has run off the rings may not settle.
             if reach > _WIDEST * film.thickness:
@@ -143,6 +145,12 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
             cure="Lower the load or the depth, or extend the profile.",
         )
     return [_contact_radius(request, rings, state) for state in states], within
+
+
+@lru_cache(maxsize=16)
+def _even_film(film: ElasticFilm, reach: float) -> HankelFilm:
+    """Return a film with even rings up to ``reach`` (m): several coefficients share it."""
+    return HankelFilm(film, np.linspace(0.0, reach, _COARSE))
 
 
 def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathPoint]:
