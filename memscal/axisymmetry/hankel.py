@@ -140,13 +140,17 @@ def _mirrored(r: FloatArray, f: FloatArray, order: int) -> tuple[FloatArray, Flo
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:
-    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table that ends at ``r[-1]``."""
+    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table that ends at ``r[-1]``.
+
+    Of a table of several functions, shape (r, m), all transforms at once: (k, m).
+    """
     spline, sharp = table_spline(*_mirrored(r, f, order))
     knots = r if sharp else r[::_INTERVALS_PER_PANEL]
     edges = _panel_edges(knots, float(r[-1]), float(np.max(np.abs(k))))
     nodes, weights = gauss_between(edges, _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
-    return np.asarray(bessel(order, np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
+    matrix = bessel(order, np.multiply.outer(k, nodes))
+    return np.asarray(matrix @ (measure * spline(nodes).T).T)
 
 
 def bessel(order: int, x: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ stress by the wrong :math:`T`.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import hyp0f1
@@ -239,7 +240,7 @@ def reach_of(points: ScanPoints) -> float:
 
 def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     """Return the transform of G at ``k`` (rad/m), as a convolution with it has it."""
-    return hankel_transform(apparatus.radial_profile.r, apparatus.radial_profile.g, k)
+    return _of_sensor(apparatus, k.tobytes())[0]
 
 
 def posterior_of(
@@ -298,6 +299,12 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
 
 def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa."""
+    return _of_sensor(apparatus, k.tobytes())[1]
+
+
+@lru_cache(maxsize=16)
+def _of_sensor(apparatus: ApparatusFunction, nodes: bytes) -> tuple[FloatArray, FloatArray]:
+    """Return transfer function and changes, which all profiles of one sensor share."""
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
     covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
@@ -309,8 +316,9 @@ def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
     uncertain = values > max(_EXACT * float(values[-1]), 0.0)
     roots = vectors[:, uncertain] * np.sqrt(values[uncertain]) / ring[:, None]
-    columns = [hankel_transform(profile.r, root, k) for root in roots.T]
-    return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
+    table = np.column_stack([profile.g, roots])
+    transforms = hankel_transform(profile.r, table, np.frombuffer(nodes))
+    return transforms[:, 0], transforms[:, 1:]
 
 
 def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:

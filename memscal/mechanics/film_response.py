@@ -268,9 +268,8 @@ def _hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     return surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
 
 
-# x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
-_LARGEST_KH_OF_LAYER = 22.0
-# Phase, in rad, that one panel of the k-quadrature may span.
+# Phase, in rad, that one panel of the k-quadrature may span.  The layer's correction to the
+# half-space has ended at half the base's largest k h; with equal nodes both share their tables.
 _PHASE_OF_LAYER = 12.0
 
 
@@ -361,7 +360,7 @@ _Pair = tuple[FloatArray, FloatArray]
 def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
     """Return quadrature nodes for the layer's share, seen at distances up to ``reach``."""
     h = film.thickness
-    return gauss_panels(_LARGEST_KH_OF_LAYER / h, min(1.5 / h, _PHASE_OF_LAYER / max(reach, h)))
+    return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE_OF_LAYER / max(reach, h)))
 
 
 def _layer_integrals(

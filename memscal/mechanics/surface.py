@@ -40,11 +40,23 @@ class SurfaceCompliance:
     radial: FloatArray
 
     @cached_property
+    def whole(self) -> FloatArray:
+        """Depressions, then outward displacements, by pressures, then shears: (2 n, 2 n)."""
+        blocks = [[self.normal, self.normal_by_shear], [self.radial_by_pressure, self.radial]]
+        return np.block(blocks)
+
+    @cached_property
+    def products(self) -> FloatArray:
+        r"""Integrals of products of hats over the surface, (n, n) in m^2."""
+        left, right, width = self.r[:-1], self.r[1:], np.diff(self.r) * np.pi / 6
+        inner, outer, across = (width * (a * left + b * right) for a, b in ((3, 1), (1, 3), (1, 1)))
+        diagonal = np.append(inner, 0.0) + np.append(0.0, outer)
+        return np.diag(diagonal) + np.diag(across, 1) + np.diag(across, -1)
+
+    @cached_property
     def areas(self) -> FloatArray:
         r"""Integrals of the hats over the surface, in m^2: the load is ``areas @ p``."""
-        left, right = self.r[:-1], self.r[1:]
-        rising, falling = (right - left) * (left + 2 * right), (right - left) * (2 * left + right)
-        return np.asarray((np.append(0.0, rising) + np.append(falling, 0.0)) * np.pi / 3)
+        return np.asarray(self.products.sum(axis=1))
 
 
 class FilmField(Protocol):

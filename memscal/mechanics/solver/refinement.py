@@ -40,10 +40,13 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
     local = np.full(r.size, spacing)
     if len(edges):
-        distance = np.min([np.abs(r - edge) for edge in edges], axis=0)
+        ordered = np.sort(edges)
+        bounds = np.searchsorted(r, [0.0, *(ordered[1:] + ordered[:-1]) / 2, math.inf])
+        distance = r - np.repeat(ordered, np.diff(bounds))  # from the nearest edge
         local = np.minimum(local, np.hypot(_FINEST * spacing, _GROWTH * distance))
     # Where the number of rings passed so far is whole, there is one.
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
+    density = 1 / local
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1]))])
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
@@ -110,20 +113,24 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     if isinstance(request.indenter, Rod):
         return [], request.indenter.radius
     film = request.film
+    farthest = max(request.targets, key=lambda target: target.value)
+    smooth = replace(request, targets=(farthest,), friction=0.0, interface=Interface())
     # Doubled until the contact ends within the rings; shortened until it fills a good part of them.
     reach = film.thickness
     while True:
         model = _even_film(film, reach)
         rings = model.r
         try:
-            states = [point.state for point in _follow(request, model)]
+            # The path takes longer than its end without friction, where contact is hardly wider.
+            ends = _follow(smooth, model)[0].state.pressure[-1] == 0
+            states = [point.state for point in _follow(request, model)] if ends else []
         except ConvergenceError:
             # A contact that has run off the rings may not settle.
             if reach > _WIDEST * film.thickness:
                 raise
             reach *= 2
             continue
-        filled = max(int(np.flatnonzero(state.pressure > 0)[-1]) for state in states)
+        filled = max((int(np.flatnonzero(s.pressure > 0)[-1]) for s in states), default=_COARSE)
         if filled >= _COARSE - 4:
             reach *= 2
         elif filled < _COARSE // 3 and reach > 1e-6 * film.thickness:
