@@ -30,14 +30,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import hyp0f1
+from scipy.special import hyp0f1, j0, j1
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
+from memscal.estimation.gaussian import GaussianFit, Linearised, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
@@ -147,10 +147,38 @@ class ShapeFit:
     log_marginal: float  # marginal likelihood up to a constant of the scan
 
 
-def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
+class _Line:
+    """Signals of round kernels on a line, by a Taylor series in the centre's shift from one."""
+
+    def __init__(self, model: ForwardModel, fit: GaussianFit) -> None:
+        points, k, axis = model.points, model.k, int(model.points.free[0, 1])
+        self.model, self.centre = model, float(fit.centre[0, axis])
+        places, self.back = np.unique((points.x, points.y)[axis] - self.centre, return_inverse=True)
+        x = np.multiply.outer(places, k)
+        zero, one = j0(x), j1(x)
+        two = 2 * np.divide(one, x, out=np.full_like(x, 0.5), where=x != 0) - zero
+        three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
+        # Derivatives of J0(kx) by the centre, over the factorials: the shapes share them.
+        waves = zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24
+        self.waves = np.stack(waves) * (model.reference.wavenumbers.weights * model.reference.values)
+
+    def linearise(self, theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
+        """Return voltages (n,) and Jacobian (n, p) at force, width, centre and drift."""
+        amplitude, width, centre, *drift = theta
+        kernels = np.stack(shape.transform(self.model.k, width), axis=1)
+        terms = (self.waves @ kernels)[:, self.back] * self.model.points.load[:, None]
+        powers = (centre - self.centre) ** np.arange(4)
+        signal, widening = np.tensordot(powers, terms, 1).T
+        shift = (np.arange(1, 4) * powers[:3]) @ terms[1:, :, 0]
+        baseline = self.model.drift_columns
+        columns = [signal, amplitude * widening, amplitude * shift, baseline]
+        return amplitude * signal + baseline @ drift, np.column_stack(columns)
+
+
+def fit_shape(shape: PressureShape, start: ProfileEstimate, line: _Line | None) -> ShapeFit:
     """Fit a shape, starting from the Gaussian fit, and average departures from it."""
     model, weights = start.model, start.weights
-    fit = _fit(shape, model, weights, start.gaussian)
+    fit = _fit(shape, model, weights, start.gaussian, line)
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
@@ -175,7 +203,11 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
 
 
 def _fit(
-    shape: PressureShape, model: ForwardModel, weights: FloatArray, start: GaussianFit
+    shape: PressureShape,
+    model: ForwardModel,
+    weights: FloatArray,
+    start: GaussianFit,
+    line: _Line | None,
 ) -> GaussianFit:
     """Fit force, width, centre and drift; where that diverges, keep the Gaussian's."""
     free, standardised = model.points.free, model.points.standardised
@@ -184,15 +216,26 @@ def _fit(
     widths = np.full(1 + int(free.sum()), width)
     scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
-    def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        fit = linearise(model, scaled * scale, shape.transform)
-        misfit = standardised(fit.predicted - model.points.u, weights)
-        return misfit, standardised(fit.jacobian, weights) * scale
+    def misfit(predicted: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        residual = standardised(predicted - model.points.u, weights)
+        return residual, standardised(jacobian, weights) * scale
 
-    best = gauss_newton(linearised, theta / scale, tolerance=1e-9)
-    if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
-        best = theta / scale
-    return linearise(model, best * scale, shape.transform)
+    def exact(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        last.append(linearise(model, scaled * scale, shape.transform))
+        return misfit(last[-1].predicted, last[-1].jacobian)
+
+    def fitted(linearised: Linearised, begin: FloatArray) -> FloatArray | None:
+        best = gauss_newton(linearised, begin, tolerance=1e-9)
+        ends = best is not None and best[0] > 0 and 1 / _FARTHEST < best[1] < _FARTHEST
+        return best if ends else None
+
+    begin, near, last = theta / scale, None, list[GaussianFit]()
+    if line:
+        # Bessel functions at one centre take most steps; the last ones are exact.
+        near = fitted(lambda scaled: misfit(*line.linearise(scaled * scale, shape)), begin)
+    if fitted(exact, begin if near is None else near) is None:
+        exact(begin)
+    return last[-1]
 
 
 #: A shape of less probability is left out.
@@ -247,7 +290,8 @@ def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.set_up.film)]
+    line = None if estimate.points.planar else _Line(estimate.model, estimate.gaussian)
+    fits = [fit_shape(shape, estimate, line) for shape in pressure_shapes(scan.set_up.film)]
     log_marginal = np.array([fit.log_marginal for fit in fits])
     weight = np.exp(log_marginal - log_marginal.max())
     weight[weight < _NEGLIGIBLE] = 0.0
