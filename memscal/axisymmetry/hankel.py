@@ -79,6 +79,10 @@ class Wavenumbers:
         k, dk = gauss_panels(k_max, _PHASE / r_max, _ORDER)
         return cls(k, k * dk / (2 * np.pi))
 
+    def integrals(self, spectra: FloatArray) -> FloatArray:
+        """Transforms (n,) or (n, m) at k = 0, by parabolas in k^2."""
+        return np.polynomial.polynomial.polyfit(self.k[:3] ** 2, spectra[:3], 2)[0]
+
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
         phase = np.multiply.outer(np.asarray(r, dtype=np.float64), self.k)
@@ -106,8 +110,7 @@ class RadialSpectrum:
     @property
     def integral(self) -> float:
         """Integral of :attr:`scalar` over the plane: its transform at k = 0, by parabola in k^2."""
-        k2 = self.wavenumbers.k[:3] ** 2
-        return float(np.polynomial.polynomial.polyfit(k2, self.scalar.values[:3], 2)[0])
+        return float(self.wavenumbers.integrals(self.scalar.values))
 
     def at(self, r: FloatArray) -> FloatArray:
         """Evaluate the function, or the vector's radial component, at radii ``r`` (m)."""

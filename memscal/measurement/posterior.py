@@ -160,7 +160,8 @@ class _Line:
         three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
         # Derivatives of J0(kx) by the centre, over the factorials: the shapes share them.
         waves = zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24
-        self.waves = np.stack(waves) * (model.reference.wavenumbers.weights * model.reference.values)
+        reference = model.reference
+        self.waves = np.stack(waves) * (reference.wavenumbers.weights * reference.values)
 
     def linearise(self, theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
         """Return voltages (n,) and Jacobian (n, p) at force, width, centre and drift."""

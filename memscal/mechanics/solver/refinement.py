@@ -113,23 +113,20 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     if isinstance(request.indenter, Rod):
         return [], request.indenter.radius
     film = request.film
-    farthest = max(request.targets, key=lambda target: target.value)
-    smooth = replace(request, targets=(farthest,), friction=0.0, interface=Interface())
     # Doubled until the contact ends within the rings; shortened until it fills a good part of them.
     reach = film.thickness
     while True:
         model = _even_film(film, reach)
         rings = model.r
         try:
-            # The path takes longer than its end without friction, where contact is hardly wider.
-            ends = _follow(smooth, model)[0].state.pressure[-1] == 0
-            states = [point.state for point in _follow(request, model)] if ends else []
+            points = [] if _overflows(request, model) else _follow(request, model)
         except ConvergenceError:
             # A contact that has run off the rings may not settle.
             if reach > _WIDEST * film.thickness:
                 raise
             reach *= 2
             continue
+        states = [point.state for point in points]
         filled = max((int(np.flatnonzero(s.pressure > 0)[-1]) for s in states), default=_COARSE)
         if filled >= _COARSE - 4:
             reach *= 2
@@ -152,6 +149,16 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
             cure="Lower the load or the depth, or extend the profile.",
         )
     return [_contact_radius(request, rings, state) for state in states], within
+
+
+def _overflows(request: RingRequest, model: HankelFilm) -> bool:
+    """Whether a contact fills all rings: without friction, at once; with it, it is hardly less."""
+    farthest = max(request.targets, key=lambda target: target.value)
+    smooth = replace(request, targets=(farthest,), friction=0.0, interface=Interface())
+    try:
+        return bool(_follow(smooth, model)[0].state.pressure[-1] > 0)
+    except ConvergenceError:
+        return False
 
 
 @lru_cache(maxsize=16)

@@ -153,9 +153,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     matrix[:, :-1] = equations.take(unknown, axis=1)
     matrix[:, slipping] += equations.take(n + rows[slipping], axis=1) * ratio[slipping]
     matrix[: rows.size, -1] = matrix[-1, -1] = -unit
-    right = np.concatenate(
-        [-problem.heights[rows], status.anchor[stuck], [-problem.heights[ring]]]
-    )
+    right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [-problem.heights[ring]]])
     if not isinstance(goal, Touch):
         matrix[-1], right[-1] = _goal_row(problem, goal, rows, unknown.size, unit)
     if (law := problem.interface.normal_law) is not None:
