@@ -138,6 +138,7 @@ class _Walk:
     steps: int = 0
     work: float = 0.0
     dissipated: float = 0.0
+    ahead: ContactState | None = None  # the next meeting, beyond the target that came before it
 
     def step_to(self, following: ContactState) -> None:
         before = self.state
@@ -187,11 +188,12 @@ def _step_by_step(
 def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     """Go to the target, ring by ring; return the walk as it was at the last ring before it."""
     problem = walk.problem
-    while (following := _next_meeting(problem, walk.state, target, rising=rising)) is not None:
+    while following := walk.ahead or _next_meeting(problem, walk.state, target, rising=rising):
+        walk.ahead = None
         begin, end = _reached(walk.state, target), _reached(following, target)
         if not (begin < end <= target.value or begin > end >= target.value):
             # The path goes on from the ring before: a state between two rings changes no other.
-            before = replace(walk)
+            before = replace(walk, ahead=following)
             walk.step_to(_mixture(walk.state, following, target))
             return before
         walk.step_to(following)
