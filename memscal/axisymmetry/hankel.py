@@ -143,10 +143,7 @@ def _mirrored(r: FloatArray, f: FloatArray, order: int) -> tuple[FloatArray, Flo
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:
-    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table that ends at ``r[-1]``.
-
-    Of a table of several functions, shape (r, m), all transforms at once: (k, m).
-    """
+    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table (r,) or (r, m) up to its end."""
     spline, sharp = table_spline(*_mirrored(r, f, order))
     knots = r if sharp else r[::_INTERVALS_PER_PANEL]
     edges = _panel_edges(knots, float(r[-1]), float(np.max(np.abs(k))))

@@ -25,7 +25,7 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -147,39 +147,37 @@ class ShapeFit:
     log_marginal: float  # marginal likelihood up to a constant of the scan
 
 
-class _Line:
-    """Signals of round kernels on a line, by a Taylor series in the centre's shift from one."""
+_OnLine = Callable[[FloatArray, PressureShape], tuple[FloatArray, FloatArray]]
 
-    def __init__(self, model: ForwardModel, fit: GaussianFit) -> None:
-        points, k, axis = model.points, model.k, int(model.points.free[0, 1])
-        self.model, self.centre = model, float(fit.centre[0, axis])
-        places, self.back = np.unique((points.x, points.y)[axis] - self.centre, return_inverse=True)
-        x = np.multiply.outer(places, k)
-        zero, one = j0(x), j1(x)
-        two = 2 * np.divide(one, x, out=np.full_like(x, 0.5), where=x != 0) - zero
-        three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
-        # Derivatives of J0(kx) by the centre, over the factorials: the shapes share them.
-        waves = zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24
-        reference = model.reference
-        self.waves = np.stack(waves) * (reference.wavenumbers.weights * reference.values)
 
-    def linearise(self, theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
-        """Return voltages (n,) and Jacobian (n, p) at force, width, centre and drift."""
-        amplitude, width, centre, *drift = theta
-        kernels = np.stack(shape.transform(self.model.k, width), axis=1)
-        terms = (self.waves @ kernels)[:, self.back] * self.model.points.load[:, None]
-        powers = (centre - self.centre) ** np.arange(4)
+def _on_line(model: ForwardModel, fit: GaussianFit) -> _OnLine:
+    """Return what linearises a shape on a line: a Taylor series in the shift of a fit's centre."""
+    points, k, axis = model.points, model.k, int(model.points.free[0, 1])
+    places, back = np.unique((points.x, points.y)[axis] - fit.centre[0, axis], return_inverse=True)
+    x = np.multiply.outer(places, k)
+    zero, one = j0(x), j1(x)
+    two = 2 * np.divide(one, x, out=np.full_like(x, 0.5), where=x != 0) - zero
+    three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
+    # Derivatives of J0(kx) by the centre, over the factorials: the shapes share them.
+    waves = np.stack([zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24])
+    waves *= model.reference.wavenumbers.weights * model.reference.values
+
+    def linearised(theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
+        terms = waves @ np.stack(shape.transform(k, theta[1]), axis=1)
+        terms = terms[:, back] * points.load[:, None]
+        powers = (theta[2] - fit.centre[0, axis]) ** np.arange(4)
         signal, widening = np.tensordot(powers, terms, 1).T
         shift = (np.arange(1, 4) * powers[:3]) @ terms[1:, :, 0]
-        baseline = self.model.drift_columns
-        columns = [signal, amplitude * widening, amplitude * shift, baseline]
-        return amplitude * signal + baseline @ drift, np.column_stack(columns)
+        columns = [signal, theta[0] * widening, theta[0] * shift, model.drift_columns]
+        return theta[0] * signal + model.drift_columns @ theta[3:], np.column_stack(columns)
+
+    return linearised
 
 
-def fit_shape(shape: PressureShape, start: ProfileEstimate, line: _Line | None) -> ShapeFit:
+def fit_shape(shape: PressureShape, start: ProfileEstimate, on_line: _OnLine | None) -> ShapeFit:
     """Fit a shape, starting from the Gaussian fit, and average departures from it."""
     model, weights = start.model, start.weights
-    fit = _fit(shape, model, weights, start.gaussian, line)
+    fit = _fit(shape, model, weights, start.gaussian, on_line)
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
@@ -208,7 +206,7 @@ def _fit(
     model: ForwardModel,
     weights: FloatArray,
     start: GaussianFit,
-    line: _Line | None,
+    on_line: _OnLine | None,
 ) -> GaussianFit:
     """Fit force, width, centre and drift; where that diverges, keep the Gaussian's."""
     free, standardised = model.points.free, model.points.standardised
@@ -217,26 +215,28 @@ def _fit(
     widths = np.full(1 + int(free.sum()), width)
     scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
+    last: list[GaussianFit] = []
+
     def misfit(predicted: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         residual = standardised(predicted - model.points.u, weights)
         return residual, standardised(jacobian, weights) * scale
 
     def exact(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        last.append(linearise(model, scaled * scale, shape.transform))
-        return misfit(last[-1].predicted, last[-1].jacobian)
+        last[:] = [linearise(model, scaled * scale, shape.transform)]
+        return misfit(last[0].predicted, last[0].jacobian)
 
     def fitted(linearised: Linearised, begin: FloatArray) -> FloatArray | None:
         best = gauss_newton(linearised, begin, tolerance=1e-9)
         ends = best is not None and best[0] > 0 and 1 / _FARTHEST < best[1] < _FARTHEST
         return best if ends else None
 
-    begin, near, last = theta / scale, None, list[GaussianFit]()
-    if line:
+    begin, near = theta / scale, None
+    if on_line:
         # Bessel functions at one centre take most steps; the last ones are exact.
-        near = fitted(lambda scaled: misfit(*line.linearise(scaled * scale, shape)), begin)
+        near = fitted(lambda scaled: misfit(*on_line(scaled * scale, shape)), begin)
     if fitted(exact, begin if near is None else near) is None:
         exact(begin)
-    return last[-1]
+    return last[0]
 
 
 #: A shape of less probability is left out.
@@ -291,7 +291,7 @@ def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    line = None if estimate.points.planar else _Line(estimate.model, estimate.gaussian)
+    line = None if estimate.points.planar else _on_line(estimate.model, estimate.gaussian)
     fits = [fit_shape(shape, estimate, line) for shape in pressure_shapes(scan.set_up.film)]
     log_marginal = np.array([fit.log_marginal for fit in fits])
     weight = np.exp(log_marginal - log_marginal.max())

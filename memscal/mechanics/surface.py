@@ -42,8 +42,8 @@ class SurfaceCompliance:
     @cached_property
     def whole(self) -> FloatArray:
         """Depressions, then outward displacements, by pressures, then shears: (2 n, 2 n)."""
-        blocks = [[self.normal, self.normal_by_shear], [self.radial_by_pressure, self.radial]]
-        return np.block(blocks)
+        normal, radial = (self.normal, self.normal_by_shear), (self.radial_by_pressure, self.radial)
+        return np.block([[*normal], [*radial]])
 
     @cached_property
     def products(self) -> FloatArray:
@@ -147,15 +147,11 @@ def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatA
     total, share, largest = t / 2, 1 / np.maximum(t, _TINY), 1.0
     while largest > _EQUAL:
         # In place: allocation would take longer than the sums.
-        apart = mean - other
-        apart /= 2
+        apart = (mean - other) / 2
         largest = apart.max(initial=0.0)
-        other *= mean
-        np.sqrt(other, out=other)
+        np.sqrt(np.multiply(mean, other, out=other), out=other)
         mean -= apart
-        apart *= apart
-        apart *= share
-        total += apart
+        total += np.multiply(np.square(apart, out=apart), share, out=apart)
         share *= 2
     scale = 1 / (larger * mean)
     return scale, scale * total

@@ -74,10 +74,7 @@ def require_increasing(name: str, values: FloatArray) -> None:
 
 
 def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
-    """Return a cubic spline through a table; for one with an edge a monotone one, and ``True``.
-
-    A table may have several columns, shape (n, m).
-    """
+    """Return a cubic spline through a table (n,) or (n, m); a monotone one of an edge, and True."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
     # A table has an edge where it changes by a twentieth of its range within an interval that is

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -155,10 +156,9 @@ def _overflows(request: RingRequest, model: HankelFilm) -> bool:
     """Whether a contact fills all rings: without friction, at once; with it, it is hardly less."""
     farthest = max(request.targets, key=lambda target: target.value)
     smooth = replace(request, targets=(farthest,), friction=0.0, interface=Interface())
-    try:
+    with suppress(ConvergenceError):
         return bool(_follow(smooth, model)[0].state.pressure[-1] > 0)
-    except ConvergenceError:
-        return False
+    return False
 
 
 @lru_cache(maxsize=16)
