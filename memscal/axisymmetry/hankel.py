@@ -81,7 +81,7 @@ class Wavenumbers:
 
     def integrals(self, spectra: FloatArray) -> FloatArray:
         """Transforms (n,) or (n, m) at k = 0, by parabolas in k^2."""
-        return np.polynomial.polynomial.polyfit(self.k[:3] ** 2, spectra[:3], 2)[0]
+        return np.asarray(np.polynomial.polynomial.polyfit(self.k[:3] ** 2, spectra[:3], 2)[0])
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""

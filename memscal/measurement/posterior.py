@@ -37,7 +37,7 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_trans
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, Linearised, gauss_newton, linearise
+from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
@@ -147,10 +147,10 @@ class ShapeFit:
     log_marginal: float  # marginal likelihood up to a constant of the scan
 
 
-_OnLine = Callable[[FloatArray, PressureShape], tuple[FloatArray, FloatArray]]
+_Linearised = Callable[[FloatArray, PressureShape], tuple[FloatArray, FloatArray]]
 
 
-def _on_line(model: ForwardModel, fit: GaussianFit) -> _OnLine:
+def _on_line(model: ForwardModel, fit: GaussianFit) -> _Linearised:
     """Return what linearises a shape on a line: a Taylor series in the shift of a fit's centre."""
     points, k, axis = model.points, model.k, int(model.points.free[0, 1])
     places, back = np.unique((points.x, points.y)[axis] - fit.centre[0, axis], return_inverse=True)
@@ -174,7 +174,9 @@ def _on_line(model: ForwardModel, fit: GaussianFit) -> _OnLine:
     return linearised
 
 
-def fit_shape(shape: PressureShape, start: ProfileEstimate, on_line: _OnLine | None) -> ShapeFit:
+def fit_shape(
+    shape: PressureShape, start: ProfileEstimate, on_line: _Linearised | None
+) -> ShapeFit:
     """Fit a shape, starting from the Gaussian fit, and average departures from it."""
     model, weights = start.model, start.weights
     fit = _fit(shape, model, weights, start.gaussian, on_line)
@@ -206,7 +208,7 @@ def _fit(
     model: ForwardModel,
     weights: FloatArray,
     start: GaussianFit,
-    on_line: _OnLine | None,
+    on_line: _Linearised | None,
 ) -> GaussianFit:
     """Fit force, width, centre and drift; where that diverges, keep the Gaussian's."""
     free, standardised = model.points.free, model.points.standardised
@@ -217,25 +219,24 @@ def _fit(
 
     last: list[GaussianFit] = []
 
-    def misfit(predicted: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        residual = standardised(predicted - model.points.u, weights)
-        return residual, standardised(jacobian, weights) * scale
+    def exact(theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
+        last[:] = [linearise(model, theta, shape.transform)]
+        return last[0].predicted, last[0].jacobian
 
-    def exact(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        last[:] = [linearise(model, scaled * scale, shape.transform)]
-        return misfit(last[0].predicted, last[0].jacobian)
+    def fitted(linearised: _Linearised, begin: FloatArray) -> FloatArray | None:
+        def misfit(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+            predicted, jacobian = linearised(scaled * scale, shape)
+            residual = standardised(predicted - model.points.u, weights)
+            return residual, standardised(jacobian, weights) * scale
 
-    def fitted(linearised: Linearised, begin: FloatArray) -> FloatArray | None:
-        best = gauss_newton(linearised, begin, tolerance=1e-9)
+        best = gauss_newton(misfit, begin, tolerance=1e-9)
         ends = best is not None and best[0] > 0 and 1 / _FARTHEST < best[1] < _FARTHEST
         return best if ends else None
 
-    begin, near = theta / scale, None
-    if on_line:
-        # Bessel functions at one centre take most steps; the last ones are exact.
-        near = fitted(lambda scaled: misfit(*on_line(scaled * scale, shape)), begin)
-    if fitted(exact, begin if near is None else near) is None:
-        exact(begin)
+    # Bessel functions at one centre take most steps; the last ones are exact.
+    near = fitted(on_line, theta / scale) if on_line else None
+    if fitted(exact, theta / scale if near is None else near) is None:
+        exact(theta, shape)
     return last[0]
 
 

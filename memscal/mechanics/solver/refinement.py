@@ -39,14 +39,10 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
         return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
     spacing = reach / count
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
-    local = np.full(r.size, spacing)
-    if len(edges):
-        ordered = np.sort(edges)
-        bounds = np.searchsorted(r, [0.0, *(ordered[1:] + ordered[:-1]) / 2, math.inf])
-        distance = r - np.repeat(ordered, np.diff(bounds))  # from the nearest edge
-        local = np.minimum(local, np.hypot(_FINEST * spacing, _GROWTH * distance))
+    near = np.sort(edges)
+    distance = r - near[np.searchsorted((near[1:] + near[:-1]) / 2, r)]
     # Where the number of rings passed so far is whole, there is one.
-    density = 1 / local
+    density = 1 / np.minimum(spacing, np.hypot(_FINEST * spacing, _GROWTH * distance))
     passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1]))])
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
