@@ -27,7 +27,7 @@ stress by the wrong :math:`T`.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.special import hyp0f1, j0, j1
@@ -129,9 +129,16 @@ class _Basis(DepartureBasis):
     shape: PressureShape
 
     def kernels(self, k: FloatArray) -> FloatArray:
-        kernel, slope = self.shape.transform(k, self.sigma)
-        rings = [ring.transform(k) for ring in self.rings]
-        return self._columns(kernel, self.conversion_constant * slope, rings)
+        if (nodes := k.tobytes()) not in self._kernels:
+            kernel, slope = self.shape.transform(k, self.sigma)
+            rings = [ring.transform(k) for ring in self.rings]
+            columns = self._columns(kernel, self.conversion_constant * slope, rings)
+            self._kernels[nodes] = columns
+        return self._kernels[nodes]
+
+    @cached_property
+    def _kernels(self) -> dict[bytes, FloatArray]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
