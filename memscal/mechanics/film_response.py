@@ -154,10 +154,10 @@ class InterfaceTraction(Protocol):
         """Integrals over k of p, q times J0, then of p, q times J1, at ``r`` (m), in Pa m."""
 
 
-# k h exp(-k h) is below 1e-15 here.
+# k h exp(-k h) is below 1e-15 here; the layer's correction to the half-space ends at 22.
 _LARGEST_KH = 38.0
 # Phase, in rad, that one panel of the k-quadrature may span.
-_PHASE = 14.0
+_PHASE = 12.0
 # Distance from the contact, in thicknesses, beyond which the stress is below 1e-13 of its maximum:
 # it decays as exp(-eta r/h), where i eta is the denominator's zero nearest to the real axis; eta
 # falls from 1.19 at nu = 0 to 0.739 at nu = 1/2.
@@ -187,10 +187,8 @@ def base_stress(
     stress = np.zeros_like(flat)
     for start in range(0, sorting.size, _BASE_STRESS_CHUNK):
         chunk = sorting[start : start + _BASE_STRESS_CHUNK]
-        # The integrand turns at the rate r (Bessel function) + radius (transform of the traction);
-        # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
-        rate = flat[chunk[-1]] + traction.radius
-        k, weights = gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / rate))
+        # The integrand turns at the rate r (Bessel function) + radius (transform of the traction).
+        k, weights = _wavenumbers(film, flat[chunk[-1]] + traction.radius)
         density = weights * k * base_spectrum(film, traction, k, order=order)
         stress[chunk] = (j0, j1)[order](np.outer(flat[chunk], k)) @ density
     return stress.reshape(np.shape(r))
@@ -266,11 +264,6 @@ def _hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     starts = np.arange(0, s.size, count)
     right = np.add.reduceat(waves * rising, starts, axis=1)
     return surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
-
-
-# Phase, in rad, that one panel of the k-quadrature may span.  The layer's correction to the
-# half-space has ended at half the base's largest k h; with equal nodes both share their tables.
-_PHASE_OF_LAYER = 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,9 +351,10 @@ _Pair = tuple[FloatArray, FloatArray]
 
 
 def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
-    """Return quadrature nodes for the layer's share, seen at distances up to ``reach``."""
+    """Return quadrature nodes for layer and base, seen at distances up to ``reach``."""
+    # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
     h = film.thickness
-    return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE_OF_LAYER / max(reach, h)))
+    return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
 
 
 def _layer_integrals(
