@@ -233,7 +233,8 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    law, separation, pressing = problem.interface.normal_law, start.pressure, start.touching.copy()
+    law, pressing = problem.interface.normal_law, start.touching.copy()
+    separation = np.zeros(problem.size)  # counts where the interface is compliant alone
     if law is not None:
         separation = problem.separations(start)
         pressing = _bearing(problem, law, separation)
