@@ -79,6 +79,10 @@ class Wavenumbers:
         k, dk = gauss_panels(k_max, _PHASE / r_max, _ORDER)
         return cls(k, k * dk / (2 * np.pi))
 
+    def integrals(self, spectra: FloatArray) -> FloatArray:
+        """Transforms (n,) or (n, m) at k = 0, by parabolas in k^2."""
+        return np.asarray(np.polynomial.polynomial.polyfit(self.k[:3] ** 2, spectra[:3], 2)[0])
+
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
         phase = np.multiply.outer(np.asarray(r, dtype=np.float64), self.k)
@@ -106,8 +110,7 @@ class RadialSpectrum:
     @property
     def integral(self) -> float:
         """Integral of :attr:`scalar` over the plane: its transform at k = 0, by parabola in k^2."""
-        k2 = self.wavenumbers.k[:3] ** 2
-        return float(np.polynomial.polynomial.polyfit(k2, self.scalar.values[:3], 2)[0])
+        return float(self.wavenumbers.integrals(self.scalar.values))
 
     def at(self, r: FloatArray) -> FloatArray:
         """Evaluate the function, or the vector's radial component, at radii ``r`` (m)."""
@@ -140,13 +143,14 @@ def _mirrored(r: FloatArray, f: FloatArray, order: int) -> tuple[FloatArray, Flo
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:
-    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table that ends at ``r[-1]``."""
+    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table (r,) or (r, m) up to its end."""
     spline, sharp = table_spline(*_mirrored(r, f, order))
     knots = r if sharp else r[::_INTERVALS_PER_PANEL]
     edges = _panel_edges(knots, float(r[-1]), float(np.max(np.abs(k))))
     nodes, weights = gauss_between(edges, _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
-    return np.asarray(bessel(order, np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
+    matrix = bessel(order, np.multiply.outer(k, nodes))
+    return np.asarray(matrix @ (measure * spline(nodes).T).T)
 
 
 def bessel(order: int, x: FloatArray) -> FloatArray:

@@ -160,8 +160,10 @@ class Rings:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
-        blurred = np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
-        return np.asarray(self.amplitude * blurred * j0(np.multiply.outer(k, self.radius)))
+        # Most shapes have one blur, or no radius.
+        blur = self.blur if np.ptp(self.blur) else self.blur[:1]
+        blurred = self.amplitude * np.exp(-0.5 * np.multiply.outer(k, blur) ** 2)
+        return blurred * j0(np.multiply.outer(k, self.radius)) if self.radius.any() else blurred
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""

@@ -42,7 +42,6 @@ def bracketed_share(
 
 #: Level of one standard deviation of a normal distribution.
 _ONE_SIGMA = 0.6827
-_STEPS = 40
 
 
 def profile_estimate(
@@ -94,13 +93,12 @@ def _crossing(
     beyond = coordinates[coordinates * side > start * side]
     if not beyond.size:
         return None
-    inside, outside = start, float(beyond.min() if side > 0 else beyond.max())
+    outside = float(beyond.min() if side > 0 else beyond.max())
     if spline(outside) <= level:
         return None
-    for _ in range(_STEPS):
-        middle = (inside + outside) / 2
-        inside, outside = (middle, outside) if spline(middle) <= level else (inside, middle)
-    return (inside + outside) / 2
+    roots = spline.solve(level, extrapolate=False)
+    between = roots[(min(start, outside) <= roots) & (roots <= max(start, outside))]
+    return float(min(between, key=lambda root: abs(root - start), default=start))
 
 
 def friction_reason(interval: Interval, last: float) -> str:
@@ -225,8 +223,11 @@ def load_comparison(
     """Compare a measured load, by its index, with every calculated profile of a family."""
     family, load = confronted.family, confronted.loads[index]
     points = confronted.points[index]
-    calculated, errors = _blurred(confronted.sensor, family, load, profile.r, points)
-    top, top_errors = _blurred(confronted.sensor, family, load, np.zeros(1), points)
+    r = np.append(profile.r, 0.0)
+    calculated, errors = _blurred(confronted.sensor, family, load, r, points)
+    (calculated, top), (errors, top_errors) = (
+        np.split(values, [-1], axis=1) for values in (calculated, errors)
+    )
     chi_square = confronted.at(family.values, index)
     ratio = profile.maximum / float(top[0, 0])
     # Measured and calculated maximum: A and G err together.

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from scipy.special import j0, j1
 
 from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
-from memscal.friction.marginal_likelihood import Tables
+from memscal.friction.marginal_likelihood import Tables, log_likelihood
 from memscal.measurement.posterior import apparatus_changes, sensor_transfer
 from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredProfile
@@ -154,12 +154,12 @@ class Sensor:
     conversion_constant: float  # A, in V/Pa
     order: int = 0  # one of a tangential channel
 
-    @property
+    @cached_property
     def of_shape(self) -> Sensor:
         """The sensor with the changes of A G that those of G alone bring: its integral stays."""
-        of_conversion = [RadialSpectrum(self.wavenumbers, c).integral for c in self.changes.T]
+        of_conversion = self.wavenumbers.integrals(self.changes)
         scaled = np.outer(self.transfer, of_conversion) / self.conversion_constant
-        return replace(self, changes=self.changes - scaled.reshape(self.changes.shape))
+        return replace(self, changes=self.changes - scaled)
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,10 +315,12 @@ class Likelihood:
     values: FloatArray
     coordinates: FloatArray
     loads: tuple[Standardised, ...]
+    tables: Tables  # what each load tells, as chi-square and the evidence of laws are made of
 
     def only(self, chosen: Sequence[int]) -> Likelihood:
         """Return the likelihood of some of the loads."""
-        return Likelihood(self.values, self.coordinates, tuple(self.loads[i] for i in chosen))
+        loads = tuple(self.loads[i] for i in chosen)
+        return replace(self, loads=loads, tables=self.tables.only(chosen))
 
     @property
     def degrees(self) -> int:
@@ -328,8 +330,7 @@ class Likelihood:
     @cached_property
     def chi_square(self) -> FloatArray:
         """Least chi-square over all nuisances, shape (V,)."""
-        residual = np.concatenate([load.residual for load in self.loads], axis=1)
-        return np.asarray(np.einsum("vn,vn->v", residual, self._inverse_times(residual)))
+        return log_likelihood(self.tables.together())[1][:, 0]
 
     @cached_property
     def information(self) -> FloatArray:
@@ -351,60 +352,60 @@ class Likelihood:
             for name, root in load.noises.items():
                 share = root[index] * piece if root.ndim == 2 else root[index].T @ piece
                 shares[name] = float(np.hypot(shares.get(name, 0.0), np.linalg.norm(share)))
-        for source in self._widths:
-            columns = np.concatenate([self._columns_of(load, source)[index] for load in self.loads])
-            shares[source] = float(np.linalg.norm(gain @ columns))
+        columns, start = self._systematic[0][index], 0
+        for source, width in _widths(self.loads).items():
+            shares[source] = float(np.linalg.norm(gain @ columns[:, start : start + width]))
+            start += width
         return shares
-
-    def tables(self) -> Tables:
-        """Return what each load tells, as the evidence of laws of the interface is made of."""
-        columns = [self._all_columns(load) for load in self.loads]
-        pairs = zip(columns, self.loads, strict=True)
-        pulls = [np.einsum("vnq,vn->vq", column, load.residual) for column, load in pairs]
-        return Tables(
-            squares=np.stack([np.sum(load.residual**2, axis=-1) for load in self.loads], axis=1),
-            pulls=np.stack(pulls, axis=1),
-            grips=np.stack([np.swapaxes(column, -1, -2) @ column for column in columns], axis=1),
-            volumes=np.stack([load.volume for load in self.loads], axis=1),
-        )
-
-    @cached_property
-    def _widths(self) -> dict[str, int]:
-        """Number of systematic columns of each source."""
-        widths: dict[str, int] = {}
-        for load in self.loads:
-            for source, columns in load.columns.items():
-                widths.setdefault(source, columns.shape[-1])
-        return widths
-
-    def _columns_of(self, load: Standardised, source: str) -> FloatArray:
-        """Return the columns of a source, zero where the load does not know it."""
-        return load.columns.get(source, np.zeros((*load.residual.shape, self._widths[source])))
-
-    def _all_columns(self, load: Standardised) -> FloatArray:
-        columns = [self._columns_of(load, source) for source in self._widths]
-        return np.concatenate([np.zeros((*load.residual.shape, 0)), *columns], axis=-1)
 
     @cached_property
     def _systematic(self) -> tuple[FloatArray, FloatArray]:
         """Columns of all sources, shape (V, n, q), and the inverse of 1 + D^T D."""
-        columns = np.concatenate([self._all_columns(load) for load in self.loads], axis=1)
+        columns = np.concatenate(_columns(self.loads), axis=1)
         grip = np.swapaxes(columns, -1, -2) @ columns
         return columns, np.asarray(np.linalg.inv(grip + np.eye(columns.shape[-1])), np.float64)
 
     def _inverse_times(self, values: FloatArray) -> FloatArray:
         """C^-1 times vectors (V, n), by Woodbury's identity."""
         columns, inverse = self._systematic
-        pull = np.einsum("vnq,vn->vq", columns, values)
-        return np.asarray(values - np.einsum("vnq,vqp,vp->vn", columns, inverse, pull))
+        pull = np.swapaxes(columns, -1, -2) @ values[..., None]
+        return np.asarray(values - (columns @ (inverse @ pull))[..., 0])
+
+
+def _widths(loads: Sequence[Standardised]) -> dict[str, int]:
+    """Return the number of systematic columns of each source."""
+    every = (item for load in loads for item in load.columns.items())
+    return {source: columns.shape[-1] for source, columns in every}
+
+
+def _columns(loads: Sequence[Standardised]) -> list[FloatArray]:
+    """Return all sources' columns (V, n, q) of each load, zero where it does not know a source."""
+    widths, stacked = _widths(loads), []
+    for load in loads:
+        shape = load.residual.shape
+        columns = [load.columns.get(name, np.zeros((*shape, q))) for name, q in widths.items()]
+        stacked.append(np.concatenate([np.zeros((*shape, 0)), *columns], axis=-1))
+    return stacked
+
+
+def _tables(loads: Sequence[Standardised]) -> Tables:
+    columns = _columns(loads)
+    pairs = zip(columns, loads, strict=True)
+    pulls = [(load.residual[:, None] @ column)[:, 0] for column, load in pairs]
+    return Tables(
+        squares=np.stack([np.sum(load.residual**2, axis=-1) for load in loads], axis=1),
+        pulls=np.stack(pulls, axis=1),
+        grips=np.stack([np.swapaxes(column, -1, -2) @ column for column in columns], axis=1),
+        volumes=np.stack([load.volume for load in loads], axis=1),
+    )
 
 
 def likelihood(
     points: Sequence[LoadPoints], sensor: Sensor, members: ProfileFamily, loads: Sequence[int]
 ) -> Likelihood:
     """Return the likelihood of loads, each with the index of its load in the family."""
-    standardised = [
+    standardised = tuple(
         standardise(of_load, predict(of_load, sensor, members, load))
         for of_load, load in zip(points, loads, strict=True)
-    ]
-    return Likelihood(members.values, members.coordinates, tuple(standardised))
+    )
+    return Likelihood(members.values, members.coordinates, standardised, _tables(standardised))

@@ -43,10 +43,13 @@ class Tables(NamedTuple):
         """Return the groups as one, of shape (M, 1): one parameter for all of them."""
         return Tables(*(np.sum(array, axis=1, keepdims=True) for array in self))
 
+    def only(self, chosen: Sequence[int]) -> Tables:
+        """Return some of the groups."""
+        return Tables(*(array[:, list(chosen)] for array in self))
+
     def group(self, index: int | Sequence[int]) -> Tables:
         """Return some of the groups, as one."""
-        chosen = np.atleast_1d(np.asarray(index, dtype=np.intp))
-        return Tables(*(array[:, chosen] for array in self)).together()
+        return self.only(np.atleast_1d(index).tolist()).together()
 
 
 def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:

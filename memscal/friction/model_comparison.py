@@ -265,7 +265,7 @@ class Measured:
     def tables(self, values: FloatArray) -> Tables:
         """Return the statistics of the loads at values of the family's parameter."""
         loads = range(len(self.points))
-        return likelihood(self.points, self.sensor, self.family.at(values), loads).tables()
+        return likelihood(self.points, self.sensor, self.family.at(values), loads).tables
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,13 +25,13 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property, lru_cache, reduce
 from operator import add
 
 import numpy as np
-from scipy.special import hyp0f1
+from scipy.special import hyp0f1, j0, j1
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
@@ -132,9 +132,16 @@ class _Basis(DepartureBasis):
     shape: PressureShape
 
     def kernels(self, k: FloatArray) -> FloatArray:
-        kernel, slope = self.shape.transform(k, self.sigma)
-        rings = [ring.transform(k) for ring in self.rings]
-        return self._columns(kernel, self.conversion_constant * slope, rings)
+        if (nodes := k.tobytes()) not in self._kernels:
+            kernel, slope = self.shape.transform(k, self.sigma)
+            rings = [ring.transform(k) for ring in self.rings]
+            columns = self._columns(kernel, self.conversion_constant * slope, rings)
+            self._kernels[nodes] = columns
+        return self._kernels[nodes]
+
+    @cached_property
+    def _kernels(self) -> dict[bytes, FloatArray]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +157,39 @@ class ShapeFit:
     log_marginal: float  # marginal likelihood up to a constant of the scan
 
 
-def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
+_Linearised = Callable[[FloatArray, PressureShape], tuple[FloatArray, FloatArray]]
+
+
+def _on_line(model: ForwardModel, fit: GaussianFit) -> _Linearised:
+    """Return what linearises a shape on a line: a Taylor series in the shift of a fit's centre."""
+    points, k, axis = model.points, model.k, int(model.points.free[0, 1])
+    places, back = np.unique((points.x, points.y)[axis] - fit.centre[0, axis], return_inverse=True)
+    x = np.multiply.outer(places, k)
+    zero, one = j0(x), j1(x)
+    two = 2 * np.divide(one, x, out=np.full_like(x, 0.5), where=x != 0) - zero
+    three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
+    # Derivatives of J0(kx) by the centre, over the factorials: the shapes share them.
+    waves = np.stack([zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24])
+    waves *= model.reference.wavenumbers.weights * model.reference.values
+
+    def linearised(theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
+        terms = waves @ np.stack(shape.transform(k, theta[1]), axis=1)
+        terms = terms[:, back] * points.load[:, None]
+        powers = (theta[2] - fit.centre[0, axis]) ** np.arange(4)
+        signal, widening = np.tensordot(powers, terms, 1).T
+        shift = (np.arange(1, 4) * powers[:3]) @ terms[1:, :, 0]
+        columns = [signal, theta[0] * widening, theta[0] * shift, model.drift_columns]
+        return theta[0] * signal + model.drift_columns @ theta[3:], np.column_stack(columns)
+
+    return linearised
+
+
+def fit_shape(
+    shape: PressureShape, start: ProfileEstimate, on_line: _Linearised | None
+) -> ShapeFit:
     """Fit a shape, starting from the Gaussian fit, and average departures from it."""
     model, weights = start.model, start.weights
-    fit = _fit(shape, model, weights, start.gaussian)
+    fit = _fit(shape, model, weights, start.gaussian, on_line)
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
@@ -179,7 +215,11 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
 
 
 def _fit(
-    shape: PressureShape, model: ForwardModel, weights: FloatArray, start: GaussianFit
+    shape: PressureShape,
+    model: ForwardModel,
+    weights: FloatArray,
+    start: GaussianFit,
+    on_line: _Linearised | None,
 ) -> GaussianFit:
     """Fit force, width, centre and drift; where that diverges, keep the Gaussian's."""
     free, standardised = model.points.free, model.points.standardised
@@ -188,15 +228,27 @@ def _fit(
     widths = np.full(1 + int(free.sum()), width)
     scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
-    def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        fit = linearise(model, scaled * scale, shape.transform)
-        misfit = standardised(fit.predicted - model.points.u, weights)
-        return misfit, standardised(fit.jacobian, weights) * scale
+    last: list[GaussianFit] = []
 
-    best = gauss_newton(linearised, theta / scale, tolerance=1e-9)
-    if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
-        best = theta / scale
-    return linearise(model, best * scale, shape.transform)
+    def exact(theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
+        last[:] = [linearise(model, theta, shape.transform)]
+        return last[0].predicted, last[0].jacobian
+
+    def fitted(linearised: _Linearised, begin: FloatArray) -> FloatArray | None:
+        def misfit(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+            predicted, jacobian = linearised(scaled * scale, shape)
+            residual = standardised(predicted - model.points.u, weights)
+            return residual, standardised(jacobian, weights) * scale
+
+        best = gauss_newton(misfit, begin, tolerance=1e-9)
+        ends = best is not None and best[0] > 0 and 1 / _FARTHEST < best[1] < _FARTHEST
+        return best if ends else None
+
+    # Bessel functions at one centre take most steps; the last ones are exact.
+    near = fitted(on_line, theta / scale) if on_line else None
+    if fitted(exact, theta / scale if near is None else near) is None:
+        exact(theta, shape)
+    return last[0]
 
 
 #: A shape of less probability is left out.
@@ -244,14 +296,15 @@ def reach_of(points: ScanPoints) -> float:
 
 def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     """Return the transform of G at ``k`` (rad/m), as a convolution with it has it."""
-    return hankel_transform(apparatus.radial_profile.r, apparatus.radial_profile.g, k)
+    return _of_sensor(apparatus, k.tobytes())[0]
 
 
 def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.set_up.film)]
+    line = None if estimate.points.planar else _on_line(estimate.model, estimate.gaussian)
+    fits = [fit_shape(shape, estimate, line) for shape in pressure_shapes(scan.set_up.film)]
     log_marginal = np.array([fit.log_marginal for fit in fits])
     weight = np.exp(log_marginal - log_marginal.max())
     weight[weight < _NEGLIGIBLE] = 0.0
@@ -303,6 +356,12 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
 
 def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa."""
+    return _of_sensor(apparatus, k.tobytes())[1]
+
+
+@lru_cache(maxsize=16)
+def _of_sensor(apparatus: ApparatusFunction, nodes: bytes) -> tuple[FloatArray, FloatArray]:
+    """Return transfer function and changes, which all profiles of one sensor share."""
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
     covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
@@ -314,8 +373,9 @@ def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
     uncertain = values > max(_EXACT * float(values[-1]), 0.0)
     roots = vectors[:, uncertain] * np.sqrt(values[uncertain]) / ring[:, None]
-    columns = [hankel_transform(profile.r, root, k) for root in roots.T]
-    return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
+    table = np.column_stack([profile.g, roots])
+    transforms = hankel_transform(profile.r, table, np.frombuffer(nodes))
+    return transforms[:, 0], transforms[:, 1:]
 
 
 def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:

@@ -41,7 +41,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -154,10 +154,10 @@ class InterfaceTraction(Protocol):
         """Integrals over k of p, q times J0, then of p, q times J1, at ``r`` (m), in Pa m."""
 
 
-# k h exp(-k h) is below 1e-15 here.
+# k h exp(-k h) is below 1e-15 here; the layer's correction to the half-space ends at 22.
 _LARGEST_KH = 38.0
 # Phase, in rad, that one panel of the k-quadrature may span.
-_PHASE = 14.0
+_PHASE = 12.0
 # Distance from the contact, in thicknesses, beyond which the stress is below 1e-13 of its maximum:
 # it decays as exp(-eta r/h), where i eta is the denominator's zero nearest to the real axis; eta
 # falls from 1.19 at nu = 0 to 0.739 at nu = 1/2.
@@ -187,10 +187,8 @@ def base_stress(
     stress = np.zeros_like(flat)
     for start in range(0, sorting.size, _BASE_STRESS_CHUNK):
         chunk = sorting[start : start + _BASE_STRESS_CHUNK]
-        # The integrand turns at the rate r (Bessel function) + radius (transform of the traction);
-        # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
-        rate = flat[chunk[-1]] + traction.radius
-        k, weights = gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / rate))
+        # The integrand turns at the rate r (Bessel function) + radius (transform of the traction).
+        k, weights = _wavenumbers(film, flat[chunk[-1]] + traction.radius)
         density = weights * k * base_spectrum(film, traction, k, order=order)
         stress[chunk] = (j0, j1)[order](np.outer(flat[chunk], k)) @ density
     return stress.reshape(np.shape(r))
@@ -235,42 +233,37 @@ class RingTraction:
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(k, dtype=np.float64))
         transform = np.zeros_like(flat)
-        if flat.size and np.any(values):
-            used = self.rings <= self.radius
-            rings = self.rings[used]
-            s, weights = _nodes(rings, float(flat.max()))
-            density, bessel = weights * s * np.interp(s, rings, values[used]), (j0, j1)[order]
-            # So many Bessel functions are evaluated together, which bounds the memory.
-            size = max(1, 4_000_000 // s.size)
-            for start in range(0, flat.size, size):
-                chunk = slice(start, start + size)
-                transform[chunk] = bessel(np.multiply.outer(flat[chunk], s)) @ density
+        if np.any(values):
+            for start in range(0, flat.size, _CHUNK):
+                chunk = slice(start, start + _CHUNK)
+                hats = _hat_transform(self.rings.tobytes(), flat[chunk].tobytes(), order)
+                transform[chunk] = hats @ values
         return transform.reshape(np.shape(k))
 
 
 def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
     r"""Return :math:`\int\phi_j\,J_n(kr)\,r\,dr` n = 0 and 1, shapes (k, rings), in m^2."""
-    s, weights = _nodes(rings, float(k.max()))
-    nodes = s.reshape(rings.size - 1, -1)
-    rising = ((nodes - rings[:-1, None]) / np.diff(rings)[:, None]).ravel()
-    starts = np.arange(0, s.size, nodes.shape[1])
-    transforms = []
-    for bessel in (j0, j1):
-        waves = bessel(np.multiply.outer(k, s)) * (weights * s)
-        right = np.add.reduceat(waves * rising, starts, axis=1)
-        transforms.append(surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right))
-    return transforms[0], transforms[1]
+    zero, one = (_hat_transform(rings.tobytes(), k.tobytes(), order) for order in (0, 1))
+    return zero, one
 
 
-def _nodes(rings: FloatArray, fastest: float) -> tuple[FloatArray, FloatArray]:
-    """Return Gauss nodes between the rings, enough for ``fastest`` rad/m in the widest gap."""
-    return gauss_between(rings, order=4 + math.ceil(0.7 * fastest * float(np.diff(rings).max())))
+#: Wavenumbers that are treated together: bounds the memory.
+_CHUNK = 2048
 
 
-# x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
-_LARGEST_KH_OF_LAYER = 22.0
-# Phase, in rad, that one panel of the k-quadrature may span.
-_PHASE_OF_LAYER = 12.0
+@lru_cache(maxsize=8)
+def _hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
+    """Return the hats' transforms of one order, (k, rings); the contacts of a path share them."""
+    rings, k = np.frombuffer(ring_bytes), np.frombuffer(k_bytes)
+    widths = np.diff(rings)
+    # Gauss nodes between the rings, enough for the largest wavenumber in the widest gap.
+    count = 4 + math.ceil(0.7 * float(k.max() * widths.max()))
+    s, weights = gauss_between(rings, count)
+    rising = ((s.reshape(widths.size, count) - rings[:-1, None]) / widths[:, None]).ravel()
+    waves = (j0, j1)[order](np.multiply.outer(k, s)) * (weights * s)
+    starts = np.arange(0, s.size, count)
+    right = np.add.reduceat(waves * rising, starts, axis=1)
+    return surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,9 +351,10 @@ _Pair = tuple[FloatArray, FloatArray]
 
 
 def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
-    """Return quadrature nodes for the layer's share, seen at distances up to ``reach``."""
+    """Return quadrature nodes for layer and base, seen at distances up to ``reach``."""
+    # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
     h = film.thickness
-    return gauss_panels(_LARGEST_KH_OF_LAYER / h, min(1.5 / h, _PHASE_OF_LAYER / max(reach, h)))
+    return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
 
 
 def _layer_integrals(

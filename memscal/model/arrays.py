@@ -74,14 +74,14 @@ def require_increasing(name: str, values: FloatArray) -> None:
 
 
 def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
-    """Return a cubic spline through a table; for one with an edge a monotone one, and ``True``."""
+    """Return a cubic spline through a table (n,) or (n, m); a monotone one of an edge, and True."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
     # A table has an edge where it changes by a twentieth of its range within an interval that is
     # narrower than a tenth of its neighbours.
-    widths, jumps = np.diff(x), np.abs(np.diff(y))
+    widths, jumps = np.diff(x), np.abs(np.diff(y, axis=0))
     narrow = widths[1:-1] < 0.1 * np.minimum(widths[:-2], widths[2:])
-    sharp = bool(np.any(jumps[1:-1][narrow] > 0.05 * np.ptp(y)))
+    sharp = bool(np.any(jumps[1:-1][narrow] > 0.05 * np.ptp(y, axis=0)))
     # A cubic spline swings about an edge, by more than the table holds.
     return (PchipInterpolator if sharp else CubicSpline)(x, y), sharp
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from memscal.errors import ConvergenceError
 from memscal.mechanics.solver import step
 from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target, Touch
-from memscal.model.arrays import FloatArray
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
 _PULL = 1e-2
@@ -139,6 +138,7 @@ class _Walk:
     steps: int = 0
     work: float = 0.0
     dissipated: float = 0.0
+    ahead: ContactState | None = None  # the next meeting, beyond the target that came before it
 
     def step_to(self, following: ContactState) -> None:
         before = self.state
@@ -188,11 +188,12 @@ def _step_by_step(
 def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     """Go to the target, ring by ring; return the walk as it was at the last ring before it."""
     problem = walk.problem
-    while (following := _next_meeting(problem, walk.state, target, rising=rising)) is not None:
+    while following := walk.ahead or _next_meeting(problem, walk.state, target, rising=rising):
+        walk.ahead = None
         begin, end = _reached(walk.state, target), _reached(following, target)
         if not (begin < end <= target.value or begin > end >= target.value):
             # The path goes on from the ring before: a state between two rings changes no other.
-            before = replace(walk)
+            before = replace(walk, ahead=following)
             walk.step_to(_mixture(walk.state, following, target))
             return before
         walk.step_to(following)
@@ -239,13 +240,17 @@ def _next_meeting(
 
 
 def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return np.asarray(np.append(False, rings[:-1]) | np.append(rings[1:], False))
+    beside = np.zeros_like(rings)
+    beside[1:] = rings[:-1]
+    beside[:-1] |= rings[1:]
+    return beside
 
 
 def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:
     r"""Return :math:`\frac12\int(p\,w + q\,u)\,dA`, in J (Clapeyron)."""
     w, u = problem.displacements(state.pressure, state.shear)
-    return 0.5 * _surface_integral(problem.compliance.r, (state.pressure, w), (state.shear, u))
+    products = problem.compliance.products
+    return 0.5 * float(state.pressure @ (products @ w) + state.shear @ (products @ u))
 
 
 def _dissipation(problem: ContactProblem, before: ContactState, after: ContactState) -> float:
@@ -254,15 +259,4 @@ def _dissipation(problem: ContactProblem, before: ContactState, after: ContactSt
     slipped = np.where(slips, after.anchor - before.anchor, 0.0)
     # A ring that turns around slips under the shear that it has at the end.
     shear = np.where(before.slip == after.slip, (before.shear + after.shear) / 2, after.shear)
-    return -_surface_integral(problem.compliance.r, (shear, slipped))
-
-
-def _surface_integral(r: FloatArray, *products: tuple[FloatArray, FloatArray]) -> float:
-    """Integrate products of functions that are linear between rings; exact."""
-    left, right, width = r[:-1], r[1:], np.diff(r)
-    total = 0.0
-    for f, g in products:
-        # Cubic integrand: Simpson's rule is exact.
-        middle = (left + right) * (f[:-1] + f[1:]) * (g[:-1] + g[1:]) / 2
-        total += float(np.sum(width / 6 * (left * (f * g)[:-1] + middle + right * (f * g)[1:])))
-    return 2 * np.pi * total
+    return -float(shear @ (problem.compliance.products @ slipped))

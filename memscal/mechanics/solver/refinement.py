@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -38,11 +39,11 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
         return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
     spacing = reach / count
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
-    local = np.full(r.size, spacing)
-    for edge in edges:
-        local = np.minimum(local, np.hypot(_FINEST * spacing, _GROWTH * (r - edge)))
+    near = np.sort(edges)
+    distance = r - near[np.searchsorted((near[1:] + near[:-1]) / 2, r)]
     # Where the number of rings passed so far is whole, there is one.
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
+    density = 1 / np.minimum(spacing, np.hypot(_FINEST * spacing, _GROWTH * distance))
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (density[1:] + density[:-1]))])
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
@@ -112,16 +113,18 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     # Doubled until the contact ends within the rings; shortened until it fills a good part of them.
     reach = film.thickness
     while True:
-        rings = np.linspace(0.0, reach, _COARSE)
+        model = _even_film(film, reach)
+        rings = model.r
         try:
-            states = [point.state for point in _follow(request, HankelFilm(film, rings))]
+            points = [] if _overflows(request, model) else _follow(request, model)
         except ConvergenceError:
             # A contact that has run off the rings may not settle.
             if reach > _WIDEST * film.thickness:
                 raise
             reach *= 2
             continue
-        filled = max(int(np.flatnonzero(state.pressure > 0)[-1]) for state in states)
+        states = [point.state for point in points]
+        filled = max((int(np.flatnonzero(s.pressure > 0)[-1]) for s in states), default=_COARSE)
         if filled >= _COARSE - 4:
             reach *= 2
         elif filled < _COARSE // 3 and reach > 1e-6 * film.thickness:
@@ -143,6 +146,21 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
             cure="Lower the load or the depth, or extend the profile.",
         )
     return [_contact_radius(request, rings, state) for state in states], within
+
+
+def _overflows(request: RingRequest, model: HankelFilm) -> bool:
+    """Whether a contact fills all rings: without friction, at once; with it, it is hardly less."""
+    farthest = max(request.targets, key=lambda target: target.value)
+    smooth = replace(request, targets=(farthest,), friction=0.0, interface=Interface())
+    with suppress(ConvergenceError):
+        return bool(_follow(smooth, model)[0].state.pressure[-1] > 0)
+    return False
+
+
+@lru_cache(maxsize=16)
+def _even_film(film: ElasticFilm, reach: float) -> HankelFilm:
+    """Return a film with even rings up to ``reach`` (m): several coefficients share it."""
+    return HankelFilm(film, np.linspace(0.0, reach, _COARSE))
 
 
 def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathPoint]:

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +54,8 @@ class ContactProblem:
 
     def displacements(self, p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
-        c = self.compliance
-        return c.normal @ p + c.normal_by_shear @ q, c.radial_by_pressure @ p + c.radial @ q
+        both = self.compliance.whole @ np.concatenate([p, q])
+        return both[: self.size], both[self.size :]
 
     def separations(self, state: ContactState) -> FloatArray:
         """Return the distance between the two surfaces in m, ``inf`` beyond the indenter."""
@@ -124,29 +125,37 @@ class _Status:
     stretch: FloatArray
 
 
-_Tractions = tuple[FloatArray, FloatArray, float]  # pressure and shear (Pa), and the depth (m)
+class _Trial(NamedTuple):
+    """Tractions and depth that fulfil the equations of a status and a goal."""
+
+    pressure: FloatArray  # Pa
+    shear: FloatArray  # Pa
+    depth: float  # m
+    separation: FloatArray  # of the two surfaces, in m
+    outward: FloatArray  # displacement in m
 
 
-def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tractions:
-    """Return the tractions and the depth that fulfil the equations of ``status`` and ``goal``."""
-    c, mu = problem.compliance, problem.friction
-    off_axis = c.r > 0
-    rows = np.flatnonzero(status.pressing)
-    sticks = status.pressing & (status.slip == 0) & off_axis
-    stuck = np.flatnonzero(sticks) if mu > 0 else rows[:0]
+def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trial:
+    c, mu, n = problem.compliance, problem.friction, problem.size
+    rows, off_axis = np.flatnonzero(status.pressing), c.r > 0
+    stuck = np.flatnonzero(status.pressing & (status.slip == 0) & off_axis) if mu > 0 else rows[:0]
     # Shear of a slipping ring per pressure.  Nothing slips where friction has no bound.
     bounded = mu if math.isfinite(mu) else 0.0
-    ratio = bounded * np.where(off_axis, status.slip, 0)[rows]
+    ratio = bounded * (status.slip * off_axis)[rows]
+    slipping = np.flatnonzero(ratio)
 
-    # In units of the film's own compliance, the matrix mixes pressures with pressures.
-    unit = c.normal[0, 0]
-    by_rows = c.normal[:, rows] + c.normal_by_shear[:, rows] * ratio
-    normal = np.hstack([by_rows, c.normal_by_shear[:, stuck], np.full((problem.size, 1), -unit)])
-    by_rows = c.radial_by_pressure[np.ix_(stuck, rows)] + c.radial[np.ix_(stuck, rows)] * ratio
-    radial = np.hstack([by_rows, c.radial[np.ix_(stuck, stuck)], np.zeros((stuck.size, 1))])
-    last, value = _goal_row(problem, goal, normal, rows, unit)
-    matrix = np.vstack([normal[rows], radial, last])
-    right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [value]])
+    # In units of the film's own compliance, the matrix mixes pressures with pressures.  The last
+    # row is the goal's, from the start that of a ring which the surfaces are to meet.
+    unit, ring = c.whole[0, 0], goal.ring if isinstance(goal, Touch) else 0
+    unknown = np.concatenate([rows, n + stuck])
+    equations = c.whole.take(np.append(unknown, ring), axis=0)
+    matrix = np.zeros((equations.shape[0], equations.shape[0]))
+    matrix[:, :-1] = equations.take(unknown, axis=1)
+    matrix[:, slipping] += equations.take(n + rows[slipping], axis=1) * ratio[slipping]
+    matrix[: rows.size, -1] = matrix[-1, -1] = -unit
+    right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [-problem.heights[ring]]])
+    if not isinstance(goal, Touch):
+        matrix[-1], right[-1] = _goal_row(problem, goal, rows, unknown.size, unit)
     if (law := problem.interface.normal_law) is not None:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
@@ -165,27 +174,27 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trac
             cure="Check film, indenter and loads, and their units; try another number of rings.",
         ) from error
 
-    pressure, shear = np.zeros(problem.size), np.zeros(problem.size)
+    pressure, shear = np.zeros(n), np.zeros(n)
     pressure[rows] = solution[: rows.size]
     shear[rows] = ratio * solution[: rows.size]
     shear[stuck] = solution[rows.size : -1]
-    return pressure, shear, float(solution[-1]) * unit
+    depth = float(solution[-1]) * unit
+    w, u = problem.displacements(pressure, shear)
+    return _Trial(pressure, shear, depth, problem.heights - depth + w, u)
 
 
 def _goal_row(
-    problem: ContactProblem, goal: Goal, normal: FloatArray, rows: _Rings, unit: float
+    problem: ContactProblem, goal: Target, rows: _Rings, unknowns: int, unit: float
 ) -> tuple[FloatArray, float]:
     """Return the equation that ends the step, of the size of the others."""
-    row = np.zeros(normal.shape[1])
+    row = np.zeros(unknowns + 1)
     if isinstance(goal, Load):
         areas = problem.compliance.areas
         scale = unit / areas.sum()
         row[: rows.size] = areas[rows] * scale
         return row, goal.value * scale
-    if isinstance(goal, Depth):
-        row[-1] = unit
-        return row, goal.value
-    return normal[goal.ring], -float(problem.heights[goal.ring])
+    row[-1] = unit
+    return row, goal.value
 
 
 def _add_tangential_compliance(
@@ -224,21 +233,24 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    law, separation = problem.interface.normal_law, problem.separations(start)
-    pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
+    law, pressing = problem.interface.normal_law, start.touching.copy()
+    separation = np.zeros(problem.size)  # counts where the interface is compliant alone
+    if law is not None:
+        separation = problem.separations(start)
+        pressing = _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
     if held is not None:
         pressing[held] = False
     stretch = start.outward - start.anchor
     status = _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        tractions = _solve_system(problem, status, goal)
-        revised, settled = _revise(problem, status, tractions, held, iteration > _CAREFUL_AFTER)
+        trial = _solve_system(problem, status, goal)
+        revised, settled = _revise(problem, status, trial, held, iteration > _CAREFUL_AFTER)
         if same_contact:
-            changed = not np.array_equal(revised.slip, status.slip)
-            revised, settled = replace(revised, pressing=status.pressing), not changed
+            settled = np.array_equal(revised.slip, status.slip)
+            revised = replace(revised, pressing=status.pressing)
         if settled:
-            return _accepted(problem, status, tractions, held)
+            return _accepted(problem, status, trial, held)
         status = revised
     raise ConvergenceError(
         f"The contact did not settle within {_MOST_ITERATIONS} iterations on the way to {goal}.",
@@ -254,82 +266,77 @@ def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) ->
 
 
 def _revise(
-    problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None, careful: bool
+    problem: ContactProblem, status: _Status, trial: _Trial, held: int | None, careful: bool
 ) -> tuple[_Status, bool]:
-    """Return a status that the tractions do not contradict, and whether nothing changed."""
-    p, q, depth = tractions
-    w, u = problem.displacements(p, q)
-    gap = problem.heights - depth + w
-    slip, tangential = _revised_slip(problem, status, tractions, u, careful)
-    law = problem.interface.normal_law
+    """Return a status that the trial does not contradict, and whether nothing changed."""
+    p, separation = trial.pressure, trial.separation
+    slip, tangential = _revised_slip(problem, status, trial, careful)
+    law, normal = problem.interface.normal_law, False
     if law is None:
-        pressing = _revised_contact(status, tractions, gap, held, careful=careful)
-        separation, normal = gap, bool(np.any(pressing != status.pressing))
+        pressing = _revised_contact(status, trial, held, careful=careful)
+        normal = not np.array_equal(pressing, status.pressing)
     else:
-        separation = _revised_separation(problem.film, law, status, tractions, gap)
-        pressing, normal = _bearing(problem, law, separation), False
-    moved = np.max(np.abs(p - status.pressure)) > _SETTLED * p.max()
-    settled = not (normal or tangential or (moved and not problem.interface.rigid))
-    length = problem.interface.slip_length
-    stretch = np.clip(u - status.anchor, -length, length)
+        separation = _revised_separation(problem.film, law, status, trial)
+        pressing = _bearing(problem, law, separation)
+    settled, stretch = not (normal or tangential), status.stretch
+    if not problem.interface.rigid:
+        settled &= bool(np.abs(p - status.pressure).max() <= _SETTLED * p.max())
+        length = problem.interface.slip_length
+        stretch = np.clip(trial.outward - status.anchor, -length, length)
     return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
 
 
 def _revised_contact(
-    status: _Status, tractions: _Tractions, gap: FloatArray, held: int | None, *, careful: bool
+    status: _Status, trial: _Trial, held: int | None, *, careful: bool
 ) -> NDArray[np.bool_]:
     """Let go of rings that pull, and catch rings that would pass through the indenter."""
-    p, _, depth = tractions
-    pulled = np.where(status.pressing, -p / np.abs(p).max(initial=1e-300), 0.0)
-    passed = np.where(status.pressing, 0.0, -gap / max(abs(depth), 1e-300))
+    pull = -trial.pressure / np.abs(trial.pressure).max(initial=1e-300)
+    overlap = -trial.separation / max(abs(trial.depth), 1e-300)
+    wrong = np.where(status.pressing, pull, overlap)
     if held is not None:
-        passed[held] = 0.0
-    wrong = np.maximum(pulled, passed)
+        wrong[held] = 0.0
     changing = wrong > _SLACK
-    if careful and np.any(changing):
+    if careful and changing.any():
         changing = np.arange(wrong.size) == np.argmax(wrong)
     return status.pressing ^ changing
 
 
 def _revised_slip(
-    problem: ContactProblem, status: _Status, tractions: _Tractions, u: FloatArray, careful: bool
+    problem: ContactProblem, status: _Status, trial: _Trial, careful: bool
 ) -> tuple[NDArray[np.int8], bool]:
     """Let rings slip whose shear is too large, and stick that would be pushed on by friction."""
     mu = problem.friction
     if mu == 0 or np.isinf(mu):
         return status.slip, False
-    p, q, _ = tractions
-    largest = mu * np.abs(p).max()
-    sticks = status.pressing & (status.slip == 0)
-    slips = status.pressing & (status.slip != 0) & (problem.compliance.r > 0)
-    excess = np.where(sticks, (np.abs(q) - mu * np.maximum(p, 0.0)) / largest, 0.0)
-    # A slipping ring stretches the interface by its slip length, against the shear.
-    short = status.slip * (u - status.anchor) + problem.interface.slip_length
-    reach = np.max(np.abs(u)) + problem.interface.slip_length
-    pushed = np.where(slips, short / reach, 0.0)
-    wrong = np.maximum(excess, pushed)
+    p, q, u, sticks = np.maximum(trial.pressure, 0.0), trial.shear, trial.outward, status.slip == 0
+    stretch, length = u - status.anchor, problem.interface.slip_length
+    excess = (np.abs(q) - mu * p) / (mu * np.abs(trial.pressure).max())
+    # A slipping ring stretches the interface by its slip length, against the shear; on the axis
+    # nothing slips.
+    pushed = (status.slip * stretch + length) / (np.abs(u).max() + length)
+    pushed *= problem.compliance.r > 0
+    wrong = np.where(sticks, excess, pushed) * status.pressing
     changing = wrong > _SLACK
-    if not np.any(changing):
+    if not changing.any():
         return status.slip, False
     if careful:
         changing = np.arange(wrong.size) == np.argmax(wrong)
     # A ring that friction would push on far enough to slip back does so at once (the trial shear
     # of Alart and Curnier); sticking first, it could go back and forth for ever.
-    stretch = u - status.anchor
-    turn = 2 * mu * np.maximum(p, 0.0) * np.diagonal(problem.compliance.radial)
-    turns = np.abs(stretch) > np.maximum(turn, problem.interface.slip_length)
+    turn = 2 * mu * p * np.diagonal(problem.compliance.radial)
+    turns = np.abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
     slip = np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
     return slip.astype(np.int8), True
 
 
 def _revised_separation(
-    film: ElasticFilm, law: NormalLaw, status: _Status, tractions: _Tractions, gap: FloatArray
+    film: ElasticFilm, law: NormalLaw, status: _Status, trial: _Trial
 ) -> FloatArray:
     """Return the next trial of the separations."""
     # Where the surfaces part, the linear equations' own; where they close, the one at which the
     # (convex) law bears the linear equations' pressure.
-    before, p = status.separation, tractions[0]
+    before, gap, p = status.separation, trial.separation, trial.pressure
     after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
     closing = status.pressing & (gap < before) & (p > 0)
     borne = law.separation(np.where(closing, p, 1.0), film)
@@ -337,10 +344,9 @@ def _revised_separation(
 
 
 def _accepted(
-    problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None
+    problem: ContactProblem, status: _Status, trial: _Trial, held: int | None
 ) -> ContactState:
-    p, q, depth = tractions
-    _, u = problem.displacements(p, q)
+    p, q, depth, _, u = trial
     slip = np.where(status.pressing, status.slip, 0).astype(np.int8)
     # What slips drags its anchor along, a slip length behind; what is free has none.
     moving = ~status.pressing | (slip != 0)
