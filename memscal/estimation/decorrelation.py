@@ -6,16 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import solve_banded, solve_triangular
 
 from memscal.model.arrays import FloatArray
+from memscal.model.correlation import is_banded
 
 
 @dataclass(frozen=True, eq=False)
 class Decorrelation:
     r"""Makes noise of covariance :math:`(1 + S S^T) C` or :math:`C`, block by block, white."""
 
-    # Points of each block, and the lower Cholesky factor of their correlation C.
+    # Points of each block, and the lower Cholesky factor of their correlation C, or its diagonals.
     blocks: tuple[tuple[NDArray[np.intp], FloatArray], ...]
     # Orthonormal columns (n, q) of what changes all points in common, after that; its growth (q,).
     common: FloatArray | None = None
@@ -25,28 +26,28 @@ class Decorrelation:
         """Make columns (n,) or (n, m) white."""
         white = values.copy()
         for rows, root in self.blocks:
-            white[rows] = solve_triangular(root, values[rows], lower=True)
+            white[rows] = _solved(root, values[rows])
         return self._scaled(white, 1.0)
 
     def adjoint(self, values: FloatArray) -> FloatArray:
         """The transposed transformation of columns."""
         white = self._scaled(values, 1.0).copy()
         for rows, root in self.blocks:
-            white[rows] = solve_triangular(root, white[rows], lower=True, trans="T")
+            white[rows] = _solved(root, white[rows], transposed=True)
         return white
 
     def correlate(self, white: FloatArray) -> FloatArray:
         """Give white noise the correlation: the inverse of :meth:`apply`."""
         values = self._scaled(white, -1.0).copy()
         for rows, root in self.blocks:
-            values[rows] = root @ values[rows]
+            values[rows] = _product(root, values[rows])
         return values
 
     def correlate_adjoint(self, values: FloatArray) -> FloatArray:
         """The transposed of :meth:`correlate`."""
         moved = values.copy()
         for rows, root in self.blocks:
-            moved[rows] = root.T @ values[rows]
+            moved[rows] = _product(root, values[rows], transposed=True)
         return self._scaled(moved, -1.0)
 
     def _scaled(self, values: FloatArray, power: float) -> FloatArray:
@@ -55,3 +56,28 @@ class Decorrelation:
             return values
         along = self.common.T @ values
         return np.asarray(values + self.common @ (along.T * (self.growth**-power - 1)).T)
+
+
+def _solved(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
+    """Solve L x = values, or L' x = values."""
+    if not is_banded(root):
+        return np.asarray(solve_triangular(root, values, lower=True, trans=1 if transposed else 0))
+    below = len(root) - 1
+    if not transposed:
+        return np.asarray(solve_banded((below, 0), root, values))
+    upper = np.zeros_like(root)
+    for i, diagonal in enumerate(root):
+        upper[below - i, i:] = diagonal[: diagonal.size - i]
+    return np.asarray(solve_banded((0, below), upper, values))
+
+
+def _product(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
+    """L times columns, or L' times them."""
+    if not is_banded(root):
+        return np.asarray((root.T if transposed else root) @ values)
+    total, count = np.zeros_like(values), len(values)
+    for i, diagonal in enumerate(root):
+        above, below = slice(0, count - i), slice(i, count)
+        to, of = (above, below) if transposed else (below, above)
+        total[to] += (diagonal[above] * values[of].T).T
+    return total

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
+from memscal.model.correlation import across, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
@@ -249,7 +250,7 @@ def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], t
                 cure='Take one centre for all (centre="common", --centre common).',
             )
         between = scan.u_zz_correlation if scan.kind == "points" else None
-        if between is not None and between[np.not_equal.outer(passes, passes)].any():
+        if between is not None and across(between, passes):
             problem = "u_zz_correlation correlates the noise of one repeat with that of another."
             why = "Repeats with centres of their own are fitted as separate measurements."
             cure = 'Take one centre for all (centre="common", --centre common).'
@@ -353,8 +354,7 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> Decorrelation | None:
     for measured in keep.reshape(-1, size):
         kept = np.flatnonzero(measured)
         if (key := measured.tobytes()) not in roots and kept.size:
-            chosen = scan.u_zz_correlation[np.ix_(kept, kept)]
-            roots[key] = np.asarray(np.linalg.cholesky(chosen), dtype=np.float64)
+            roots[key] = root_of(of_points(scan.u_zz_correlation, kept))
         if kept.size:
             blocks.append((np.arange(first, first + kept.size), roots[key]))
         first += kept.size

@@ -188,7 +188,8 @@ def _data_group(scan: Scan) -> Group:
         data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
     data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:
-        data |= {axis: writer.index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
+        pairs = zip(_PAIRS, scan.u_zz_correlation.shape, strict=True)
+        data |= {axis: writer.index_axis(axis, size) for axis, size in pairs}
         data |= _nodes(scan, {"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
     optional = {name: getattr(scan, name) for name in LIKE_SIGNAL}
     data |= _nodes(scan, optional | dict(scan.channels), axes)

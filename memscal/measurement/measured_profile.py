@@ -25,6 +25,7 @@ from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
+from memscal.model.correlation import scaled
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
@@ -245,8 +246,7 @@ def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan
         flat = total.reshape(-1, correlation.shape[0])
         ours = electronic.reshape(flat.shape)
         share = np.sqrt(np.nanmean(ours**2, axis=0) / np.nanmean(flat**2, axis=0))
-        correlation = correlation * np.outer(share, share)
-        np.fill_diagonal(correlation, 1.0)
+        correlation = scaled(correlation, share)
     return replace(scan, u_zz_errors=total, u_zz_correlation=correlation)
 
 

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.model import arrays
 from memscal.model.arrays import FloatArray
+from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
-from memscal.model.sizes import MOST_CORRELATED, too_large
 from memscal.model.stress import StressProfile
 
 IntArray = NDArray[np.intp]
@@ -194,8 +194,6 @@ LUBRICATIONS = ("", "dry", "lubricated")
 BRANCHES = {"approach": 1, "retreat": 2}
 """Numbers of the indenter's branches; 0 where none is stated."""
 
-#: A combination of voltages with less of the noise than this would outweigh all others.
-_LEAST_EIGENVALUE = 1e-8
 #: Points that spread by less of their length across it are a line.
 _LINE = 0.01
 
@@ -239,35 +237,6 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
         cure = "Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known."
         raise InputError(problem, why=why, cure=cure)
     return numbers.astype(np.int64)
-
-
-def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
-    """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
-    if size > MOST_CORRELATED:
-        why = "The cube of their number is worked with."
-        cure = "Average neighbouring readings, or leave it out: their noise is then estimated."
-        raise too_large("u_zz_correlation", size, MOST_CORRELATED, "points", why=why, cure=cure)
-    correlation = arrays.frozen_array(stated)
-    if correlation.shape != (size, size) or not np.isfinite(correlation).all():
-        raise InputError(
-            f"u_zz_correlation has shape {correlation.shape}, but it should be ({size}, {size}) "
-            "and finite.",
-            why="It correlates every point of one repeat with every other.",
-        )
-    symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
-    if not (symmetric and np.allclose(np.diag(correlation), 1.0)):
-        raise InputError(
-            "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
-            cure="Divide a covariance by the standard uncertainties of row and column, and "
-            "give those as u_zz_errors.",
-        )
-    least = float(np.linalg.eigvalsh(correlation)[0])
-    if least <= _LEAST_EIGENVALUE:
-        problem = f"u_zz_correlation is not positive definite: it has the eigenvalue {least:.3g}."
-        why = "Some combination of the voltages would have no noise, or less than none."
-        cure = "Add the electronic noise, which is independent from point to point."
-        raise InputError(problem, why=why, cure=cure)
-    return correlation
 
 
 def require_plane(x: FloatArray, y: FloatArray) -> None:
@@ -350,7 +319,7 @@ class Scan:
         Standard uncertainty of each position, independent from point to point, in m.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
         Correlation of the noise between the points of one repeat (of kind points: between all);
-        none where absent.
+        none where absent.  With shape (n, w) that of each point with itself and the next w - 1.
     direction : str
         ``"x"`` or ``"y"``: which way a line scan ran across the sensor; its positions are in ``x``.
     position_scale_uncertainty : float, optional
@@ -520,7 +489,7 @@ class Scan:
                 if (values := getattr(self, name)) is not None:
                     changes[name] = values[keep]
             if self.u_zz_correlation is not None:
-                changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
+                changes["u_zz_correlation"] = of_points(self.u_zz_correlation, keep)
         for name in ("branch", "u_zz", *LIKE_SIGNAL):
             if (values := getattr(self, name)) is not None:
                 changes[name] = values[keep]

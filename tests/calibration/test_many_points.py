@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from helpers.rasters import tailed_raster
 
 import memscal
 from memscal.calibration import field_uncertainty, fields
+from memscal.errors import InputError
 from memscal.estimation import forward, gaussian, profile, residuals, smoothing, voltage_map
+from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
 LINE = memscal.simulate(noise=0.005, seed=1)
@@ -21,6 +24,73 @@ def correlated(scan: Scan) -> Scan:
     apart = np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
     noise = np.full(scan.u_zz.shape, 0.005 * np.ptp(scan.u_zz))
     return replace(scan, u_zz_correlation=0.3**apart, u_zz_errors=noise)
+
+
+def correlated_with_neighbours(scan: Scan, width: int) -> list[Scan]:
+    """The same noise, stated for neighbours alone; its correlation ends after ``width`` points."""
+    x = scan.x.size
+    apart = np.abs(np.subtract.outer(np.arange(x), np.arange(x)))
+    whole = np.where(apart < width, 0.3**apart, 0.0)
+    columns = [np.append(np.diag(whole, j), np.zeros(j)) for j in range(width)]
+    peak = np.nanmax(scan.u_zz)
+    scan = replace(scan, u_zz_errors=np.full(scan.u_zz.shape, 0.005 * peak))
+    both = whole, np.stack(columns, axis=1)
+    return [replace(scan, u_zz_correlation=correlation) for correlation in both]
+
+
+def test_correlation_of_neighbours_is_that_of_all_pairs() -> None:
+    u = memscal.simulate(noise=0.005, seed=3, repeats=2).u_zz.copy()
+    u[0, 5], u[1, 30:33] = np.nan, np.nan
+    scan = replace(memscal.simulate(noise=0.005, seed=3, repeats=2), u_zz=u)
+    whole, banded = (
+        memscal.calibrate(s).apparatus.parameters for s in correlated_with_neighbours(scan, 4)
+    )
+    u_stated = np.sqrt(np.diag(whole.covariance))
+    assert np.abs((whole.values - banded.values) / u_stated).max() < 2e-6
+    assert (
+        np.abs((whole.covariance - banded.covariance) / np.outer(u_stated, u_stated)).max() < 2e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("band", "found"),
+    [
+        (np.tile([1.0, 0.9], (65, 1)), "beyond the end"),
+        (np.r_[np.tile([1.0, 0.9], (64, 1)), [[1.0, 0.0]]], "not positive definite"),
+        (np.r_[np.tile([2.0, 0.1], (64, 1)), [[2.0, 0.0]]], "first column"),
+        (np.ones((64, 2)), "should be (65, 65), or (65, w)"),
+    ],
+)
+def test_a_correlation_of_neighbours_that_is_none_is_refused(band: FloatArray, found: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        replace(LINE, u_zz_correlation=band)
+    assert found in str(refusal.value)
+
+
+def test_noise_of_many_points_may_be_correlated_with_neighbours(tmp_path: Path) -> None:
+    scan = memscal.simulate(points=20_001, noise=0.0, seed=1)
+    # A moving average of independent noise.
+    share = np.array([1.0, 0.5, 0.25]) / np.sqrt(1.3125)
+    independent = np.random.default_rng(1).standard_normal(20_003)
+    size = 0.005 * scan.u_zz.max()
+    noise = size * np.convolve(independent, share, mode="valid")
+    band = np.tile([1.0, 0.625 / 1.3125, 0.25 / 1.3125], (20_001, 1))
+    band[-1, 1:], band[-2, 2] = 0.0, 0.0
+    errors = np.full(scan.u_zz.shape, size)
+    scan = replace(scan, u_zz=scan.u_zz + noise, u_zz_errors=errors, u_zz_correlation=band)
+    memscal.write_scan(scan, tmp_path / "scan.h5")
+    apart, alone = (
+        memscal.calibrate(s).apparatus
+        for s in (memscal.read_scan(tmp_path / "scan.h5"), replace(scan, u_zz_correlation=None))
+    )
+    # The variance of a mean over many neighbours is 1 + 2 (0.476 + 0.190) times as large.
+    ratio = apart.budget["gaussian_sigma"]["noise"] / alone.budget["gaussian_sigma"]["noise"]
+    assert ratio**2 == pytest.approx(7 / 3, rel=0.03)
+    passed = [
+        {check.name: check.passed for check in a.checks}["residual_correlation"]
+        for a in (apart, alone)
+    ]
+    assert passed == [True, False]
 
 
 def with_an_outlier(scan: Scan) -> Scan:

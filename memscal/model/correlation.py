@@ -1,0 +1,117 @@
+"""Correlation of a scan's noise: of all pairs of points, (n, n), or of neighbours, (n, w).
+
+In the banded form column j is the correlation of each point with the j-th one after it.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from memscal.errors import InputError
+from memscal.model.arrays import FloatArray, frozen_array
+from memscal.model.sizes import MOST_CORRELATED, too_large
+
+#: A combination of voltages with less of the noise than this would outweigh all others.
+_LEAST_EIGENVALUE = 1e-8
+_NOT_POSITIVE = "u_zz_correlation is not positive definite"
+_WHY = "Some combination of the voltages would have no noise, or less than none."
+_CURE = "Add the electronic noise, which is independent from point to point."
+
+
+def is_banded(correlation: FloatArray) -> bool:
+    """Whether only neighbours are correlated."""
+    return bool(correlation.shape[0] != correlation.shape[1])
+
+
+def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
+    """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
+    correlation = frozen_array(stated)
+    shape = correlation.shape
+    if len(shape) != 2 or not shape[0] == size >= shape[1] or not np.isfinite(correlation).all():
+        raise InputError(
+            f"u_zz_correlation has shape {shape}, but it should be ({size}, {size}), or ({size}, w)"
+            " of neighbours, and finite.",
+            why="It correlates every point of one repeat with every other, or with the next w - 1.",
+        )
+    if is_banded(correlation):
+        _require_band(correlation)
+        return correlation
+    if size > MOST_CORRELATED:
+        why = "The cube of their number is worked with."
+        cure = "Give the correlation of neighbours alone, (n, w), or average neighbouring readings."
+        raise too_large("u_zz_correlation", size, MOST_CORRELATED, "points", why=why, cure=cure)
+    symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
+    if not (symmetric and np.allclose(np.diag(correlation), 1.0)):
+        raise InputError(
+            "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
+            cure="Divide a covariance by the standard uncertainties of row and column, and "
+            "give those as u_zz_errors.",
+        )
+    least = float(np.linalg.eigvalsh(correlation)[0])
+    if least <= _LEAST_EIGENVALUE:
+        problem = f"{_NOT_POSITIVE}: it has the eigenvalue {least:.3g}."
+        raise InputError(problem, why=_WHY, cure=_CURE)
+    return correlation
+
+
+def _require_band(band: FloatArray) -> None:
+    if not np.allclose(band[:, 0], 1.0):
+        problem = "u_zz_correlation is not one in its first column, of each point with itself."
+        raise InputError(problem, cure="Divide a covariance by the standard uncertainties.")
+    last = band[::-1][: band.shape[1]]
+    if np.any(np.triu(last, 1)):
+        problem = "u_zz_correlation correlates the last points with points beyond the end."
+        raise InputError(problem, cure="Give zeros there.")
+    try:
+        root_of(band)
+    except np.linalg.LinAlgError:
+        raise InputError(f"{_NOT_POSITIVE}.", why=_WHY, cure=_CURE) from None
+
+
+def of_points(correlation: FloatArray, kept: NDArray[np.intp]) -> FloatArray:
+    """Return the correlation of some of the points, in their order."""
+    if not is_banded(correlation):
+        return correlation[np.ix_(kept, kept)]
+    width = correlation.shape[1]
+    chosen = np.zeros((kept.size, min(width, kept.size)))
+    chosen[:, 0] = 1.0
+    for j in range(1, chosen.shape[1]):
+        apart = kept[j:] - kept[:-j]
+        near = apart < width
+        chosen[:-j, j][near] = correlation[kept[:-j][near], apart[near]]
+    if is_banded(chosen):
+        return chosen
+    # So few points that all are neighbours.
+    whole = np.zeros_like(chosen)
+    for j in range(kept.size):
+        diagonal = np.arange(kept.size - j)
+        whole[diagonal, diagonal + j] = whole[diagonal + j, diagonal] = chosen[diagonal, j]
+    return whole
+
+
+def scaled(correlation: FloatArray, factors: FloatArray) -> FloatArray:
+    """Multiply the correlation of each pair of points by a factor (n,) of both."""
+    if not is_banded(correlation):
+        product = correlation * np.outer(factors, factors)
+        np.fill_diagonal(product, 1.0)
+        return product
+    product = correlation.copy()
+    for j in range(1, correlation.shape[1]):
+        product[:-j, j] *= factors[:-j] * factors[j:]
+    return product
+
+
+def across(correlation: FloatArray, group: NDArray[np.intp]) -> bool:
+    """Whether points of different groups (n,) are correlated."""
+    if not is_banded(correlation):
+        return bool(correlation[np.not_equal.outer(group, group)].any())
+    columns = range(1, correlation.shape[1])
+    return any(bool(correlation[:-j, j][group[j:] != group[:-j]].any()) for j in columns)
+
+
+def root_of(correlation: FloatArray) -> FloatArray:
+    """Lower Cholesky factor L: (n, n), or its diagonals (w, n), the main one first."""
+    from scipy.linalg import cholesky_banded
+
+    if is_banded(correlation):
+        return np.asarray(cholesky_banded(correlation.T, lower=True), dtype=np.float64)
+    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
