@@ -11,7 +11,7 @@ import pytest
 
 import memscal
 
-WORKING_STATE = {"Posterior", "Reading", "SetUp", "Solution"}
+WORKING_STATE = {"Decorrelation", "Posterior", "Reading", "SetUp", "Solution"}
 """Types of attributes through which a result shows how it was computed."""
 
 LIST_LIBRARIES = """

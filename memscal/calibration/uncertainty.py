@@ -305,8 +305,9 @@ def changes_by(
 ) -> FloatArray:
     """Changes by one standard uncertainty of each input, (inputs, m): of numbers of ``values``."""
     # Beyond the named ones, of G and its transfer, which no factor changes.
-    voltages = np.array([effect.voltage for effect in effects.values()])
-    changes = (by_voltage @ voltages.reshape(len(effects), -1).T).T
+    if not effects:
+        return np.zeros((0, len(by_voltage)))
+    changes = (by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)).T
     scaled = [name.startswith("conversion_constant") for name in names]
     for column, effect in zip(changes, effects.values(), strict=True):
         column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling

@@ -14,10 +14,9 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation import residuals
 from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
-from memscal.estimation.gaussian import fit_gaussian_to_points
+from memscal.estimation.gaussian import ReducedScan, fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
 from memscal.model.arrays import FloatArray
@@ -332,7 +331,8 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     except FitError:
         return none
     angular = estimate.basis.angular
-    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    around = [angular.rings.signal(model, fit.centre)] if angular else []
+    reduced = ReducedScan.of(model, fit, weights, *around)
     basis = departure_basis(model, fit, reduced, angular)
     count = float((estimate.outlier_weight * ~plateau)[chosen].sum())
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0

@@ -44,8 +44,7 @@ from memscal.axisymmetry import kernels
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel, Rings, SmoothedDisc
 from memscal.estimation.angular import AngularDepartures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit
-from memscal.estimation.reduced_scan import ReducedScan
+from memscal.estimation.gaussian import GaussianFit, ReducedScan
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.model.arrays import FloatArray
 

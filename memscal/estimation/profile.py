@@ -14,9 +14,13 @@ from memscal.estimation.angular import AngularRings, angular_departures, isolate
 from memscal.estimation.bayesian import DepartureBasis, WeighedFit
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
-from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
+from memscal.estimation.gaussian import (
+    GaussianFit,
+    ReducedScan,
+    fit_gaussian_to_points,
+    robust_scale,
+)
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
@@ -261,7 +265,9 @@ def _weighed(
 ) -> tuple[DepartureBasis, WeighedFit]:
     """Weigh departures from a fit for ``count`` readings and a least noise."""
     rings, around = AngularRings.about(fit) if angular else None, None
-    reduced = ReducedScan.of(model, fit, weights, rings)
+    reduced = ReducedScan.of(
+        model, fit, weights, rings.signal(model, fit.centre) if rings else None
+    )
     if rings:
         kernels = bayesian.departure_basis(model, fit, reduced).kernels(model.k)
         radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
@@ -305,7 +311,8 @@ def log_marginal_likelihood(
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
     angular = estimate.basis.angular
-    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    around = [angular.rings.signal(model, fit.centre)] if angular else []
+    reduced = ReducedScan.of(model, fit, weights, *around)
     basis = bayesian.departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = float(estimate.outlier_weight.sum())

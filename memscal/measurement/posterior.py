@@ -38,10 +38,9 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_trans
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
+from memscal.estimation.gaussian import GaussianFit, ReducedScan, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear

@@ -24,10 +24,9 @@ from memscal.errors import FitError, InputError
 from memscal.estimation import reference
 from memscal.estimation.bayesian import departure_basis, supported, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import fit_gaussian_to_points
+from memscal.estimation.gaussian import ReducedScan, fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive

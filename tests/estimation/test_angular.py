@@ -9,7 +9,7 @@ from helpers.scans import estimated, simulated
 from scipy.signal import fftconvolve
 
 import memscal
-from memscal.estimation.angular import ORDERS, AngularDepartures, raster_noise
+from memscal.estimation.angular import ORDERS, AngularDepartures, AngularRings, raster_noise
 from memscal.estimation.points import measured_points
 
 RADII = np.array([0.3e-3, 0.8e-3])
@@ -19,7 +19,8 @@ ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
 def test_kernels_are_blurred_rings_of_their_order() -> None:
     blur, axis = 0.25e-3, np.arange(-60, 61) * 0.05e-3
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
-    kernels = AngularDepartures(RADII, blur, ONE_EACH).at(x, y)
+    departures = AngularDepartures(AngularRings(RADII, blur), ONE_EACH)
+    kernels = departures.at(x, y, np.eye(departures.count))
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     # A ring is many Gaussians around it, their heights cos and sin of m times the angle.
     for column, (m, turn, q) in enumerate(
@@ -38,10 +39,11 @@ def test_signals_are_the_convolutions_of_the_kernels() -> None:
     stress = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(
         np.hypot.outer(axis, axis)
     )
-    departures = AngularDepartures(RADII, 0.3e-3, ONE_EACH)
+    departures = AngularDepartures(AngularRings(RADII, 0.3e-3), ONE_EACH)
+    unit = np.eye(departures.count)
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
-    kernels = departures.at(x, y).T.reshape(-1, axis.size, axis.size)
-    signals = departures.signal(model, np.array([[0.15e-3, -0.1e-3]]))
+    kernels = departures.at(x, y, unit).T.reshape(-1, axis.size, axis.size)
+    signals = departures.signal(model, np.array([[0.15e-3, -0.1e-3]]), unit)
     rows = np.rint((model.points.y + 0.1e-3) / step).astype(int) + 240
     columns = np.rint((model.points.x - 0.15e-3) / step).astype(int) + 240
     for kernel, signal in zip(kernels, signals.T, strict=True):

@@ -18,7 +18,7 @@ def test_the_noise_of_a_component_is_what_many_scans_scatter(options) -> None:
     estimate = estimated(simulated(noise=0.01, **options))
     smoothed = smooth_profile(estimate)
     draws = np.random.default_rng().normal(0.0, estimate.noise, (4000, estimate.points.u.size))
-    scatter = (draws @ smoothed.gain.T).std(axis=0)
+    scatter = (smoothed.gain @ draws.T).std(axis=1)
     noise = find_band(estimate, smoothed).noise
     # 4000 draws know a standard deviation to 1.1 percent; the largest of 200 to five of those.
     counted = noise > 1e-3 * noise.max()

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 import memscal
 from memscal.errors import FitError
 from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
+from memscal.estimation.gaussian import ReducedScan
 from memscal.estimation.profile import point_messages
 
 
@@ -81,10 +82,9 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     estimate = estimated(scan)
     change = np.zeros_like(scan.u_zz)
     change[30] = 1e-3 * estimate.weighed.noise
-    again = weigh_departures(
-        replace(estimate.model, points=replace(estimate.points, u=estimate.points.u + change)),
-        estimate.gaussian, estimate.basis, estimate.weights, float(estimate.outlier_weight.sum()),
-    )  # fmt: skip
+    model = replace(estimate.model, points=replace(estimate.points, u=estimate.points.u + change))
+    reduced = ReducedScan.of(model, estimate.gaussian, estimate.weights)
+    again = weigh_departures(reduced, estimate.basis, float(estimate.outlier_weight.sum()))
     profile = estimate.basis.radial(np.linspace(0.0, 3e-3, 31))
     expected = profile @ (estimate.weighed.gain @ change)
     found = profile @ (again.mean - estimate.weighed.mean)

@@ -11,6 +11,7 @@ import memscal
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.residuals import (
     Residuals,
+    TestOutcome,
     chi_square_test,
     free_model,
     neighbour_correlation_test,
@@ -139,6 +140,11 @@ def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size() -> Non
     assert other.p_value == pytest.approx(one.p_value)
 
 
+def pure_error(scan: Scan) -> TestOutcome | None:
+    estimate = estimated(scan)
+    return pure_error_test(estimate, free_model(estimate))
+
+
 @pytest.mark.parametrize("scatter", [0.0, 5e-6])
 def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
     """Where the stage comes to rest elsewhere each time, as well."""
@@ -152,16 +158,17 @@ def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
             x = scan.x + np.random.default_rng(seed).normal(scale=scatter, size=scan.x.size)
             moved = np.interp(x, fine.x, fine.u_zz) - np.interp(scan.x, fine.x, fine.u_zz)
             scan = replace(scan, x=x, u_zz=scan.u_zz + moved)
-        p_values.append(pure_error_test(estimated(scan)).p_value)
+        p_values.append(pure_error(scan).p_value)
     low, high = rejected_share_bounds(scans, level)
     assert low <= np.mean(np.array(p_values) < level) <= high
-    assert pure_error_test(estimated(simulated(state_noise=False))) is None
+    assert pure_error(simulated(state_noise=False)) is None
 
 
 def test_the_pure_error_is_the_scatter_of_repeats() -> None:
     scan = simulated(repeats=3, points=33, state_noise=False)
     estimate = estimated(scan)
-    found, model = pure_error_test(estimate), free_model(estimate)
+    model = free_model(estimate)
+    found = pure_error_test(estimate, model)
     assert model.point.size == scan.u_zz.size
     pure = scan.u_zz.var(axis=0, ddof=1).mean()
     degrees = 33 - model.design.shape[1]

@@ -82,7 +82,7 @@ def test_repeats_and_both_sides_count_by_their_weights() -> None:
     scan = simulated(noise=0.005, centre=(0.0, 0.0))
     mirrored = np.stack([scan.u_zz, scan.u_zz[::-1]])
     errors = np.stack([scan.u_zz_errors] * 2)
-    gain = smooth_profile(estimated(replace(scan, u_zz=mirrored, u_zz_errors=errors))).gain
+    gain = smooth_profile(estimated(replace(scan, u_zz=mirrored, u_zz_errors=errors))).gain.dense()
     # At one distance, with one noise, every reading counts alike: repeats as well as sides.
     left_and_right, readings = gain[:, :65], gain[:, 65:]
     atol = 1e-6 * np.abs(gain).max()
@@ -91,5 +91,5 @@ def test_repeats_and_both_sides_count_by_their_weights() -> None:
     # A repeat of twice the noise has a quarter of the weight.
     repeats = simulated(noise=0.005, repeats=2)
     unequal = replace(repeats, u_zz_errors=repeats.u_zz_errors * np.array([[1.0], [2.0]]))
-    gain = smooth_profile(estimated(unequal)).gain
+    gain = smooth_profile(estimated(unequal)).gain.dense()
     np.testing.assert_allclose(gain[:, 65:], gain[:, :65] / 4, atol=1e-6 * np.abs(gain).max())
