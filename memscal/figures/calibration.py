@@ -27,6 +27,7 @@ from memscal.model.scan import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit
+_MOST_DRAWN = 5_000  # points of lines
 _Loads: TypeAlias = Sequence[tuple[str, ApparatusData]]  # each load's text and points
 
 
@@ -457,10 +458,18 @@ def calibration_figure(result: Calibrated) -> Figure:
     """Draw an apparatus function and the scan that it came from, after Fig. 2 of the paper."""
     data = apparatus_of(result)
     loads = _by_load(data)
+    lines = _text_lines(data, loads)
+    count = data.reconvolution.x.size
+    if (every := -(-count // _MOST_DRAWN)) > 1 and data.reconvolution.offset_x is None:
+        lines.append((f"Of {count:,} points every {every}th is drawn.", COLOURS["muted"], "normal"))
+        columns: dict[str, Any] = {
+            n: None if v is None else v[::every] for n, v in vars(data.reconvolution).items()
+        }
+        data = replace(data, reconvolution=Reconvolution(**columns))
+        loads = _by_load(data)
     apart, mapped = min(len(loads), _MOST_PANELS), min(len(loads), _MOST_MAPS)
     mapped *= data.reconvolution.offset_x is not None
     with style.house_style():
-        lines = _text_lines(data, loads)
         heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(apart - 3, 0)]
         heights += [_MAP_HEIGHT * mapped] * bool(mapped)
         figure = style.new_figure(sum(heights))

@@ -141,6 +141,18 @@ def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference)
     show("calibration, over a plain pipeline", ratio, 4)
 
 
+def test_a_calibration_costs_as_much_as_it_has_points() -> None:
+    # Beyond what a scan of few points costs; matrices over the points would cost 64 times as much.
+    scans = [memscal.simulate(points=points, noise=0.003, seed=1) for points in (20_001, 160_001)]
+    small, large = (lambda s=s: memscal.calibrate(s) for s in scans)
+    show("calibration of 160,000 points, over 20,000", turns(large, small, rounds=2), 16)
+    rasters = [
+        memscal.simulate(points=side, raster=True, noise=0.003, seed=1) for side in (65, 129)
+    ]
+    small, large = (lambda s=s: memscal.calibrate(s) for s in rasters)
+    show("calibration of a raster of 129 x 129 points, over 65 x 65", turns(large, small, 2), 8)
+
+
 SCANS = 400 if FULL else 100
 #: Processes start by importing: a second or two, which a few hundred scans outweigh.
 ALLOWED = 0.9 if SCANS > 100 else 1.2
