@@ -13,11 +13,11 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation import residuals
-from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
+from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
+from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
 from memscal.model.arrays import FloatArray

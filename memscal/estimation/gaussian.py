@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError, InputError
 from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
@@ -324,8 +324,7 @@ def _solve(
 
 
 def _gaussian_shape(k: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    kernel = gaussian_transfer(k, sigma)
-    return kernel, -sigma * k**2 * kernel
+    return gaussian_transfer(k, sigma), gaussian_transfer_slope(k, sigma)
 
 
 def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None) -> GaussianFit:

@@ -11,12 +11,12 @@ from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
 from memscal.estimation import bayesian
 from memscal.estimation.angular import AngularRings, angular_departures, isolated, raster_noise
-from memscal.estimation.bayesian import DepartureBasis, WeighedFit
+from memscal.estimation.bayesian import WeighedFit
 from memscal.estimation.decorrelation import Decorrelation
+from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
@@ -263,11 +263,11 @@ def _weighed(
     rings, around = AngularRings.about(fit) if angular else None, None
     reduced = ReducedScan.of(model, fit, weights, rings)
     if rings:
-        kernels = bayesian.departure_basis(model, fit, reduced).kernels(model.k)
+        kernels = departure_basis(model, fit, reduced).kernels(model.k)
         radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
         columns = reduced.data, reduced.flat, radial, reduced.rings
         around = angular_departures(rings, fit, columns, noise)
-    basis = bayesian.departure_basis(model, fit, reduced, around)
+    basis = departure_basis(model, fit, reduced, around)
     return basis, bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
 
 
@@ -306,7 +306,7 @@ def log_marginal_likelihood(
         return np.full(2, -np.inf)
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
-    basis = bayesian.departure_basis(model, fit, reduced, angular)
+    basis = departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = float(estimate.outlier_weight.sum())
     weighed = bayesian.weigh_departures(reduced, basis, count, least_noise=least)

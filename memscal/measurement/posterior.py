@@ -36,12 +36,12 @@ from scipy.special import hyp0f1
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
+from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
@@ -131,10 +131,9 @@ class _Basis(DepartureBasis):
 
     shape: PressureShape
 
-    def kernels(self, k: FloatArray) -> FloatArray:
-        kernel, slope = self.shape.transform(k, self.sigma)
-        rings = [ring.transform(k) for ring in self.rings]
-        return self._columns(kernel, self.conversion_constant * slope, rings)
+    def _sensor(self, place: FloatArray, _: Side) -> tuple[FloatArray, FloatArray]:
+        kernel, slope = self.shape.transform(place, self.sigma)
+        return kernel, self.conversion_constant * slope
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,12 +22,12 @@ from memscal.calibration.uncertainty import Results, input_effects
 from memscal.deconvolution.division import Method, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation import reference
-from memscal.estimation.bayesian import departure_basis, supported, weigh_departures
+from memscal.estimation.bayesian import supported, weigh_departures
+from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
-from memscal.estimation.reduced_scan import ReducedScan
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
