@@ -12,6 +12,9 @@ from scipy.special import chndtr, i0e, j0, j1
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, require_positive
 
+#: Beyond its edge by so many widths of the blur nothing is left of a disc.
+_FARTHEST = 9.0
+
 
 def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
     r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""
@@ -43,7 +46,9 @@ def disc_transfer(k: FloatArray, radius: FloatArray, sigma: FloatArray) -> Float
 def blurred_disc(r: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
     """Discs of unit integral, blurred by Gaussians, at radii ``r`` (m), in 1/m^2."""
     # A point blurred from r falls into the disc: a non-central chi-square probability.
-    share = chndtr((radius / sigma) ** 2, 2, (np.asarray(r) / sigma) ** 2)
+    place, edge = np.broadcast_arrays(np.asarray(r) / sigma, radius / sigma)
+    share, near = np.zeros(place.shape), place < edge + _FARTHEST
+    share[near] = chndtr(edge[near] ** 2, 2, place[near] ** 2)
     return np.asarray(share / (np.pi * radius**2))
 
 

@@ -17,12 +17,14 @@ from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
 from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
-from memscal.estimation.smoothing import Band, SmoothedProfile
+from memscal.estimation.smoothing import Band, SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import EvenAxis, even_lattice
 
 _POINTS_PER_WIDTH = 6.0
+#: Points within the support are multiples of this, so that scans of one layout share their grid.
+_COUNTED = 4
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,8 @@ class GridChoice:
         return {
             "spacing": f"{self.spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
             "width, and the last wavenumber is at least twice the one where the window has closed",
-            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre; G is "
-            "tapered to zero over its outer half",
+            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre, of a "
+            "line rounded up to half a step; G is tapered to zero over its outer half",
             "extent": f"{self.extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
             "support, so that nothing wraps around into it",
         }
@@ -49,7 +51,7 @@ class GridChoice:
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     """Choose the grid from the scan: every length from a length of the data."""
     points = estimate.points
-    support = float(estimate.distance.max())
+    support = rounded_reach(float(estimate.distance.max()), points.step)
     if points.as_raster:
         # A square of this half width lies within the raster's longer side.
         support = float(np.abs(points.x - estimate.centre[0]).max())
@@ -60,7 +62,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     last = float(band.k[int(np.argmax(closed))] if closed.any() else band.k[-1])
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
-    spacing = support / np.ceil(support / spacing)
+    spacing = support / (_COUNTED * np.ceil(support / spacing / _COUNTED))
     span = max(float(np.ptp(offset)) for offset in estimate.offset)
     return GridChoice(spacing=float(spacing), support=support, extent=max(span, 1.25 * support))
 
@@ -114,8 +116,10 @@ class LineFields:
         return _taper(radius, self.support * self.grid.spacing)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Lift a radial function about a kernel's zero."""
-        return on_grid(profile, self.grid, self.grid.spacing / 2)
+        """Lift a radial function about a kernel's zero, as far as its support goes."""
+        inside = EvenGrid(self.support + 1, self.grid.spacing)
+        values = on_grid(profile, inside, self.grid.spacing / 2)
+        return np.pad(values, (0, self.grid.count - inside.count))
 
     def at_points(self, field: FloatArray) -> FloatArray:
         """Return the values of a field at the measured points."""
