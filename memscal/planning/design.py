@@ -216,8 +216,8 @@ def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> De
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
     chosen = chosen_method(method, {}, seed=seed)
     solution, results = expected_calibration(plan, chosen)
-    deconvolution, fields = solution.deconvolution, solution.fields
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)))
+    deconvolution = solution.deconvolution
+    k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
     return Design(
         plan=plan,
         method=chosen.name,
@@ -227,7 +227,7 @@ def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> De
         g=deconvolution.g.radial,
         g_errors=np.sqrt(np.diag(results.radial_covariance)),
         k=k,
-        transfer=modulus / deconvolution.conversion_constant,
+        transfer=np.abs(transfer) / deconvolution.conversion_constant,
         transfer_errors=results.transfer_errors,
         resolved_wavenumber=solution.band.resolved,
     )
