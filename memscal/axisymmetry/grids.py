@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.fft
+from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
@@ -71,6 +72,16 @@ class EvenGrid:
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the origin, where an even field's axis already is."""
         return self.forward(field)
+
+    def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wavenumbers along one axis and the Fourier transform about the origin there."""
+        line = 2 * field.sum(axis=0) - field[0] - field[-1]
+        return self.wavenumber_axis, scipy.fft.dct(line, type=1) * self.cell_area
+
+    def inverse_on_axis(self, spectrum: FloatArray) -> FloatArray:
+        """Return the first row of the field of a real even spectrum, (1, count)."""
+        line = (2 * spectrum.sum(axis=0) - spectrum[0] - spectrum[-1]) / (2 * (self.count - 1))
+        return np.asarray(scipy.fft.idct(line[None], type=1) / self.cell_area)
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve two even fields."""
@@ -166,6 +177,11 @@ class Lattice:
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the central point."""
         return self.forward(scipy.fft.ifftshift(field))
+
+    def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, NDArray[np.complex128]]:
+        """Return wavenumbers along x and the Fourier transform about the central point there."""
+        line = scipy.fft.rfft(scipy.fft.ifftshift(field.sum(axis=0)))
+        return self.wavenumber[0], line * self.cell_area
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a kernel centred on the central point with a field of the lattice."""

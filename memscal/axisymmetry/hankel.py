@@ -65,6 +65,9 @@ _TABLE_ORDER = 32
 _INTERVALS_PER_PANEL = 16
 _TABLE_PHASE = 40.0
 
+#: Tables of Bessel functions of no more products are kept.
+_MOST_KEPT = 200_000
+
 
 @dataclass(frozen=True, eq=False)
 class Wavenumbers:
@@ -85,8 +88,11 @@ class Wavenumbers:
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
-        phase = np.multiply.outer(np.asarray(r, dtype=np.float64), self.k)
-        matrix = 2 * np.cos(phase) / self.k if order == ACROSS else bessel(order, phase)
+        radii = np.asarray(r, dtype=np.float64)
+        if order == ACROSS:
+            matrix = 2 * np.cos(np.multiply.outer(radii, self.k)) / self.k
+        else:
+            matrix = bessel_table(radii, self.k, order)
         return np.asarray(matrix @ (spectrum.T * self.weights).T)
 
 
@@ -156,6 +162,20 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
 def bessel(order: int, x: FloatArray) -> FloatArray:
     """Bessel function of the first kind, of order zero or more."""
     return np.asarray((j0, j1)[order](x) if order < 2 else jv(order, x))
+
+
+def bessel_table(r: FloatArray, k: FloatArray, order: int = 0) -> FloatArray:
+    """Bessel functions of all products, (r, k); scans of one layout share those that are kept."""
+    if r.ndim != 1 or r.size * k.size > _MOST_KEPT:
+        return bessel(order, np.multiply.outer(r, k))
+    return _kept_table(r.tobytes(), k.tobytes(), order)
+
+
+@lru_cache(maxsize=12)
+def _kept_table(r: bytes, k: bytes, order: int) -> FloatArray:
+    table = bessel(order, np.multiply.outer(np.frombuffer(r), np.frombuffer(k)))
+    table.flags.writeable = False
+    return table
 
 
 def _panel_edges(knots: FloatArray, end: float, fastest: float) -> FloatArray:

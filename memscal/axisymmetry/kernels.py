@@ -1,6 +1,8 @@
 """Radial apparatus functions of unit integral whose transform has a closed form."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -10,10 +12,18 @@ from scipy.special import chndtr, i0e, j0, j1
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, require_positive
 
+#: Beyond its edge by so many widths of the blur nothing is left of a disc.
+_FARTHEST = 9.0
+
 
 def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
     r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""
     return np.asarray(np.exp(-0.5 * (sigma * k) ** 2))
+
+
+def gaussian_transfer_slope(k: FloatArray, sigma: float) -> FloatArray:
+    """Derivative of :func:`gaussian_transfer` by the width, in 1/m."""
+    return np.asarray(-sigma * k**2 * gaussian_transfer(k, sigma))
 
 
 def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
@@ -24,6 +34,22 @@ def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
 def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
     """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
     return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)
+
+
+def disc_transfer(k: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
+    """Transforms of discs of unit integral, blurred by Gaussians, at ``k`` (rad/m)."""
+    phase = np.asarray(k, dtype=np.float64) * radius
+    disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
+    return np.asarray(disc * np.exp(-0.5 * (sigma * k) ** 2))
+
+
+def blurred_disc(r: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
+    """Discs of unit integral, blurred by Gaussians, at radii ``r`` (m), in 1/m^2."""
+    # A point blurred from r falls into the disc: a non-central chi-square probability.
+    place, edge = np.broadcast_arrays(np.asarray(r) / sigma, radius / sigma)
+    share, near = np.zeros(place.shape), place < edge + _FARTHEST
+    share[near] = chndtr(edge[near] ** 2, 2, place[near] ** 2)
+    return np.asarray(share / (np.pi * radius**2))
 
 
 @runtime_checkable
@@ -131,15 +157,11 @@ class SmoothedDisc:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
-        phase = np.asarray(k, dtype=np.float64) * self.radius
-        disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
-        return disc * gaussian_transfer(k, self.sigma)
+        return disc_transfer(k, *np.array([self.radius, self.sigma]))
 
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""
-        # A point blurred from r falls into the disc: a non-central chi-square probability.
-        share = chndtr((self.radius / self.sigma) ** 2, 2, (np.asarray(r) / self.sigma) ** 2)
-        return np.asarray(share / (np.pi * self.radius**2))
+        return blurred_disc(r, *np.array([self.radius, self.sigma]))
 
     def describe(self) -> dict[str, float | str]:
         """Radius and blur, as text."""
@@ -157,6 +179,12 @@ class Rings:
     radius: FloatArray
     blur: FloatArray
     amplitude: FloatArray
+
+    @classmethod
+    def joined(cls, parts: Sequence[Rings]) -> Rings:
+        """Return all rings of several sets."""
+        sets = ((rings.radius, rings.blur, rings.amplitude) for rings in parts)
+        return cls(*map(np.concatenate, zip(*sets, strict=True)))
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Hankel transforms at ``k`` (rad/m), shape (k, m)."""

@@ -140,9 +140,11 @@ def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) 
 def _transfer(solution: Solution, results: Results) -> TransferFunction:
     fields, deconvolution = solution.fields, solution.deconvolution
     a, quotient = deconvolution.conversion_constant, deconvolution.quotient
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(quotient.values)) / a)
+    k, transfer = fields.grid.axis_transfer(quotient.values)
     window = fields.along_axis(quotient.window)[1]
-    return TransferFunction(k, modulus, results.transfer_errors, window, solution.band.resolved)
+    return TransferFunction(
+        k, np.abs(transfer) / a, results.transfer_errors, window, solution.band.resolved
+    )
 
 
 def _reconvolution(solution: Solution) -> Reconvolution:

@@ -336,13 +336,13 @@ def _agreements(
 def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
     estimate, deconvolution = solution.estimate, solution.deconvolution
-    a, g, fields = deconvolution.conversion_constant, deconvolution.g, solution.fields
+    a, g = deconvolution.conversion_constant, deconvolution.g
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
     negative = float(np.maximum(-share, 0.0).sum() / np.abs(share).sum())
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)) / a)
-    power = k * modulus**2
+    k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
+    power = k * np.abs(transfer / a) ** 2
     end = max(solution.band.resolved, solution.band.relevant, 2 / estimate.gaussian.sigma)
     rough = float(power[k > _BEYOND * end].sum() / power.sum())
     cure = "take method white-noise or bayesian, or more regularisation"

@@ -95,7 +95,7 @@ def _divided(
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
     drawn = deconvolve(estimate, band, fields, method)
-    spectrum = np.abs(fields.grid.transfer(drawn.quotient.values)) / drawn.conversion_constant
+    k, spectrum = fields.grid.axis_transfer(drawn.quotient.values)
     wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
-    transfer = np.interp(wavenumbers, *fields.along_axis(spectrum), right=0.0)
+    transfer = np.interp(wavenumbers, k, np.abs(spectrum) / drawn.conversion_constant, right=0.0)
     return *read_off(drawn, solution.deconvolution.g.r), transfer

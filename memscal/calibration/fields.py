@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -11,18 +12,22 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
-from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.deconvolution.division import NOISE_RATIO
-from memscal.deconvolution.fourier_ratio import Field
+from memscal.deconvolution.fourier_ratio import Field, reconvolve
 from memscal.errors import InputError
 from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
-from memscal.estimation.smoothing import Band, SmoothedProfile
+from memscal.estimation.smoothing import Band, SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import EvenAxis, even_lattice
 
 _POINTS_PER_WIDTH = 6.0
+#: Points within the support are multiples of this, so that scans of one layout share their grid.
+_COUNTED = 4
+#: A lifted reference of fewer points along its side is kept.
+_MOST_KEPT = 512
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,8 @@ class GridChoice:
         return {
             "spacing": f"{self.spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
             "width, and the last wavenumber is at least twice the one where the window has closed",
-            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre; G is "
-            "tapered to zero over its outer half",
+            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre, of a "
+            "line rounded up to half a step; G is tapered to zero over its outer half",
             "extent": f"{self.extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
             "support, so that nothing wraps around into it",
         }
@@ -49,7 +54,7 @@ class GridChoice:
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     """Choose the grid from the scan: every length from a length of the data."""
     points = estimate.points
-    support = float(estimate.distance.max())
+    support = rounded_reach(float(estimate.distance.max()), points.step)
     if points.as_raster:
         # A square of this half width lies within the raster's longer side.
         support = float(np.abs(points.x - estimate.centre[0]).max())
@@ -60,7 +65,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     last = float(band.k[int(np.argmax(closed))] if closed.any() else band.k[-1])
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
-    spacing = support / np.ceil(support / spacing)
+    spacing = support / (_COUNTED * np.ceil(support / spacing / _COUNTED))
     span = max(float(np.ptp(offset)) for offset in estimate.offset)
     return GridChoice(spacing=float(spacing), support=support, extent=max(span, 1.25 * support))
 
@@ -90,21 +95,21 @@ class LineFields:
         cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
-        # Both at once: they share the Bessel functions of their transforms.
         reference = estimate.model.reference
-        spectra = np.stack([spectrum.scalar.values, reference.scalar.values], axis=1)
-        wavenumbers = reference.wavenumbers
         if reference.source:
             # The grid does not sample the edge of a source, but its transform.
             k = grid.wavenumber_axis
             planes = (RadialSpectrum.plane(f, k, k) for f in (spectrum, reference))
-            both = np.stack([grid.inverse(plane) for plane in planes], axis=-1)
+            voltage, stress = (Field(grid, grid.inverse(plane)) for plane in planes)
         else:
-            both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
-        voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
+            nodes = reference.wavenumbers
+            arrays = (a.tobytes() for a in (nodes.k, nodes.weights, reference.scalar.values))
+            lifted = _lifted if grid.count < _MOST_KEPT else _lifted.__wrapped__
+            stress = lifted(grid, *arrays)
+            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, step))
         return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
 
-    @property
+    @cached_property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
         return self.taper(self.grid.radius)
@@ -114,12 +119,15 @@ class LineFields:
         return _taper(radius, self.support * self.grid.spacing)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Lift a radial function about a kernel's zero."""
-        return on_grid(profile, self.grid, self.grid.spacing / 2)
+        """Lift a radial function about a kernel's zero, as far as its support goes."""
+        inside = EvenGrid(self.support + 1, self.grid.spacing)
+        values = on_grid(profile, inside, self.grid.spacing / 2)
+        return np.pad(values, (0, self.grid.count - inside.count))
 
-    def at_points(self, field: FloatArray) -> FloatArray:
-        """Return the values of a field at the measured points."""
-        return cut(field, self.grid, self.radius)
+    def convolved(self, kernel: Field) -> FloatArray:
+        """Convolve a kernel with the stress: its values at the measured points."""
+        line = self.grid.inverse_on_axis(kernel.transform * self.stress.transform)
+        return cut(line, self.grid, self.radius)
 
     def on_support(self, kernel: FloatArray, _: PosteriorProfile | None) -> Field:
         """Return a kernel on its support."""
@@ -214,9 +222,9 @@ class RasterFields:
     def _lifted(self, profile: Callable[[FloatArray], FloatArray], grid: Lattice) -> FloatArray:
         return on_grid(profile, grid, self.step) + self.oval(*grid.axes)
 
-    def at_points(self, field: FloatArray) -> FloatArray:
-        """Return the values of a field at the measured points."""
-        return np.asarray(field[self.index])
+    def convolved(self, kernel: Field) -> FloatArray:
+        """Convolve a kernel with the stress: its values at the measured points."""
+        return np.asarray(reconvolve(1.0, kernel, self.stress).values[self.index])
 
     def share(self, smoothed: SmoothedProfile) -> FloatArray:
         """What each reading (n,) adds to its node, over its voltage, in 1/N."""
@@ -262,6 +270,14 @@ class RasterFields:
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber[0], spectral[0]
+
+
+@lru_cache(maxsize=6)
+def _lifted(grid: EvenGrid, k: bytes, weights: bytes, values: bytes) -> Field:
+    """Field of a reference by its transform, kept for the next scans of one layout."""
+    nodes = Wavenumbers(np.frombuffer(k), np.frombuffer(weights))
+    spectrum = RadialSpectrum(nodes, np.frombuffer(values))
+    return Field(grid, on_grid(spectrum.at, grid, grid.spacing / 2))
 
 
 def _about_zero(grid: Lattice) -> Lattice:

@@ -136,7 +136,7 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
         estimate, nonnegative=method.nonnegative, monotone=method.monotone
     )
     values = fields.kernel(profile.radial) * fields.confinement
-    quotient = Quotient(fields.grid, values, np.ones(fields.grid.transfer(values).shape))
+    quotient = Quotient(fields.grid, values, np.ones_like(fields.stress.transform.real))
     a, g = fourier_ratio.normalise(fields.on_support(values, profile))
     sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
     model = estimate.model
@@ -254,10 +254,9 @@ class Solution:
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
     """Signal of the quotient at the points, in V: each scan through its own reference."""
     if estimate.points.scans == 1 and estimate.model.reference.order != ACROSS:
-        back = fourier_ratio.reconvolve(1.0, quotient, fields.stress)
-        return fields.at_points(back.values) * estimate.points.load
-    k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)
-    spectrum = np.interp(estimate.model.k, k, kernel, right=0.0)
+        return fields.convolved(quotient) * estimate.points.load
+    k, kernel = fields.grid.axis_transfer(quotient.values)
+    spectrum = np.interp(estimate.model.k, k, kernel.real, right=0.0)
     return estimate.model.signal(estimate.gaussian.geometry, spectrum) + estimate.oval
 
 

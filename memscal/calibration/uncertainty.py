@@ -17,9 +17,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import j0
 
-from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform, radial_spline, ring_areas
+from memscal.axisymmetry.hankel import (
+    RadialSpectrum,
+    bessel_table,
+    hankel_transform,
+    radial_spline,
+    ring_areas,
+)
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Deconvolution, Solution
@@ -333,7 +338,7 @@ def _replace_exactly(
         column[names.index(name)] = RECTANGLE * (value - values[names.index(name)])
     change = RECTANGLE * (g - deconvolution.g.radial)
     column[count : count + r.size] = change
-    column[count + r.size :] = (j0(np.multiply.outer(wavenumbers, r)) * ring_areas(r)) @ change
+    column[count + r.size :] = (bessel_table(wavenumbers, r) * ring_areas(r)) @ change
 
 
 def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float], FloatArray]:
@@ -495,12 +500,12 @@ def _division_map(
     # Where the window has closed the reference may have vanished.
     ratio = np.divide(window, reference.values, out=np.zeros_like(window), where=window > _CLOSED)
     weights = reference.wavenumbers.weights * ratio
-    synthesis = fields.taper(r)[:, None] * j0(np.multiply.outer(r, model.k)) * weights
+    synthesis = fields.taper(r)[:, None] * bessel_table(r, model.k) * weights
     rings = ring_areas(r)
 
     # From changes of A G at its radii to those of A, G and its transfer function.
     of_g = (np.eye(r.size) - np.multiply.outer(g, rings)) / a
-    transfer = (j0(np.multiply.outer(wavenumbers, r)) * rings) @ of_g
+    transfer = (bessel_table(wavenumbers, r) * rings) @ of_g
     normalised = np.vstack([rings, of_g, transfer])
     geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])

@@ -43,6 +43,7 @@ class DivisionProblem:
     # Moduli of the fields' transforms where the voltage's is 15 times its noise, V m^2/N and 1.
     weakest_voltage: float
     weakest_reference: float
+    transform: FloatArray | None = None  # of the reference, where it is known
 
     @cached_property
     def voltage_spectrum(self) -> FloatArray:
@@ -52,7 +53,7 @@ class DivisionProblem:
     @cached_property
     def reference_spectrum(self) -> FloatArray:
         """Transform of the base stress, dimensionless."""
-        return self.grid.forward(self.reference)
+        return self.grid.forward(self.reference) if self.transform is None else self.transform
 
 
 @dataclass(frozen=True, eq=False)

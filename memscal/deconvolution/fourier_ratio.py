@@ -83,9 +83,14 @@ class Field:
     def _profile(self) -> tuple[FloatArray, FloatArray]:
         return self.grid.radial(self.values)
 
+    @cached_property
+    def transform(self) -> FloatArray:
+        """Fourier transform, in the layout of the grid and the unit of the values times m^2."""
+        return self.grid.forward(self.values)
+
     def spectrum(self) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along x, in rad/m, and the modulus of the Fourier transform there."""
-        return self.grid.wavenumber[0], np.abs(self.grid.forward(self.values)[0])
+        return self.grid.wavenumber[0], np.abs(self.transform[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -219,7 +224,8 @@ def divide(
         weakest = (weakest, float(voltage.spectrum()[1][last]))
     for modulus in weakest:
         require_positive("weakest relevant component", modulus)
-    problem = DivisionProblem(voltage.grid, voltage.values, stress.values, weakest[1], weakest[0])
+    fields, weakest = (voltage.values, stress.values), weakest[::-1]
+    problem = DivisionProblem(voltage.grid, *fields, *weakest, transform=stress.transform)
     division = regulariser.divide(problem)
     return Quotient(voltage.grid, division.field, division.window)
 

@@ -13,8 +13,9 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation import residuals
-from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
-from memscal.estimation.gaussian import ReducedScan, fit_gaussian_to_points
+from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
+from memscal.estimation.departures import ReducedScan, departure_basis
+from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
@@ -331,8 +332,7 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     except FitError:
         return none
     angular = estimate.basis.angular
-    around = [angular.rings.signal(model, fit.centre)] if angular else []
-    reduced = ReducedScan.of(model, fit, weights, *around)
+    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(model, fit, reduced, angular)
     count = float((estimate.outlier_weight * ~plateau)[chosen].sum())
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0

@@ -42,6 +42,8 @@ Rows: TypeAlias = slice | NDArray[np.bool_]
 TURN = -1
 #: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
 _TABLE_PHASE, _DEGREE = 0.25, 5
+#: Few points read a table where its last phase (rad) is less.
+_LONGEST_PHASE = 500.0
 #: Combinations of waves whose voltages are below this share of the largest one's are left out.
 _NOTHING = 1e-14
 
@@ -100,7 +102,9 @@ class Geometry:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
             return np.asarray(self.interpolation[rows] @ (self.table(wave).splines @ spread))
-        if wave not in self._waves:
+        if wave not in self._waves and self.reach * self.k[-1] < _LONGEST_PHASE:
+            self._waves[wave] = self.interpolation @ self.table(wave).splines
+        elif wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
             unique, back = np.unique(self.radius, return_inverse=True)
             self._waves[wave] = _wave(wave, unique, self.k, self.across)[back]

@@ -11,12 +11,12 @@ from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
 from memscal.estimation import bayesian
 from memscal.estimation.angular import AngularRings, angular_departures, isolated, raster_noise
-from memscal.estimation.bayesian import DepartureBasis, WeighedFit
+from memscal.estimation.bayesian import WeighedFit
 from memscal.estimation.decorrelation import Decorrelation
+from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
 from memscal.estimation.gaussian import (
     GaussianFit,
-    ReducedScan,
     fit_gaussian_to_points,
     robust_scale,
 )
@@ -265,15 +265,13 @@ def _weighed(
 ) -> tuple[DepartureBasis, WeighedFit]:
     """Weigh departures from a fit for ``count`` readings and a least noise."""
     rings, around = AngularRings.about(fit) if angular else None, None
-    reduced = ReducedScan.of(
-        model, fit, weights, rings.signal(model, fit.centre) if rings else None
-    )
+    reduced = ReducedScan.of(model, fit, weights, rings)
     if rings:
-        kernels = bayesian.departure_basis(model, fit, reduced).kernels(model.k)
+        kernels = departure_basis(model, fit, reduced).kernels(model.k)
         radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
         columns = reduced.data, reduced.flat, radial, reduced.rings
         around = angular_departures(rings, fit, columns, noise)
-    basis = bayesian.departure_basis(model, fit, reduced, around)
+    basis = departure_basis(model, fit, reduced, around)
     return basis, bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
 
 
@@ -311,9 +309,8 @@ def log_marginal_likelihood(
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
     angular = estimate.basis.angular
-    around = [angular.rings.signal(model, fit.centre)] if angular else []
-    reduced = ReducedScan.of(model, fit, weights, *around)
-    basis = bayesian.departure_basis(model, fit, reduced, angular)
+    reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
+    basis = departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = float(estimate.outlier_weight.sum())
     weighed = bayesian.weigh_departures(reduced, basis, count, least_noise=least)

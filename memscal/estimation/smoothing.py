@@ -11,9 +11,10 @@ minimises
 
 Its one parameter :math:`\lambda` maximises the restricted likelihood of the voltages (Wahba, Ann.
 Stat. 13 (1985) 1378).  The curvature of what a film transmits falls off as its stress does, so
-that :math:`\rho` is the inverse square of the reference's own profile.  Beyond the last point R the
-profile goes on as the film's own decay, that of the reference: its amplitude is fitted with the
-spline, whose logarithmic slope at R is that of the reference.
+that :math:`\rho` is the inverse square of the reference's own profile.  Beyond R, the distance of
+the last point rounded up to half a step, the profile goes on as the film's own decay, that of the
+reference: its amplitude is fitted with the spline, whose logarithmic slope at R is that of the
+reference.
 
 For given centre, weights and :math:`\lambda` the result is linear in the voltages.
 
@@ -26,15 +27,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from operator import add
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, gauss_between
+from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, gauss_between
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import OUTLIER_THRESHOLD, ProfileEstimate, outlier_weights
 from memscal.estimation.voltage_map import BLOCK, DENSE, VoltageMap
@@ -43,6 +44,7 @@ from memscal.model.arrays import FloatArray
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
+Splines: TypeAlias = "Callable[[FloatArray, int], csr_array]"
 #: Order of the derivative that is penalised; the spline is of degree 2 m - 1.
 _ORDER = 3
 _DEGREE = 2 * _ORDER - 1
@@ -62,6 +64,8 @@ _ROUNDS = 4
 _LEAST_SCALE = 0.5
 #: A residual is divided by the root of what its own point leaves free, at least this.
 _LEAST_FREEDOM = 0.05
+#: Rounds in which the smoothing parameter's logarithm is found, each to a ninth.
+_SECTIONS = 14
 #: Misfit of a scan without noise, relative to its signal.
 _LEAST = 1e-14
 
@@ -188,38 +192,14 @@ class _RadialSpline:
     @classmethod
     def through(cls, radius: FloatArray, reference: RadialSpectrum, step: float) -> _RadialSpline:
         """Place the splines for points at radii (m), ``step`` apart."""
-        reach = float(radius.max()) * (1 + 1e-9)
-        k, per_newton = reference.wavenumbers.k, reference.values
-        finest = min(_PER_STEP / step, _PER_RADIAN * k[-1])
-        intervals = int(np.clip(np.ceil(finest * reach), _DEGREE, _MOST_INTERVALS))
-        knots = np.linspace(0.0, reach, intervals + 1)
-        basis = _even_splines(knots)
-        nodes, weights = gauss_between(knots, _NODES)
-        stress = reference.at(np.append(nodes, [0.0, reach]))
-        peak, end = stress[-2], stress[-1]
-        slope = -float((reference.wavenumbers.weights * k * per_newton) @ j1(k * reach))
-        # At R a spline has the logarithmic slope of the tail, which goes on from there.
-        ending = basis(np.array([reach]), 0).toarray()
-        tied = step * (end * basis(np.array([reach]), 1).toarray() - slope * ending)
-        # A source that ends inside has no tail to go on with: the spline ends with the scan.
-        tail = not reference.source
-        free = np.linalg.svd(tied)[2][1:].T if tail else np.eye(tied.size)
-        curved = basis(nodes, _ORDER).toarray() * step**_ORDER
-        values = basis(nodes, 0).toarray()
-        rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
-        # What no penalty holds, a parabola, is held by next to nothing.
-        rows = np.vstack([curved, _NEXT_TO_NOTHING * values]) @ free
-        rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
-        phase = np.multiply.outer(k, nodes)
-        across = reference.order == ACROSS
-        bessel = 2 * np.cos(phase) if across else 2 * np.pi * j0(phase) * nodes
-        bessel *= weights
-        transform = bessel @ values @ free
-        if tail:
-            transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
+        reach = (1 + 2e-9) * rounded_reach(float(radius.max()), step)
+        nodes = reference.wavenumbers
+        arrays = (array.tobytes() for array in (nodes.k, nodes.weights, reference.values))
+        basis, intervals, *matrices = _layout(
+            reach, step, reference.order, reference.source, *arrays
+        )
         interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
-        root = np.asarray(np.linalg.qr(rows)[1])
-        return cls(basis(radius, 0), interval, free, root, transform)
+        return cls(basis(radius, 0), interval, *matrices)
 
     def fit(self, y: FloatArray, weight: FloatArray) -> _FittedSpline:
         """Fit values y (n,) with weights, smoothed by the restricted likelihood."""
@@ -295,22 +275,68 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
     """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
     # ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
     # the voltages along their vectors; ``total``: sum of the squares of all ``count``.
-    from scipy.optimize import minimize_scalar
+    squares, power = values**2 / values[0] ** 2, data**2
 
-    squares, power = values**2, data**2
-
-    def loss(log_smoothing: float) -> float:
-        smoothing = squares[0] * np.exp(log_smoothing)
-        misfit = max(total - float(power @ (squares / (squares + smoothing))), _LEAST * total)
-        return float(count * np.log(misfit) + np.log1p(squares / smoothing).sum())
+    def ratios(logarithms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        ratio = squares / np.exp(logarithms)[:, None]
+        kept = ratio / (1 + ratio)
+        return ratio, kept, np.maximum(total - kept @ power, _LEAST * total)
 
     grid = np.arange(-80.0, 11.0, 1.0)
-    best = float(grid[int(np.argmin([loss(place) for place in grid]))])
-    least = minimize_scalar(loss, bounds=(best - 1.0, best + 1.0), method="bounded")
-    return float(squares[0] * np.exp(least.x))
+    ratio, kept, misfit = ratios(grid)
+    best = grid[int(np.argmin(count * np.log(misfit) + np.log1p(ratio).sum(axis=1)))]
+    # There the loss's slope crosses zero upwards: between which of ten places, again and again.
+    places = np.linspace(best - 1.0, best + 1.0, 10)
+    for _ in range(_SECTIONS):
+        ratio, kept, misfit = ratios(places)
+        slope = count * ((kept / (1 + ratio)) @ power) / misfit - kept.sum(axis=1)
+        first = int(np.argmax(np.append(slope[1:-1] > 0, True)))
+        places = np.linspace(places[first], places[first + 1], 10)
+    return float(values[0] ** 2 * np.exp(places.mean()))
 
 
-def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], csr_array]:
+def rounded_reach(distance: float, step: float) -> float:
+    """Round a distance up to half steps of a scan: those of one layout share what depends on it."""
+    return float(np.ceil((1 - 1e-9) * distance / (step / 2)) * step / 2)
+
+
+@lru_cache(maxsize=8)
+def _layout(
+    reach: float, step: float, order: int, source: bool, *arrays: bytes
+) -> tuple[Splines, int, FloatArray, FloatArray, FloatArray]:
+    """Splines by radii and derivative, their intervals; free ones, root and transforms of these."""
+    # ``arrays``: the reference's wavenumbers with their weights, and its values.
+    k, of_k, per_newton = map(np.frombuffer, arrays)
+    reference = RadialSpectrum(Wavenumbers(k, of_k), per_newton, order)
+    finest = min(_PER_STEP / step, _PER_RADIAN * k[-1])
+    intervals = int(np.clip(np.ceil(finest * reach), _DEGREE, _MOST_INTERVALS))
+    knots = np.linspace(0.0, reach, intervals + 1)
+    basis = _even_splines(knots)
+    nodes, weights = gauss_between(knots, _NODES)
+    stress = reference.at(np.append(nodes, [0.0, reach]))
+    peak, end = stress[-2], stress[-1]
+    slope = -float((of_k * k * per_newton) @ j1(k * reach))
+    # At R a spline has the logarithmic slope of the tail, which goes on from there.
+    ending = basis(np.array([reach]), 0).toarray()
+    tied = step * (end * basis(np.array([reach]), 1).toarray() - slope * ending)
+    # A source that ends inside has no tail to go on with: the spline ends with the scan.
+    free = np.eye(tied.size) if source else np.linalg.svd(tied)[2][1:].T
+    curved = basis(nodes, _ORDER).toarray() * step**_ORDER
+    values = basis(nodes, 0).toarray()
+    rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
+    # What no penalty holds, a parabola, is held by next to nothing.
+    rows = np.vstack([curved, _NEXT_TO_NOTHING * values]) @ free
+    rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
+    phase = np.multiply.outer(k, nodes)
+    bessel = 2 * np.cos(phase) if order == ACROSS else 2 * np.pi * j0(phase) * nodes
+    bessel *= weights
+    transform = bessel @ values @ free
+    if not source:
+        transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
+    return basis, intervals, free, np.asarray(np.linalg.qr(rows)[1]), transform
+
+
+def _even_splines(knots: FloatArray) -> Splines:
     """Return even B-splines on even knots from zero: their derivatives at radii, (n, m)."""
     from scipy.interpolate import BSpline
     from scipy.sparse import csr_array, eye_array, vstack

@@ -27,7 +27,7 @@ stress by the wrong :math:`T`.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, reduce
+from functools import lru_cache, reduce
 from operator import add
 
 import numpy as np
@@ -36,9 +36,10 @@ from scipy.special import hyp0f1, j0, j1
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
+from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, ReducedScan, gauss_newton, linearise
+from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
@@ -130,17 +131,9 @@ class _Basis(DepartureBasis):
 
     shape: PressureShape
 
-    def kernels(self, k: FloatArray) -> FloatArray:
-        if (nodes := k.tobytes()) not in self._kernels:
-            kernel, slope = self.shape.transform(k, self.sigma)
-            rings = [ring.transform(k) for ring in self.rings]
-            columns = self._columns(kernel, self.conversion_constant * slope, rings)
-            self._kernels[nodes] = columns
-        return self._kernels[nodes]
-
-    @cached_property
-    def _kernels(self) -> dict[bytes, FloatArray]:
-        return {}
+    def _sensor(self, place: FloatArray, _: Side) -> tuple[FloatArray, FloatArray]:
+        kernel, slope = self.shape.transform(place, self.sigma)
+        return kernel, self.conversion_constant * slope
 
 
 @dataclass(frozen=True, eq=False)

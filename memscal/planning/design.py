@@ -22,9 +22,10 @@ from memscal.calibration.uncertainty import Results, input_effects
 from memscal.deconvolution.division import Method, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation import reference
-from memscal.estimation.bayesian import departure_basis, supported, weigh_departures
+from memscal.estimation.bayesian import supported, weigh_departures
+from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import ReducedScan, fit_gaussian_to_points
+from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.mechanics.press_rod import press_rod
@@ -215,8 +216,8 @@ def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> De
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
     chosen = chosen_method(method, {}, seed=seed)
     solution, results = expected_calibration(plan, chosen)
-    deconvolution, fields = solution.deconvolution, solution.fields
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)))
+    deconvolution = solution.deconvolution
+    k, transfer = solution.fields.grid.axis_transfer(deconvolution.quotient.values)
     return Design(
         plan=plan,
         method=chosen.name,
@@ -226,7 +227,7 @@ def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> De
         g=deconvolution.g.radial,
         g_errors=np.sqrt(np.diag(results.radial_covariance)),
         k=k,
-        transfer=modulus / deconvolution.conversion_constant,
+        transfer=np.abs(transfer) / deconvolution.conversion_constant,
         transfer_errors=results.transfer_errors,
         resolved_wavenumber=solution.band.resolved,
     )

@@ -10,7 +10,8 @@ from scipy.stats import multivariate_normal
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
-from memscal.estimation.bayesian import HYPOTHESES, SHAPES
+from memscal.estimation.bayesian import HYPOTHESES
+from memscal.estimation.departures import SHAPES
 from memscal.estimation.profile import constrained_profile
 
 R = np.linspace(0.0, 3e-3, 121)

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 import memscal
 from memscal.errors import FitError
 from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
-from memscal.estimation.gaussian import ReducedScan
+from memscal.estimation.departures import ReducedScan
 from memscal.estimation.profile import point_messages
 
 

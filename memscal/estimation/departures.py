@@ -1,0 +1,351 @@
+r"""Departures from a Gaussian apparatus function: kernels, and their voltages in a reduced scan.
+
+A departure is a sum of rings of radius q, blurred by a Gaussian of width b, with random
+amplitudes; each has a closed form on both sides of the Hankel transform,
+
+.. math::
+
+    a\,(\delta_q \otimes g_b)(r) = \frac{a}{2\pi b^2}\,e^{-(r^2+q^2)/2b^2} I_0(rq/b^2),
+    \qquad a\,J_0(kq)\,e^{-b^2k^2/2} .
+
+Lengths are in units of the width of the best Gaussian; the strength is the expected size over the
+Gaussian's, both as L2 norms over the plane.  Families (blurred discs, wide tails, rings) are no
+small departures: the sensor of each that fits best stands in the Gaussian's place.  A scan is
+reduced to as few rows as its model has columns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from memscal.axisymmetry import kernels
+from memscal.axisymmetry.kernels import Rings
+from memscal.estimation.angular import AngularDepartures, AngularRings
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit
+from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
+from memscal.model.arrays import FloatArray
+
+#: Rings are never narrower than this many steps: a width below the sampling is not resolved.
+_SMALLEST_WIDTH_IN_STEPS = 0.5
+#: Neighbouring rings overlap: this share of their blur apart.
+_SPACING = 0.7
+_FEWEST_RINGS = 6
+#: A field is cut at this multiple of its extent, where its envelope has fallen to 1e-5.
+_REACH = 2.2
+_SCALES = 12
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A kind of departure, in units of the Gaussian's width."""
+
+    name: str
+    blur: float  # finest width of its components
+    extent: float  # of a field, the radius where its envelope falls; of scales, the largest width
+    scales: bool = False  # Gaussians of all widths from blur to extent, not rings of one blur
+
+    def rings(self, width: float, amplitude: float) -> Rings:
+        """Components about a Gaussian of a width (m) and amplitude (V/Pa), by its L2 norm."""
+        if self.scales:
+            blur = width * np.geomspace(self.blur, self.extent, _SCALES)
+            plain = Rings(np.zeros(_SCALES), blur, np.ones(_SCALES))
+        else:
+            reach = _REACH * self.extent
+            count = max(_FEWEST_RINGS, math.ceil(reach / (_SPACING * self.blur)))
+            q = (np.arange(count) + 0.5) * reach / count
+            envelope = np.sqrt(q) * np.exp(-0.5 * (q / self.extent) ** 4)
+            plain = Rings(width * q, np.full(count, width * self.blur), envelope)
+        gaussian = amplitude / (2 * np.sqrt(np.pi) * width)
+        return replace(plain, amplitude=plain.amplitude * gaussian / plain.size)
+
+
+#: Edges (a disc, a plateau), a core (a ring, a spike), and tails.
+SHAPES = (
+    *(Shape("edge", 0.65, extent) for extent in (0.8, 1.2)),
+    *(Shape("rough edge", blur, extent) for blur in (0.4, 0.5) for extent in (0.8, 1.2)),
+    Shape("core", 0.3, 2.0, scales=True),
+    *(Shape("tail", 0.85, extent) for extent in (1.8, 3.0)),
+)
+
+
+@dataclass(frozen=True)
+class Family:
+    """Sensors that no departure from a Gaussian resembles: blurred discs, wide tails, rings."""
+
+    name: str
+    share: float  # of the disc in the mean square radius; of the second Gaussian in the integral
+    spread: float  # standard deviation of the share within the family
+    ratio: float = 0.0  # of the second Gaussian's width to the first's; none of a disc
+
+
+#: Shares of discs and their spreads, about half the way to the next share.
+_DISCS = ((0.35, 0.2), (0.6, 0.2), (0.8, 0.12), (0.92, 0.08), (0.98, 0.04))
+FAMILIES = (
+    *(Family("disc", share, spread) for share, spread in _DISCS),
+    *(Family("wide tail", 0.15, 0.08, ratio) for ratio in (2.0, 2.4, 2.9)),
+    Family("wide tail", 0.35, 0.12, 2.0),
+    Family("ring", -0.3, 0.15, 0.5),
+)
+#: Step in ln(width) of the derivative by it.
+_RELATIVE_STEP = 1e-3
+
+
+class Side(NamedTuple):
+    """Functions of wavenumber, or of radius, of a width: all kernels are made of them."""
+
+    gaussian: Callable[..., FloatArray]
+    slope: Callable[..., FloatArray]  # by the width
+    disc: Callable[..., FloatArray]
+    rings: Callable[[Rings, FloatArray], FloatArray]
+
+
+_TRANSFORMS = Side(
+    kernels.gaussian_transfer, kernels.gaussian_transfer_slope, kernels.disc_transfer,
+    Rings.transform,
+)  # fmt: skip
+_PROFILES = Side(
+    kernels.unit_gaussian, kernels.unit_gaussian_slope, kernels.blurred_disc, Rings.radial
+)
+
+
+def _sensors(
+    families: Sequence[Family], width: FloatArray, place: FloatArray, side: Side,
+    offset: FloatArray | float = 0.0,
+) -> FloatArray:  # fmt: skip
+    """G of families for widths (m,), the shares off by some of their spreads: (place, m)."""
+    share, spread, ratio = np.array([[f.share, f.spread, f.ratio] for f in families]).T
+    share, disc, x = share + offset * spread, ratio == 0, place[:, None]
+    columns = np.empty((place.size, width.size))
+    w, f = width[disc], share[disc]
+    columns[:, disc] = side.disc(x, 2 * w * np.sqrt(f), w * np.sqrt(1 - f))
+    w, f, second = width[~disc], share[~disc], (ratio * width)[~disc]
+    columns[:, ~disc] = (1 - f) * side.gaussian(x, w) + f * side.gaussian(x, second)
+    return columns
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyFit:
+    """The sensor of a family that fits the scan best."""
+
+    family: Family
+    conversion_constant: float  # in V/Pa
+    width: float  # in m
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedScan:
+    """Standardised voltages and their derivatives, Q' times those at the points (n), (r, ...)."""
+
+    # Q is orthonormal and spans voltages and all columns, so that sums of squares are those of the
+    # points.  Of few points it is the unit matrix.
+    model: ForwardModel
+    fit: GaussianFit
+    data: FloatArray  # (r,): voltages that the fit leaves over
+    flat: FloatArray  # (r, p): by the parameters of the fit
+    rings: FloatArray  # (r, a): of angular rings
+    weights: FloatArray  # (n,)
+    synthesis: FloatArray | None  # (r, nodes): of kernels by their transforms
+    right: Tall | None  # (n, r): the transposed standardisation of Q
+
+    @classmethod
+    def of(
+        cls,
+        model: ForwardModel,
+        fit: GaussianFit,
+        weights: FloatArray,
+        rings: AngularRings | None = None,
+    ) -> ReducedScan:
+        """Reduce a scan with weights (n,), with angular rings or without."""
+        points, count = model.points, fit.jacobian.shape[1]
+        beside = [(points.u - fit.predicted)[:, None], fit.jacobian]
+        beside += [rings.signal(model, fit.centre)] if rings else []
+        columns, mix = model.framed(fit.geometry, beside)
+        columns, right = points.standardise(columns, weights), None
+        last, synthesis = columns.shape[1], None
+        if mix is not None:
+            columns, reduced = orthonormalised(columns)
+            last -= len(mix)
+            synthesis, right = reduced[:, last:] @ mix, points.unstandardise(columns, weights)
+            right = right.astype(np.float32) if len(right) > SINGLE else right
+            columns = reduced
+        parts = columns[:, 0], columns[:, 1 : 1 + count], columns[:, 1 + count : last]
+        return cls(model, fit, *parts, weights, synthesis, right)
+
+    def signal(self, kernels: FloatArray) -> FloatArray:
+        """Voltages (r, m) of round kernels by their transforms, (nodes, m)."""
+        if self.synthesis is not None:
+            return np.asarray(self.synthesis @ kernels)
+        voltages = self.model.signal(self.fit.geometry, kernels)
+        return self.model.points.standardised(voltages, self.weights)
+
+    def summed(self, share: FloatArray) -> FloatArray:
+        """Factors (r,) whose products with reduced columns are sums of shares (n,) of columns."""
+        root, factor = np.sqrt(self.weights), self.model.points.decorrelation
+        shares = share / root if factor is None else factor.correlate_adjoint(share / root)
+        if self.right is None:
+            return np.asarray(shares)
+        shares = shares if factor is None else factor.correlate(shares)
+        return np.asarray(self.right.T @ (shares / root))
+
+    def by_voltages(self, gain: FloatArray) -> VoltageMap:
+        """Derivatives by the voltages (m, n) of numbers with these by the reduced data, (m, r)."""
+        if self.right is not None:
+            return VoltageMap(((gain, self.right),))
+        return VoltageMap(((self.model.points.unstandardise(gain.T.copy(), self.weights).T, None),))
+
+
+#: At so many sets of wavenumbers or radii a basis keeps its columns.
+_KEPT = 4
+
+
+@dataclass(frozen=True, eq=False)
+class DepartureBasis:
+    """The kernels that an estimate is a combination of, about the best Gaussian."""
+
+    conversion_constant: float  # the Gaussian, in V/Pa and m
+    sigma: float
+    flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
+    rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
+    families: tuple[FamilyFit, ...]  # as many as fit the scan
+    angular: AngularDepartures | None  # the last flat ones: theirs is a prior of unit variance
+
+    @property
+    def blocks(self) -> tuple[slice, ...]:
+        """Columns of each shape, then of each family: its sensor less the Gaussian, changes."""
+        counts = [*(ring.radius.size for ring in self.rings), *(3 for _ in self.families)]
+        ends = self.flat + np.cumsum([0, *counts])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def kernels(self, k: FloatArray) -> FloatArray:
+        """Transforms of all columns at ``k`` (rad/m), shape (k, p)."""
+        return self._at(k, _TRANSFORMS)
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values of all columns at radii ``r`` (m), shape (r, p)."""
+        return self._at(r, _PROFILES)
+
+    def columns(self, reduced: ReducedScan) -> FloatArray:
+        """Voltages of all columns, standardised, of a reduced scan, (r, p)."""
+        around = [self.angular.combined(reduced.rings)] if self.angular else []
+        kernels = self.kernels(reduced.model.k)[:, self.flat :]
+        return np.hstack([reduced.flat, *around, reduced.signal(kernels)])
+
+    def voltages(
+        self, model: ForwardModel, fit: GaussianFit, coefficients: FloatArray
+    ) -> FloatArray:
+        """Voltages at the points of combinations of all columns, (p,) or (p, m): (n,) or (n, m)."""
+        # Coefficients are few: of a million points there is no room for all columns.
+        count = fit.jacobian.shape[1]
+        volts = fit.jacobian @ coefficients[:count]
+        if self.angular:
+            theirs = coefficients[count : self.flat]
+            around = self.angular.signal(model, fit.centre, theirs.reshape(len(theirs), -1))
+            volts += around.reshape(volts.shape)
+        kernels = self.kernels(model.k)[:, self.flat :]
+        return np.asarray(volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :]))
+
+    @cached_property
+    def integrals(self) -> FloatArray:
+        """Integrals of all columns over the plane, shape (p,)."""
+        return np.asarray(self.kernels(np.zeros(1))[0])
+
+    @cached_property
+    def _tables(self) -> dict[tuple[Side, bytes], FloatArray]:
+        return {}
+
+    def _at(self, place: FloatArray, side: Side) -> FloatArray:
+        """All columns at wavenumbers or radii; those of the last few are kept."""
+        key = side, place.tobytes()
+        if key not in self._tables:
+            if len(self._tables) == _KEPT:
+                self._tables.clear()
+            # The first two are by A and width; parameters that move no kernel hold zeros.
+            table = np.zeros((place.size, self.blocks[-1].stop if self.blocks else self.flat))
+            table[:, 0], table[:, 1] = self._sensor(place, side)
+            first = self.flat
+            if self.rings:
+                rings = Rings.joined(self.rings)
+                table[:, first : first + rings.radius.size] = side.rings(rings, place)
+                first += rings.radius.size
+            if self.families:
+                table[:, first:] = self._families(table[:, :1], place, side)
+            table.flags.writeable = False
+            self._tables[key] = table
+        return self._tables[key]
+
+    def _sensor(self, place: FloatArray, side: Side) -> tuple[FloatArray, FloatArray]:
+        """Columns by A and width of the sensor that the others depart from."""
+        slope = self.conversion_constant * side.slope(place, self.sigma)
+        return side.gaussian(place, self.sigma), slope
+
+    def _families(self, gaussian: FloatArray, place: FloatArray, side: Side) -> FloatArray:
+        """Three columns of each: less the Gaussian; changes by ln(width), the share's spread."""
+        families, a, widths = zip(
+            *((fit.family, fit.conversion_constant, fit.width) for fit in self.families),
+            strict=True,
+        )
+        width = np.outer([1, 1 + _RELATIVE_STEP, 1], widths).ravel()
+        offset = np.repeat([0.0, 0.0, -1.0], len(a))
+        values = _sensors(3 * families, width, place, side, offset)
+        sensor, wider, less = np.moveaxis(values.reshape(place.size, 3, -1), 1, 0) * np.array(a)
+        change = (wider - sensor) / _RELATIVE_STEP
+        columns = [sensor - self.conversion_constant * gaussian, change, sensor - less]
+        return np.stack(columns, axis=2).reshape(place.size, -1)
+
+
+def departure_basis(
+    model: ForwardModel,
+    fit: GaussianFit,
+    reduced: ReducedScan | None = None,
+    angular: AngularDepartures | None = None,
+) -> DepartureBasis:
+    """Return the kernels of the fit's own parameters and of every shape about it."""
+    # With the scan as reduced about the fit, of the families' best fits, too.
+    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
+    rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
+    families = () if reduced is None else tuple(_fitted_families(reduced, width))
+    flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
+    return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
+
+
+#: Steps in ln(width) end below the first, are cut at the second; beyond the third factor from the
+#: Gaussian's width a family does not fit the scan.
+_FAMILY_ROUNDS = 8
+_SETTLED, _LONGEST, _FARTHEST = 1e-3, 0.3, 2.5
+
+
+def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
+    """Fit A and width of every family, centre, baseline and drift by the way."""
+    fit, k, step = reduced.fit, reduced.model.k, _RELATIVE_STEP
+    others = np.linalg.qr(reduced.flat[:, 2:])[0]
+
+    def free(values: FloatArray) -> FloatArray:
+        return np.asarray(values - others @ (others.T @ values))
+
+    gaussian = fit.conversion_constant * kernels.gaussian_transfer(k, fit.sigma)
+    data = free(reduced.data + reduced.signal(gaussian))
+    widths, amplitudes = np.full((2, len(FAMILIES)), start)
+    for _ in range(_FAMILY_ROUNDS):
+        both = _sensors(2 * FAMILIES, np.append(widths, (1 + step) * widths), k, _TRANSFORMS)
+        signal, wider = np.hsplit(free(reduced.signal(both)), 2)
+        # Least squares in A and A d ln(width), of all families at once.
+        slope = (wider - signal) / step
+        a, b, c = (np.sum(x, axis=0) for x in (signal**2, signal * slope, slope**2))
+        determinant = a * c - b**2
+        amplitudes = (c * (data @ signal) - b * (data @ slope)) / determinant
+        growth = (a * (data @ slope) - b * (data @ signal)) / determinant / amplitudes
+        growth = np.clip(growth, -_LONGEST, _LONGEST)
+        widths = widths * np.exp(growth)
+        if np.abs(growth).max() < _SETTLED:
+            break
+    for family, width, amplitude in zip(FAMILIES, widths, amplitudes, strict=True):
+        if amplitude > 0 and start / _FARTHEST < width < start * _FARTHEST:
+            yield FamilyFit(family, float(amplitude), float(width))
