@@ -22,18 +22,20 @@ _VARIABLE_LENGTH = 9  # class of the datatype
 _MAX_BLOCKS = 1000
 
 
-def text_length(data: bytes, address: int) -> int:
+def text_length(data: bytes, address: int, heaps: set[int]) -> int:
     """Return the length that the descriptor at an address claims, in bytes."""
+    # ``heaps``: addresses of those that were looked at before, in the same file.
     if not 0 <= address <= len(data) - _DESCRIPTOR:
         raise ValueError("the text lies outside the file")
-    return _claim(data, data, address)
+    return _claim(data, data, address, heaps)
 
 
-def _claim(file: bytes, data: bytes, position: int) -> int:
+def _claim(file: bytes, data: bytes, position: int, heaps: set[int]) -> int:
     """Return the length in a descriptor, after a look at the heap that it leads to."""
     length, heap = struct.unpack_from("<IQ", data, position)
-    if length:
+    if length and heap not in heaps:
         _check_heap(file, heap)
+        heaps.add(heap)
     return int(length)
 
 
@@ -53,7 +55,9 @@ def _check_heap(file: bytes, address: int) -> None:
         position += step
 
 
-def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -> list[int]:
+def attribute_text_lengths(
+    data: bytes, header: int, name: bytes, number: int, heaps: set[int]
+) -> list[int]:
     """Return the lengths, in bytes, that an object's attribute of texts claims."""
     try:
         for kind, flags, message in _messages(data, header):
@@ -62,16 +66,16 @@ def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -
             attribute, start = _attribute(message)
             if attribute == name:
                 starts = [start + i * _DESCRIPTOR for i in range(number)]
-                return [_claim(data, message, at) for at in starts]
+                return [_claim(data, message, at, heaps) for at in starts]
     except (struct.error, IndexError) as error:
         raise ValueError("the header of its object is damaged") from error
-    lengths = list(_dense_lengths(data, name, number))
+    lengths = list(_dense_lengths(data, name, number, heaps))
     if not lengths:
         raise ValueError("an attribute is stored in a way that cannot be checked")
     return lengths
 
 
-def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
+def _dense_lengths(data: bytes, name: bytes, number: int, heaps: set[int]) -> Iterator[int]:
     """Yield the claims of every attribute of this name and of variable length, in any object."""
     # In a heap of many attributes a message stands as it would in the header.
     terminated = name + b"\0"
@@ -87,7 +91,7 @@ def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
             variable = dtype < len(message) and message[dtype] & 0x0F == _VARIABLE_LENGTH
             if attribute == name and variable and len(message) >= values + number * _DESCRIPTOR:
                 for i in range(number):
-                    yield _claim(data, message, values + i * _DESCRIPTOR)
+                    yield _claim(data, message, values + i * _DESCRIPTOR, heaps)
         position = data.find(terminated, position + 1)
 
 
@@ -159,8 +163,11 @@ def check_type(where: str, kind: Any, *, text: bool) -> None:
         raise refuse(where, f"has numbers of {kind.get_size()} bytes", "No number is that long.")
 
 
-def check_layout(where: str, dataset: Any, *, text: bool) -> None:
-    """Refuse a dataset whose storage could read other files, run code or exhaust memory."""
+def check_layout(where: str, dataset: Any, *, text: bool) -> int:
+    """Refuse a dataset whose storage could read other files, run code or exhaust memory.
+
+    Return the size that its shape and type claim, in bytes.
+    """
     if dataset.get_space().get_simple_extent_type() == h5py.h5s.NULL:
         raise refuse(where, "has a null dataspace", "It holds no value.")
     check_type(where, dataset.get_type(), text=text)
@@ -168,10 +175,10 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> None:
     if len(shape) > (0 if text else _MAX_RANK):
         expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
         raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
-    limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
-    if claimed_bytes(dataset) > limit:
+    limit, claimed = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES, claimed_bytes(dataset)
+    if claimed > limit:
         why = f"More than {limit:,} bytes are not read, however small the file is."
-        raise refuse(where, f"claims {claimed_bytes(dataset):,} bytes", why)
+        raise refuse(where, f"claims {claimed:,} bytes", why)
     plist = dataset.get_create_plist()
     layout = plist.get_layout()
     if layout == h5py.h5d.VIRTUAL:
@@ -181,8 +188,9 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> None:
     _check_filters(where, plist)
     if layout == h5py.h5d.CHUNKED:
         _check_chunks(where, dataset, plist)
-    elif claimed_bytes(dataset) and dataset.get_storage_size() < claimed_bytes(dataset):
+    elif claimed and dataset.get_storage_size() < claimed:
         raise refuse(where, *_UNWRITTEN)
+    return claimed
 
 
 def _check_filters(where: str, plist: Any) -> None:

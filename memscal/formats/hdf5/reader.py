@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 from collections.abc import Iterable, Iterator
 from io import BytesIO
@@ -83,6 +84,8 @@ class SafeFile:
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
         self._listed: frozenset[str] | None = None
+        self._heaps: set[int] = set()  # addresses of those that are sound
+        self._attributes: dict[tuple[str, str], str | int | float | tuple[str, ...] | None] = {}
 
     def where(self, path: str) -> str:
         """Return file and path as messages name them."""
@@ -91,6 +94,7 @@ class SafeFile:
     def limit_to(self, paths: Iterable[str]) -> None:
         """From now on refuse what stands at any other path: no digest covers it."""
         self._listed = frozenset(paths)
+        self._attributes.clear()
 
     def has(self, path: str) -> bool:
         """Return whether a path exists; a link that is not a hard link is refused."""
@@ -107,8 +111,7 @@ class SafeFile:
         if path not in self._arrays:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                limits.check_layout(self.where(path), dataset, text=False)
-                self._spend(path, limits.claimed_bytes(dataset))
+                self._spend(path, limits.check_layout(self.where(path), dataset, text=False))
                 whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
                 values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
                 dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
@@ -121,11 +124,10 @@ class SafeFile:
         if path not in self._texts:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                limits.check_layout(self.where(path), dataset, text=True)
-                self._spend(path, limits.claimed_bytes(dataset))
+                self._spend(path, limits.check_layout(self.where(path), dataset, text=True))
                 if dataset.get_type().is_variable_str():
                     offset = dataset.get_offset() or -1
-                    self._check_length(path, limits.text_length(self._data, offset))
+                    self._check_length(path, limits.text_length(self._data, offset, self._heaps))
                 self._texts[path] = printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
         return self._texts[path]
 
@@ -136,8 +138,10 @@ class SafeFile:
 
     def attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
         """Return an attribute: text, a number, a few texts, or ``None`` where there is none."""
-        with damage_named(f"{self.where(path)}@{name} cannot be read"):
-            return self._read_attribute(path, name)
+        if (path, name) not in self._attributes:
+            with damage_named(f"{self.where(path)}@{name} cannot be read"):
+                self._attributes[path, name] = self._read_attribute(path, name)
+        return self._attributes[path, name]
 
     def _open(self, path: str) -> Any:
         """Return the object at a path, each part of which is a hard link; ``None`` if absent."""
@@ -153,9 +157,10 @@ class SafeFile:
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
         key = name.encode("ascii")
-        if not isinstance(folder, h5py.h5g.GroupID) or not folder.links.exists(key):
+        links = folder.links if isinstance(folder, h5py.h5g.GroupID) else None
+        if links is None or not links.exists(key):
             return None
-        if folder.links.get_info(key).type != h5py.h5l.TYPE_HARD:
+        if links.get_info(key).type != h5py.h5l.TYPE_HARD:
             problem = f"{self.where(path)} is reached through a soft, external or other link."
             why = "A link can lead to another file, to a pipe, or round in a circle."
             raise UnsafeFileError(problem, why=why, cure="Copy the linked data into the file.")
@@ -192,21 +197,22 @@ class SafeFile:
         where = f"{self.where(path)}@{name}"
         if attribute.get_space().get_simple_extent_type() == h5py.h5s.NULL:
             raise refuse(where, "has a null dataspace", "It holds no value.")
-        number = int(np.prod(attribute.shape, dtype=object))
-        size = number * attribute.get_type().get_size()
-        if len(attribute.shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
+        kind, shape = attribute.get_type(), attribute.shape
+        number = math.prod(shape)
+        size = number * kind.get_size()
+        if len(shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
             raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
-        text = attribute.get_type().get_class() == h5py.h5t.STRING
-        limits.check_type(where, attribute.get_type(), text=text)
+        text = kind.get_class() == h5py.h5t.STRING
+        limits.check_type(where, kind, text=text)
         self._spend(path, size)
-        if text and attribute.get_type().is_variable_str():
-            address = h5py.h5o.get_info(item).addr
-            for length in limits.attribute_text_lengths(self._data, address, key, number):
+        if text and kind.is_variable_str():
+            place = self._data, h5py.h5o.get_info(item).addr
+            for length in limits.attribute_text_lengths(*place, key, number, self._heaps):
                 self._check_length(f"{path}@{name}", length)
         # h5py's attribute access needs nothing of an object but its identifier.
         value = h5py.AttributeManager(SimpleNamespace(id=item))[name]
         if not text:
             return np.asarray(value).reshape(-1)[0].item() if number else None
-        if len(attribute.shape) == 0:
+        if not shape:
             return printable(value, _MAX_ATTRIBUTE_BYTES)
         return tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in value)
