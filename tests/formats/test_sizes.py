@@ -140,7 +140,7 @@ def test_what_is_too_large_is_refused_with_size_limit_and_cure(
     with pytest.raises(InputError, match=r"2,049 pixels along a side, but at most 2,048"):
         memscal.read_reference(tmp_path / "field.png", pixel_size=1e-6)
     correlation = np.broadcast_to(0.0, (4001, 4001))
-    with pytest.raises(InputError, match=r"4,001 points, but at most 4,000(.|\n)*Average"):
+    with pytest.raises(InputError, match=r"4,001 points, but at most 4,000(.|\n)*average"):
         replace(memscal.simulate(points=4001), u_zz_correlation=correlation)
 
 
