@@ -29,6 +29,8 @@ from memscal.model.checks import OUTLIER_WEIGHT, Message
 OUTLIER_THRESHOLD = 3.5
 #: Error of the reference and of its transforms, relative to the largest signal.
 NUMERICAL_FLOOR = 1e-6
+#: Residuals below this share of the largest voltage are of rounding, and show no outliers.
+_ROUNDING = 1e-10
 #: A conversion constant must exceed this many of its standard uncertainties.
 LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
@@ -279,9 +281,9 @@ def _outliers(
     points: ScanPoints, residual: FloatArray, stated: FloatArray, threshold: float
 ) -> FloatArray:
     """Weights of the points by their residuals; over the plane by what neighbours do not share."""
-    least = float(np.finfo(float).tiny)
+    least = _ROUNDING * float(np.abs(points.u).max() * np.sqrt(stated).max())
     if points.planar:
-        least = float(robust_scale(residual * np.sqrt(stated)))
+        least = max(least, float(robust_scale(residual * np.sqrt(stated))))
         residual = isolated(points, residual)
     return outlier_weights(residual * np.sqrt(stated), threshold, least)
 
