@@ -41,7 +41,7 @@ Rows: TypeAlias = slice | NDArray[np.bool_]
 #: In place of the order of a Bessel function: J_1(x)/x.
 TURN = -1
 #: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
-_TABLE_PHASE, _DEGREE = 0.25, 5
+_TABLE_PHASE, _DEGREE = 0.25, 7
 #: Few points read a table where its last phase (rad) is less.
 _LONGEST_PHASE = 500.0
 #: Combinations of waves whose voltages are below this share of the largest one's are left out.
