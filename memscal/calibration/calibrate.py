@@ -88,7 +88,7 @@ def assemble(
     g, plane = solution.deconvolution.g, results.field_errors
     if plane is None:
         errors = np.sqrt(np.diag(results.radial_covariance))
-        plane = np.interp(np.hypot.outer(g.y, g.x), g.r, errors)
+        plane = g.grid.to_image(np.interp(g.grid.radius, g.r, errors))
         scatter = None
     else:
         scatter, plane = plane

@@ -112,17 +112,22 @@ class LineFields:
     @cached_property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return self.taper(self.grid.radius)
+        return self._padded(self.taper(self._inside.radius))
 
     def taper(self, radius: FloatArray) -> FloatArray:
         """Taper at radii, in m."""
         return _taper(radius, self.support * self.grid.spacing)
 
+    @cached_property
+    def _inside(self) -> EvenGrid:
+        return EvenGrid(self.support + 1, self.grid.spacing)
+
+    def _padded(self, values: FloatArray) -> FloatArray:
+        return np.pad(values, (0, self.grid.count - self._inside.count))
+
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero, as far as its support goes."""
-        inside = EvenGrid(self.support + 1, self.grid.spacing)
-        values = on_grid(profile, inside, self.grid.spacing / 2)
-        return np.pad(values, (0, self.grid.count - inside.count))
+        return self._padded(on_grid(profile, self._inside, self.grid.spacing / 2))
 
     def convolved(self, kernel: Field) -> FloatArray:
         """Convolve a kernel with the stress: its values at the measured points."""
@@ -132,8 +137,8 @@ class LineFields:
     def on_support(self, kernel: FloatArray, _: PosteriorProfile | None) -> Field:
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
-        inside = slice(0, self.support + 1)
-        return Field(EvenGrid(self.support + 1, self.grid.spacing), kernel[inside, inside])
+        inside = slice(0, self._inside.count)
+        return Field(self._inside, kernel[inside, inside])
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""

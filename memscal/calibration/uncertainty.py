@@ -33,7 +33,7 @@ from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import RECTANGLE, carried_force, reference_sensitivities
 from memscal.estimation.smoothing import SmoothedProfile
-from memscal.estimation.voltage_map import VoltageMap, square_root, triangular
+from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
@@ -44,7 +44,7 @@ from memscal.model.stress import StressProfile
 _FINE = 20
 #: Windows below this have closed; what sums of squares lose to rounding.
 _CLOSED = _ROUNDING = 1e-9
-#: Columns over the points that are made at a time.
+#: Columns over many points that are made at a time.
 _COLUMNS = 8
 #: Parameters whose uncertainty is broken down by source.
 BUDGETED = (
@@ -464,8 +464,11 @@ def _posterior_kernel(
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
-    transfer = [np.interp(wavenumbers, k, column) for column in normalised.T]
-    rows = np.vstack([basis.integrals, radial, np.stack(transfer, axis=1)])
+    place = np.interp(wavenumbers, k, np.arange(k.size))
+    below = np.minimum(place.astype(np.intp), k.size - 2)
+    share = (place - below)[:, None]
+    transfer = (1 - share) * normalised[below] + share * normalised[below + 1]
+    rows = np.vstack([basis.integrals, radial, transfer])
     return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
 
 
@@ -510,8 +513,9 @@ def _division_map(
     geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
-    starts = range(0, kernels.shape[1], _COLUMNS)
-    signals = (model.signal(geometry, kernels[:, i : i + _COLUMNS]) for i in starts)
+    count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
+    starts = range(0, kernels.shape[1], count)
+    signals = (model.signal(geometry, kernels[:, i : i + count]) for i in starts)
     direct = normalised @ synthesis @ gain
     kept = np.hstack([direct @ voltages for voltages in signals])
     radial = np.column_stack([estimate.radial(r), basis.radial(r)])

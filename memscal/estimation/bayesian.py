@@ -87,7 +87,12 @@ class _LinearModel:
         rest = data - q @ (q.T @ data)
         return cls(start, (places / scale) @ np.linalg.inv(r), q, size, data, rest, *noise)
 
-    @property
+    @cached_property
+    def mean(self) -> FloatArray:
+        """Posterior mean of all parameters without departures, (p,)."""
+        return np.asarray(self.start + self.root @ (self.q.T @ self.data))
+
+    @cached_property
     def numbers(self) -> tuple[float, ...]:
         """Square of what is left over, expected noise included; the noise's least variances."""
         power = float(self.rest @ self.rest) + self.added * self.freedom
@@ -115,7 +120,9 @@ class _Design:
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ linear.rest
         # Of a vector that meets the flat columns, only what lies beside them carries noise.
-        power = along**2 + linear.added * (1 - np.sum((linear.q.T @ left) ** 2, axis=0))
+        power = along**2
+        if linear.added:
+            power += linear.added * (1 - np.sum((linear.q.T @ left) ** 2, axis=0))
         return cls(linear, places, columns, left, singular, right, along, power)
 
     @cached_property
@@ -156,8 +163,7 @@ class _Conditional:
         """Posterior mean of all parameters, (p,)."""
         design, linear = self.design, self.design.linear
         amplitudes = self.filter * (design.left.T @ linear.data)
-        flat = linear.root @ (linear.q.T @ linear.data)
-        return np.asarray(linear.start + flat + design.turned @ amplitudes)
+        return np.asarray(linear.mean + design.turned @ amplitudes)
 
     @property
     def gain(self) -> tuple[FloatArray, FloatArray]:

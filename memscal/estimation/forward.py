@@ -41,7 +41,7 @@ Rows: TypeAlias = slice | NDArray[np.bool_]
 #: In place of the order of a Bessel function: J_1(x)/x.
 TURN = -1
 #: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
-_TABLE_PHASE, _DEGREE = 0.25, 5
+_TABLE_PHASE, _DEGREE = 0.25, 7
 #: Few points read a table where its last phase (rad) is less.
 _LONGEST_PHASE = 500.0
 #: Combinations of waves whose voltages are below this share of the largest one's are left out.
@@ -66,6 +66,14 @@ class WaveTable:
     values: FloatArray  # (t, nodes)
     splines: FloatArray  # (t, nodes): coefficients
     knots: FloatArray
+
+    def at(self, radius: FloatArray) -> FloatArray:
+        """Waves at radii within the table, (n, nodes)."""
+        from scipy.interpolate import BSpline
+
+        inside = np.clip(radius, self.radii[0], self.radii[-1])
+        spline = BSpline.construct_fast(self.knots, self.splines, _DEGREE)
+        return np.asarray(spline(inside))
 
     def interpolation(self, radius: FloatArray) -> csr_array:
         """From coefficients to radii within the table, shape (n, t), sparse."""
@@ -103,7 +111,7 @@ class Geometry:
         if self.radius.size > DENSE or wave > 1:
             return np.asarray(self.interpolation[rows] @ (self.table(wave).splines @ spread))
         if wave not in self._waves and self.reach * self.k[-1] < _LONGEST_PHASE:
-            self._waves[wave] = self.interpolation @ self.table(wave).splines
+            self._waves[wave] = self.table(wave).at(self.radius)
         elif wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
             unique, back = np.unique(self.radius, return_inverse=True)

@@ -85,7 +85,7 @@ class ProfileEstimate:
         random = self.scattered(self.weighed.gain)
         return square_root(self.covariance - random @ random.T, np.diag(self.covariance))
 
-    @property
+    @cached_property
     def noise_scale(self) -> float:
         """Noise of a point (V); with stated uncertainties, the factor they must grow by (Birge)."""
         return self.adopted_noise(self.weighed.noise)
@@ -203,12 +203,12 @@ class ProfileEstimate:
         positions = np.stack([self.points.x, self.points.y])
         return np.asarray(positions - self.centres[self.points.scan].T)
 
-    @property
+    @cached_property
     def distance(self) -> FloatArray:
         """Distance of each point from its scan's centre, shape (n,), in m."""
         return np.asarray(np.hypot(*self.offset))
 
-    @property
+    @cached_property
     def background(self) -> FloatArray:
         """Baseline and drift at each point, shape (n,), in V."""
         return np.asarray(self.model.drift_columns @ self.drifts)
