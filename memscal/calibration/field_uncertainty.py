@@ -29,7 +29,6 @@ from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix
-from memscal.deconvolution.fourier_ratio import Quotient
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import FloatArray
@@ -135,17 +134,15 @@ class _Band:
     def of(
         cls,
         fields: Any,
-        quotient: Quotient,
+        ratio: ComplexArray,
+        window: FloatArray,
         axes: tuple[FloatArray, FloatArray],
         stated: tuple[NDArray[np.bool_], NDArray[np.bool_]],
     ) -> _Band:
         """Return the band in which a window is open; ``axes``, ``stated``: x and y of nodes."""
-        grid, window = fields.central, quotient.window
-        stress = grid.forward(fields.stress.values)
         open_ = window > _CLOSED
-        ratio = np.divide(window, stress, out=np.zeros_like(stress), where=open_)
         rows, columns = (np.flatnonzero(open_.any(axis=axis)) for axis in (1, 0))
-        dy, dx = grid.spacing
+        dy, dx = fields.central.spacing
         m, n = fields.confinement.shape
         angles = 2 * np.pi * fftfreq(m)[rows], 2 * np.pi * rfftfreq(n)[columns]
         (x, y), index = axes, fields.index
@@ -207,7 +204,9 @@ def _divided(
     # Nodes where G is stated.
     x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in axes)
     inside = np.flatnonzero(np.logical_and.outer(y, x))
-    band = _Band.of(fields, deconvolution.quotient, axes, (x, y))
+    window, stress = deconvolution.quotient.window, grid.forward(fields.stress.values)
+    ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
+    band = _Band.of(fields, ratio, window, axes, (x, y))
     share = fields.share(smoothed)
     noise = estimate.noise**2 / estimate.outlier_weight
     taper, g = fields.taper(radius[inside]), g.ravel()[inside]
@@ -240,9 +239,6 @@ def _divided(
     lost[:, -1], sums[-1] = mean[inside] - taken, mean.sum() - taken.sum()
     own, shape = np.zeros(fields.confinement.shape), fields.confinement.shape
     np.add.at(own, fields.index, share**2 * noise)
-    stress = grid.forward(fields.stress.values)
-    window = deconvolution.quotient.window
-    ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
     squared = fftshift(irfft2(rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own), s=shape))
     variance = squared[np.ix_(*band.nodes)].ravel()
     for gains, right in gain.parts:

@@ -221,7 +221,9 @@ class ForwardModel:
         for scan, measure in enumerate(measures):
             groups.setdefault(measure.tobytes(), []).append(scan)
         strongest, table = np.abs(measures).max(axis=0), geometry.table(self.order)
-        inside = (table.radii >= 0) & (table.radii <= geometry.radius.max() + table.radii[-1] / 99)
+        # One radius beyond the farthest point is within the reach of its interpolation.
+        farthest = geometry.radius.max() + (table.radii[1] - table.radii[0])
+        inside = (table.radii >= 0) & (table.radii <= farthest)
         _, size, right = np.linalg.svd(table.values[inside] * strongest, full_matrices=False)
         size = size[size > _NOTHING * size[0]]
         right, width = right[: size.size], size.size

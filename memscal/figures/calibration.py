@@ -461,7 +461,7 @@ def calibration_figure(result: Calibrated) -> Figure:
     lines = _text_lines(data, loads)
     count = data.reconvolution.x.size
     if (every := -(-count // _MOST_DRAWN)) > 1 and data.reconvolution.offset_x is None:
-        lines.append((f"Of {count:,} points every {every}th is drawn.", COLOURS["muted"], "normal"))
+        lines.append((f"Of {count:,} points one in {every} is drawn.", COLOURS["muted"], "normal"))
         columns: dict[str, Any] = {
             n: None if v is None else v[::every] for n, v in vars(data.reconvolution).items()
         }
