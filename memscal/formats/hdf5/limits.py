@@ -5,10 +5,12 @@ through a damaged heap.  The claim is a descriptor of 16 bytes: length, address,
 Format Specification", section VIII).
 """
 
+from __future__ import annotations
+
 import math
 import struct
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 
@@ -144,11 +146,6 @@ def refuse(where: str, problem: str, why: str) -> UnsafeFileError:
     return UnsafeFileError(f"{where} {problem}.", why=why, cure=cure)
 
 
-def claimed_bytes(dataset: Any) -> int:
-    """Return the size that a dataset's shape and type claim, in bytes."""
-    return int(math.prod(dataset.shape)) * int(dataset.get_type().get_size())
-
-
 def check_type(where: str, kind: Any, *, text: bool) -> None:
     """Refuse a type that is not a plain number, or not a string where text is expected."""
     type_class = kind.get_class()
@@ -163,19 +160,31 @@ def check_type(where: str, kind: Any, *, text: bool) -> None:
         raise refuse(where, f"has numbers of {kind.get_size()} bytes", "No number is that long.")
 
 
-def check_layout(where: str, dataset: Any, *, text: bool) -> int:
-    """Refuse a dataset whose storage could read other files, run code or exhaust memory.
+class Layout(NamedTuple):
+    """Type and shape of a dataset or an attribute, and the size that they claim, in bytes."""
 
-    Return the size that its shape and type claim, in bytes.
-    """
-    if dataset.get_space().get_simple_extent_type() == h5py.h5s.NULL:
-        raise refuse(where, "has a null dataspace", "It holds no value.")
-    check_type(where, dataset.get_type(), text=text)
-    shape = dataset.shape
+    kind: Any
+    shape: tuple[int, ...]
+    size: int
+
+    @classmethod
+    def of(cls, where: str, item: Any) -> Layout:
+        """Look at a dataset or an attribute."""
+        # HDF5's objects are asked for once: each costs as much as reading a number.
+        space, kind = item.get_space(), item.get_type()
+        if space.get_simple_extent_type() == h5py.h5s.NULL:
+            raise refuse(where, "has a null dataspace", "It holds no value.")
+        return cls(kind, space.shape, math.prod(space.shape) * kind.get_size())
+
+
+def check_layout(where: str, dataset: Any, *, text: bool) -> Layout:
+    """Refuse a dataset whose storage could read other files, run code or exhaust memory."""
+    kind, shape, claimed = of = Layout.of(where, dataset)
+    check_type(where, kind, text=text)
     if len(shape) > (0 if text else _MAX_RANK):
         expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
         raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
-    limit, claimed = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES, claimed_bytes(dataset)
+    limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
     if claimed > limit:
         why = f"More than {limit:,} bytes are not read, however small the file is."
         raise refuse(where, f"claims {claimed:,} bytes", why)
@@ -187,10 +196,10 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> int:
         raise refuse(where, "is stored in external files", "Any file could be read through it.")
     _check_filters(where, plist)
     if layout == h5py.h5d.CHUNKED:
-        _check_chunks(where, dataset, plist)
+        _check_chunks(where, dataset, plist.get_chunk(), of)
     elif claimed and dataset.get_storage_size() < claimed:
         raise refuse(where, *_UNWRITTEN)
-    return claimed
+    return of
 
 
 def _check_filters(where: str, plist: Any) -> None:
@@ -209,13 +218,12 @@ def _check_filters(where: str, plist: Any) -> None:
             raise refuse(where, f"uses the filter {filters[code]} more than once", why)
 
 
-def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
-    chunk = plist.get_chunk()
-    size = int(math.prod(chunk)) * int(dataset.get_type().get_size())
-    if size > max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset)) or size > MOST_ARRAY_BYTES:
-        problem = f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data"
+def _check_chunks(where: str, dataset: Any, chunk: tuple[int, ...], of: Layout) -> None:
+    size = math.prod(chunk) * of.kind.get_size()
+    if size > max(_MIN_CHUNK_LIMIT, 2 * of.size) or size > MOST_ARRAY_BYTES:
+        problem = f"has chunks of {size:,} bytes for {of.size:,} bytes of data"
         raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
-    number = math.prod(-(-n // c) for n, c in zip(dataset.shape, chunk, strict=True))
+    number = math.prod(-(-n // c) for n, c in zip(of.shape, chunk, strict=True))
     if number > _MAX_CHUNKS:
         raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")
     if number and dataset.get_num_chunks() < number:

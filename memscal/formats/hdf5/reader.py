@@ -12,7 +12,6 @@ import math
 import os
 from collections.abc import Iterable, Iterator
 from io import BytesIO
-from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -111,9 +110,10 @@ class SafeFile:
         if path not in self._arrays:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                self._spend(path, limits.check_layout(self.where(path), dataset, text=False))
-                whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
-                values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
+                of = limits.check_layout(self.where(path), dataset, text=False)
+                self._spend(path, of.size)
+                whole = of.kind.get_class() == h5py.h5t.INTEGER
+                values = np.empty(of.shape, dtype=np.int64 if whole else np.float64)
                 dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
                 values.setflags(write=False)
                 self._arrays[path] = values
@@ -124,11 +124,14 @@ class SafeFile:
         if path not in self._texts:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                self._spend(path, limits.check_layout(self.where(path), dataset, text=True))
-                if dataset.get_type().is_variable_str():
+                of = limits.check_layout(self.where(path), dataset, text=True)
+                self._spend(path, of.size)
+                if of.kind.is_variable_str():
                     offset = dataset.get_offset() or -1
                     self._check_length(path, limits.text_length(self._data, offset, self._heaps))
-                self._texts[path] = printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
+                value = np.empty((), dtype=of.kind.dtype)
+                dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
+                self._texts[path] = printable(value[()], MAX_TEXT_BYTES)
         return self._texts[path]
 
     def is_text(self, path: str) -> bool:
@@ -195,11 +198,8 @@ class SafeFile:
             return None
         attribute = h5py.h5a.open(item, key)
         where = f"{self.where(path)}@{name}"
-        if attribute.get_space().get_simple_extent_type() == h5py.h5s.NULL:
-            raise refuse(where, "has a null dataspace", "It holds no value.")
-        kind, shape = attribute.get_type(), attribute.shape
+        kind, shape, size = limits.Layout.of(where, attribute)
         number = math.prod(shape)
-        size = number * kind.get_size()
         if len(shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
             raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
         text = kind.get_class() == h5py.h5t.STRING
@@ -209,10 +209,9 @@ class SafeFile:
             place = self._data, h5py.h5o.get_info(item).addr
             for length in limits.attribute_text_lengths(*place, key, number, self._heaps):
                 self._check_length(f"{path}@{name}", length)
-        # h5py's attribute access needs nothing of an object but its identifier.
-        value = h5py.AttributeManager(SimpleNamespace(id=item))[name]
+        values = np.empty(shape, dtype=kind.dtype)
+        attribute.read(values)
         if not text:
-            return np.asarray(value).reshape(-1)[0].item() if number else None
-        if not shape:
-            return printable(value, _MAX_ATTRIBUTE_BYTES)
-        return tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in value)
+            return values.flat[0].item() if number else None
+        texts = tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in values.flat)
+        return texts if shape else texts[0]
