@@ -20,12 +20,13 @@ the Gaussian itself; its uncertainty is the mean squared error with priors that 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import compress, product
-from typing import ClassVar
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache
+from itertools import compress, pairwise, product
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.estimation import departures
 from memscal.estimation.departures import DepartureBasis, Family, ReducedScan, Shape
@@ -57,15 +58,15 @@ class Bayesian:
 
 
 @dataclass(frozen=True, eq=False)
-class _LinearModel:
-    """Weighted data and columns of flat prior about one sensor, the Gaussian or a family's."""
+class _LinearModels:
+    """Weighted data and columns of flat prior about f sensors, the Gaussian and the families'."""
 
-    start: FloatArray  # (p,): the sensor among all parameters
-    root: FloatArray  # (p, flat): of the flat parameters' covariance, for noise of unit variance
-    q: FloatArray  # (n, flat)
-    log_determinant: float  # of the columns
-    data: FloatArray  # (n,)
-    rest: FloatArray  # (n,): what the flat columns leave over
+    start: FloatArray  # (f, p): the sensor among all parameters
+    root: FloatArray  # (f, p, flat): of the flat ones' covariance, for noise of unit variance
+    q: FloatArray  # (f, n, flat)
+    log_determinant: FloatArray  # (f,): of the columns
+    data: FloatArray  # (f, n)
+    rest: FloatArray  # (f, n): what the flat columns leave over
     freedom: float
     added: float  # variance of noise that is expected, but not in the data
     stated: float  # variance of the noise
@@ -77,132 +78,186 @@ class _LinearModel:
         places: FloatArray,
         flat: FloatArray,
         data: FloatArray,
-        *noise: float,
-    ) -> _LinearModel:
+        noise: tuple[float, float, float],
+    ) -> _LinearModels:
         """Project the weighted flat columns out of the weighted data."""
-        # ``places`` (p, flat): where the flat parameters stand among all parameters.
-        scale = np.linalg.norm(flat, axis=0)
+        # ``places`` (f, p, flat): where the flat parameters stand among all parameters.
+        scale = np.linalg.norm(flat, axis=1, keepdims=True)
         q, r = np.linalg.qr(flat / scale)
-        size = float(np.log(np.abs(np.diag(r)) * scale).sum())
-        rest = data - q @ (q.T @ data)
+        size = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)) * scale[:, 0]).sum(axis=1)
+        rest = data - _times(q, _times(q, data, transposed=True))
         return cls(start, (places / scale) @ np.linalg.inv(r), q, size, data, rest, *noise)
 
     @cached_property
-    def mean(self) -> FloatArray:
-        """Posterior mean of all parameters without departures, (p,)."""
-        return np.asarray(self.start + self.root @ (self.q.T @ self.data))
+    def means(self) -> FloatArray:
+        """Posterior means of all parameters without departures, (f, p)."""
+        along = _times(self.q, self.data, transposed=True)
+        return np.asarray(self.start + _times(self.root, along))
 
     @cached_property
-    def numbers(self) -> tuple[float, ...]:
-        """Square of what is left over, expected noise included; the noise's least variances."""
-        power = float(self.rest @ self.rest) + self.added * self.freedom
-        distinct = max((_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
-        return power, distinct, self.stated, self.freedom, self.log_determinant
+    def numbers(self) -> tuple[FloatArray, FloatArray]:
+        """Squares of what is left over, expected noise included; the noise's least variances."""
+        power = np.sum(self.rest**2, axis=1) + self.added * self.freedom
+        return power, np.maximum((_ROUNDING * np.abs(self.data).max(axis=1)) ** 2, 1e-300)
+
+
+def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = False) -> FloatArray:
+    """Product of each matrix, or of its transpose, with a vector of its own, (h, m)."""
+    if transposed:
+        matrices = matrices.swapaxes(1, 2)
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
 
 
 @dataclass(frozen=True, eq=False)
-class _Design:
-    """Weighted columns of departures, by the SVD of what is left of them beside the flat ones."""
+class _Conditionals:
+    """Marginal likelihoods and posteriors, each given one of h hypotheses of m amplitudes.
 
-    linear: _LinearModel
-    places: FloatArray  # (p, m): where their amplitudes stand among all parameters
-    columns: FloatArray  # (n, m)
-    left: FloatArray
-    singular: FloatArray
-    right: FloatArray
-    along: FloatArray  # the data along the left singular vectors
-    power: FloatArray  # their squares, those of the expected noise included
+    The weighted columns of its departures are decomposed, by the SVD of what is left of them beside
+    the flat ones.
+    """
+
+    linear: _LinearModels
+    numbers: NDArray[np.intp]  # (h,): places among HYPOTHESES
+    family: NDArray[np.intp]  # (h,): of the sensor among the linear models
+    changes: FloatArray  # (h, p, m): of all parameters, the flat ones fitted anew
+    left: FloatArray  # (h, n, s)
+    singular: FloatArray  # (h, s)
+    right: FloatArray  # (h, s, m)
+    along: FloatArray  # (h, s): the data along the left singular vectors
+    power: FloatArray  # (h, s): their squares, those of the expected noise included
+    prior: FloatArray  # (h,): variance of the amplitudes
+    # At the MAP estimate of the noise.
+    log_marginal: FloatArray  # (h,)
+    scatter: FloatArray  # (h,): variance of the residuals
+    variance: FloatArray  # (h,): of the noise: at least as stated
 
     @classmethod
-    def of(cls, linear: _LinearModel, columns: FloatArray, places: FloatArray) -> _Design:
-        """Decompose weighted columns (n, m)."""
-        free = columns - linear.q @ (linear.q.T @ columns)
-        left, singular, right = np.linalg.svd(free, full_matrices=False)
-        along = left.T @ linear.rest
+    def of(
+        cls,
+        linear: _LinearModels,
+        columns: FloatArray,
+        choice: _Choice,
+    ) -> _Conditionals:
+        """Decompose the columns (n, p) that each hypothesis chooses."""
+        numbers, family, places, factors, strength = choice
+        q = linear.q[family]
+        chosen = np.moveaxis(columns[:, places], 1, 0) * factors[:, None, :]
+        beside = q.swapaxes(1, 2) @ chosen
+        changes = -(linear.root[family] @ beside)
+        every = np.arange(len(places))[:, None], places, np.arange(places.shape[1])
+        changes[every] += factors
+        left, singular, right = np.linalg.svd(chosen - q @ beside, full_matrices=False)
+        along = _times(left, linear.rest[family], transposed=True)
         # Of a vector that meets the flat columns, only what lies beside them carries noise.
         power = along**2
         if linear.added:
-            power += linear.added * (1 - np.sum((linear.q.T @ left) ** 2, axis=0))
-        return cls(linear, places, columns, left, singular, right, along, power)
+            power += linear.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
+        decomposed = left, singular, right, along, power
+        unknown = np.full((3, len(numbers)), np.nan)
+        return cls(linear, numbers, family, changes, *decomposed, strength**2, *unknown)
 
-    @cached_property
-    def changes(self) -> FloatArray:
-        """Changes of all parameters by the amplitudes, the flat ones fitted anew, (p, m)."""
-        return np.asarray(self.places - self.linear.root @ (self.linear.q.T @ self.columns))
-
-    @cached_property
-    def turned(self) -> FloatArray:
-        """The same by amplitudes along the singular vectors."""
-        return np.asarray(self.changes @ self.right.T)
-
-
-@dataclass(frozen=True, eq=False)
-class _Conditional:
-    """Marginal likelihood and posterior given one hypothesis, at the MAP estimate of the noise."""
-
-    design: _Design
-    prior: float  # variance of the amplitudes
-    log_marginal: float
-    scatter: float  # variance of the residuals
-    variance: float  # of the noise: at least as stated
+    def __getitem__(self, rows: NDArray[np.bool_]) -> _Conditionals:
+        """Some of the hypotheses."""
+        kept = {f.name: getattr(self, f.name) for f in fields(self)[1:]}
+        return replace(self, **{name: values[rows] for name, values in kept.items()})
 
     @cached_property
     def filter(self) -> FloatArray:
-        """From data to amplitudes, along the singular vectors, (m,)."""
-        singular = self.design.singular
-        return self.prior * singular / (self.variance + self.prior * singular**2)
+        """From data to amplitudes, along the singular vectors, (h, s)."""
+        prior, variance = self.prior[:, None], self.variance[:, None]
+        return prior * self.singular / (variance + prior * self.singular**2)
+
+    @cached_property
+    def turned(self) -> FloatArray:
+        """Changes of all parameters by amplitudes along the singular vectors, (h, p, s)."""
+        return np.asarray(self.changes @ self.right.swapaxes(1, 2))
 
     @property
-    def slope(self) -> FloatArray:
-        """Derivative of the logarithm by the weighted data, (n,)."""
-        explained = self.filter * self.design.singular * self.design.along
-        return (self.design.left @ explained - self.design.linear.rest) / self.variance
+    def slopes(self) -> FloatArray:
+        """Derivatives of the logarithms by the weighted data, (h, n)."""
+        explained = self.filter * self.singular * self.along
+        slopes = _times(self.left, explained) - self.linear.rest[self.family]
+        return np.asarray(slopes / self.variance[:, None])
 
-    @property
-    def mean(self) -> FloatArray:
-        """Posterior mean of all parameters, (p,)."""
-        design, linear = self.design, self.design.linear
-        amplitudes = self.filter * (design.left.T @ linear.data)
-        return np.asarray(linear.mean + design.turned @ amplitudes)
+    @cached_property
+    def means(self) -> FloatArray:
+        """Posterior means of all parameters, (h, p)."""
+        data = _times(self.left, self.linear.data[self.family], transposed=True)
+        return np.asarray(self.linear.means[self.family] + _times(self.turned, self.filter * data))
 
-    @property
-    def gain(self) -> tuple[FloatArray, FloatArray]:
-        """Derivative of the mean by the weighted data (p, n): two factors, (p, f) and (n, f)."""
-        linear, turned = self.design.linear, self.design.turned * self.filter
-        return np.hstack([linear.root, turned]), np.hstack([linear.q, self.design.left])
 
-    @property
-    def covariance_root(self) -> FloatArray:
-        """Square root of the covariance, (p, c)."""
-        design = self.design
+def _gain(groups: Sequence[_Conditionals], shares: FloatArray) -> FloatArray:
+    """Derivatives of the means by the weighted data, summed by the shares of HYPOTHESES: (p, n)."""
+    each, linear = np.zeros(len(groups[0].linear.q)), groups[0].linear
+    factors: list[tuple[FloatArray, FloatArray]] = []
+    for group in _counting(groups, shares > 0):
+        share = shares[group.numbers]
+        np.add.at(each, group.family, share)
+        factors.append((group.turned * (share[:, None] * group.filter)[:, None, :], group.left))
+    kept = each > 0
+    factors.append((each[kept, None, None] * linear.root[kept], linear.q[kept]))
+    left, right = (np.hstack([_beside(f) for f in side]) for side in zip(*factors, strict=True))
+    return np.asarray(left @ right.T)
+
+
+def _covariance_root(groups: Sequence[_Conditionals], shares: FloatArray) -> FloatArray:
+    """Square root (p, c) of the covariances' sum by the shares of HYPOTHESES."""
+    each, linear = np.zeros(len(groups[0].linear.q)), groups[0].linear
+    parts: list[FloatArray] = []
+    for group in _counting(groups, shares > 0):
+        share, prior, variance = shares[group.numbers], group.prior, group.variance
+        np.add.at(each, group.family, share * variance)
         # Posterior variances along the singular vectors; in all other directions the prior's.
-        left = self.prior * self.variance / (self.variance + self.prior * design.singular**2)
-        parts = [self.variance**0.5 * design.linear.root, left**0.5 * design.turned]
-        if len(design.right) < design.right.shape[1]:
-            parts.append(self.prior**0.5 * (design.changes - design.turned @ design.right))
-        return np.hstack(parts)
+        left = share * prior * variance / (variance + prior * group.singular.T**2)
+        parts.append(group.turned * (left.T**0.5)[:, None, :])
+        if group.right.shape[1] < group.right.shape[2]:
+            hidden = group.changes - group.turned @ group.right
+            parts.append(hidden * ((share * prior) ** 0.5)[:, None, None])
+    parts.append(linear.root[each > 0] * (each[each > 0] ** 0.5)[:, None, None])
+    return np.hstack([_beside(part) for part in parts])
 
 
-def _conditioned(designs: Sequence[tuple[_Design, float]]) -> Iterator[_Conditional]:
-    """Condition on designs of a strength, the noise at its MAP estimate."""
-    signal, power = np.zeros((2, len(designs), max(d.singular.size for d, _ in designs)))
-    for i, (design, strength) in enumerate(designs):
-        size = design.singular.size
-        signal[i, :size], power[i, :size] = (strength * design.singular) ** 2, design.power
-    numbers = np.array([design.linear.numbers for design, _ in designs]).T
-    total, distinct, stated, freedom, log_determinant = numbers
+def _counting(
+    groups: Sequence[_Conditionals], counts: NDArray[np.bool_]
+) -> Iterator[_Conditionals]:
+    """Those of the hypotheses that count, (h,) of HYPOTHESES."""
+    for group in groups:
+        rows = counts[group.numbers]
+        if rows.any():
+            yield group if rows.all() else group[rows]
+
+
+def _beside(matrices: FloatArray) -> FloatArray:
+    """Columns of matrices (h, n, m) beside each other, (n, h m)."""
+    return np.moveaxis(matrices, 0, 1).reshape(matrices.shape[1], -1)
+
+
+def _conditioned(groups: Sequence[_Conditionals]) -> Iterator[_Conditionals]:
+    """Condition on all hypotheses, the noise at its MAP estimate."""
+    sizes = [group.singular.shape for group in groups]
+    signal, power = np.zeros((2, sum(h for h, _ in sizes), max(s for _, s in sizes)))
+    ends = np.cumsum([0, *(h for h, _ in sizes)])
+    places = [slice(start, end) for start, end in pairwise(ends)]
+    for rows, group in zip(places, groups, strict=True):
+        size = group.singular.shape[1]
+        signal[rows, :size] = group.prior[:, None] * group.singular**2
+        power[rows, :size] = group.power
+    linear, family = groups[0].linear, np.concatenate([group.family for group in groups])
+    total, distinct = (numbers[family] for numbers in linear.numbers)
     beyond = np.maximum(total - power.sum(axis=1), 0.0)
-    scatter = np.maximum(total / freedom, distinct)
+    scatter = np.maximum(total / linear.freedom, distinct)
     for _ in range(8):
         explained = power * scatter[:, None] / (scatter[:, None] + signal)
-        scatter = np.maximum((beyond + explained.sum(axis=1)) / freedom, distinct)
-    variance = np.maximum(scatter, stated)
+        scatter = np.maximum((beyond + explained.sum(axis=1)) / linear.freedom, distinct)
+    variance = np.maximum(scatter, linear.stated)
     ratio = signal / variance[:, None]
     square = (beyond + (power / (1 + ratio)).sum(axis=1)) / variance
-    loss = freedom * np.log(variance) + square + np.log(1 + ratio).sum(axis=1)
-    log_marginal = -0.5 * loss - log_determinant
-    for (design, strength), *of_noise in zip(designs, log_marginal, scatter, variance, strict=True):
-        yield _Conditional(design, strength**2, *map(float, of_noise))
+    loss = linear.freedom * np.log(variance) + square + np.log(1 + ratio).sum(axis=1)
+    log_marginal = -0.5 * loss - linear.log_determinant[family]
+    for rows, group in zip(places, groups, strict=True):
+        found = log_marginal[rows], scatter[rows], variance[rows]
+        names = "log_marginal", "scatter", "variance"
+        yield replace(group, **dict(zip(names, found, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -302,88 +357,124 @@ def weigh_departures(
         prior = least_noise * np.eye(size, columns.shape[1], flat - size)
         columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
     noise = effective_count + size - flat, expected_noise**2, least_noise**2
-    hypotheses, designs = zip(*_designs(basis, columns, data, noise), strict=True)
-    conditionals = list(_conditioned(designs))
-    averaged, gain = _average(list(hypotheses), conditionals, expected_noise**2, basis.integrals)
+    groups = list(_conditioned(_groups(basis, columns, data, noise)))
+    averaged, gain = _average(groups, expected_noise**2, basis.integrals)
     residual = model.points.u - fit.predicted - basis.voltages(model, fit, averaged.mean)
     gain = gain[:, : reduced.data.size]
     return replace(averaged, gain=reduced.by_voltages(gain), residual=residual)
 
 
-def _designs(
-    basis: DepartureBasis, columns: FloatArray, data: FloatArray, noise: tuple[float, float, float]
-) -> Iterator[tuple[int, tuple[_Design, float]]]:
-    """Number, design and strength of each hypothesis; none of a family that does not fit."""
-    unit, flat, blocks = np.eye(columns.shape[1]), basis.flat, basis.blocks
-    of_shape = dict(zip(departures.SHAPES, blocks[: len(basis.rings)], strict=True))
-    of_family = dict(zip([f.family for f in basis.families], blocks[len(of_shape) :], strict=True))
-    # The first two parameters are ln A and ln(width).
-    places = unit[:, :flat] * np.r_[basis.conversion_constant, basis.sigma, np.ones(flat - 2)]
-    linear: dict[Family | None, _LinearModel] = {}
-    linear[None] = _LinearModel.of(0 * unit[0], places, columns @ places, data, *noise)
-    for fitted, block in of_family.items():
-        sensor = unit[block.start]
-        of_a = sensor + basis.conversion_constant * unit[0]
-        places = np.column_stack([of_a, unit[block.start + 1], unit[:, 2:flat]])
-        rest = data - columns[:, block.start]
-        linear[fitted] = _LinearModel.of(sensor, places, columns @ places, rest, *noise)
-    designs: dict[tuple[Family | None, Shape | None], _Design] = {}
+class _Choice(NamedTuple):
+    """The columns that hypotheses choose, times factors; of none of them the factor is zero."""
+
+    numbers: NDArray[np.intp]  # (h,): places among HYPOTHESES
+    family: NDArray[np.intp]  # (h,): of the sensor among the linear models
+    places: NDArray[np.intp]  # (h, m)
+    factors: FloatArray  # (h, m)
+    strength: FloatArray  # (h,): standard deviation of the amplitudes
+
+
+@lru_cache(maxsize=64)
+def _choices(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> list[_Choice]:
+    """Return what the hypotheses choose; those of one amplitude at the most, and the others."""
+    # For shapes of so many columns behind the flat ones, and families of three each behind them.
+    ends = flat + np.cumsum([0, *sizes])
+    of_shape = dict(zip(departures.SHAPES, map(range, ends, ends[1:]), strict=True))
+    of_family: dict[Family | None, int] = {None: 0}
+    of_family |= {family: i for i, family in enumerate(families, start=1)}
+    rows: tuple[list[Any], list[Any]] = ([], [])
     for i, hypothesis in enumerate(HYPOTHESES):
         family, shape, strength = hypothesis.family, hypothesis.shape, hypothesis.strength
-        if family not in linear:
-            continue
-        if (family, shape) not in designs:
-            block = slice(0, 0) if shape is None else of_shape[shape]
-            parts = [matrix[:, block] for matrix in (columns, unit)]
+        if family in of_family:
+            places = [] if shape is None else list(of_shape[shape])
+            number, factors = of_family[family], [1.0] * len(places)
             if family is not None:
                 # The share of a family departs by its own spread, whatever the strength.
-                last = slice(of_family[family].stop - 1, of_family[family].stop)
-                pairs = zip(parts, (columns, unit), strict=True)
-                parts = [np.hstack([strength * part, matrix[:, last]]) for part, matrix in pairs]
-            designs[family, shape] = _Design.of(linear[family], *parts)
-        yield i, (designs[family, shape], strength if family is None else 1.0)
+                places.append(ends[-1] + 3 * number - 1)
+                factors, strength = [strength] * len(factors) + [1.0], 1.0
+            rows[len(places) > 1].append((i, number, places, factors, strength))
+    choices = []
+    for of_size in filter(None, rows):
+        # Few decompositions of as many columns take less time than some of each size.
+        most = max(len(places) for _, _, places, *_ in of_size)
+        padded = [
+            (i, number, p + [0] * (most - len(p)), f + [0.0] * (most - len(f)), strength)
+            for i, number, p, f, strength in of_size
+        ]
+        stacked = [np.array(column) for column in zip(*padded, strict=True)]
+        # Without any column the places are no integers.
+        stacked[2] = stacked[2].astype(np.intp)
+        choices.append(_Choice(*stacked))
+    return choices
+
+
+def _groups(
+    basis: DepartureBasis, columns: FloatArray, data: FloatArray, noise: tuple[float, float, float]
+) -> list[_Conditionals]:
+    """The hypotheses by their numbers of amplitudes; none of a family that does not fit."""
+    shapes = len(basis.rings)
+    sizes = tuple(ring.radius.size for ring in basis.rings)
+    starts = np.array([block.start for block in basis.blocks[shapes:]], dtype=np.intp)
+    linear = _linear_models(basis, starts, columns, data, noise)
+    choices = _choices(basis.flat, sizes, tuple(fit.family for fit in basis.families))
+    return [_Conditionals.of(linear, columns, choice) for choice in choices]
+
+
+def _linear_models(
+    basis: DepartureBasis,
+    starts: NDArray[np.intp],
+    columns: FloatArray,
+    data: FloatArray,
+    noise: tuple[float, float, float],
+) -> _LinearModels:
+    """The Gaussian, then the families, whose columns begin at ``starts``."""
+    flat, size, count = basis.flat, columns.shape[1], 1 + starts.size
+    a, each = basis.conversion_constant, np.arange(1, count)
+    # The first two parameters are ln A and ln(width).
+    places = np.zeros((count, size, flat))
+    places[:, range(flat), range(flat)] = np.r_[a, basis.sigma, np.ones(flat - 2)]
+    places[each, 1, 1], places[each, starts, 0], places[each, starts + 1, 1] = 0.0, 1.0, 1.0
+    of_data, start = np.repeat(data[None], count, axis=0), np.zeros((count, size))
+    of_data[1:] -= columns[:, starts].T
+    start[each, starts] = 1.0
+    return _LinearModels.of(start, places, columns @ places, of_data, noise)
 
 
 def _average(
-    hypotheses: list[int], conditionals: list[_Conditional], added: float, integrals: FloatArray
+    groups: Sequence[_Conditionals], added: float, integrals: FloatArray
 ) -> tuple[WeighedFit, FloatArray]:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
     log_marginal, scatter = np.full(len(HYPOTHESES), -np.inf), np.zeros(len(HYPOTHESES))
-    log_marginal[hypotheses] = [c.log_marginal for c in conditionals]
-    scatter[hypotheses] = [c.scatter for c in conditionals]
+    for group in groups:
+        log_marginal[group.numbers], scatter[group.numbers] = group.log_marginal, group.scatter
     priors = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
     estimate, uncertainty = (_posterior(log_marginal, prior) for prior in priors)
-    used = [
-        (i, c)
-        for i, c in zip(hypotheses, conditionals, strict=True)
-        if estimate[i] > 0 or uncertainty[i] > 0
-    ]
-    places = [i for i, _ in used]
-    p, q, means = estimate[places], uncertainty[places], np.stack([c.mean for _, c in used])
+    used = list(_counting(groups, (estimate > 0) | (uncertainty > 0)))
+    places = np.concatenate([group.numbers for group in used])
+    means = np.concatenate([group.means for group in used])
+    p, q = estimate[places], uncertainty[places]
     change_of_a = np.full(estimate.size, np.nan)
     change_of_a[places] = means @ integrals
     mean = p @ means
     apart = means - mean
-    of_mean = [(share, c) for share, (_, c) in zip(p, used, strict=True) if share > 0]
-    factors = [(share * left, right) for share, c in of_mean for left, right in [c.gain]]
-    left, right = map(np.hstack, zip(*factors, strict=True))
-    gain = left @ right.T
-    roots = [(share, c) for share, (_, c) in zip(q, used, strict=True) if share > 0]
-    parts = [(q**0.5)[:, None] * apart]
-    parts += [(share**0.5 * c.covariance_root).T for share, c in roots]
+    gain = _gain(used, estimate)
+    parts = [q**0.5 * apart.T, _covariance_root(used, uncertainty)]
     if added:
-        for share, c in roots:
-            left, right = c.gain
-            parts.append(((share * added) ** 0.5 * (left @ right.T - gain)).T)
-    root = np.vstack(parts)
+        own = np.eye(len(HYPOTHESES))[places]
+        parts += [
+            (added * share) ** 0.5 * (_gain(used, one) - gain)
+            for share, one in zip(q, own, strict=True)
+        ]
+    root = np.hstack(parts)
     # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
-    slopes = np.stack([c.slope for _, c in of_mean])
-    moving = (p[p > 0, None] * apart[p > 0]).T @ slopes
-    sums = (np.logaddexp.reduce(log_marginal[p > 0] + np.log(p[p > 0])) for p in priors)
+    moving = (p[:, None] * apart).T @ np.concatenate([group.slopes for group in used])
+    sums = (
+        np.logaddexp.reduce(log_marginal[prior > 0] + np.log(prior[prior > 0])) for prior in priors
+    )
     noise, unknown = float(np.sqrt(estimate @ scatter)), VoltageMap(())
     # The gain is that of the standardised data, and the residual is left to be computed.
     averaged = WeighedFit(
-        mean, root.T @ root, unknown, noise, estimate, mean, change_of_a, *map(float, sums)
+        mean, root @ root.T, unknown, noise, estimate, mean, change_of_a, *map(float, sums)
     )
     return averaged, gain + moving
 

@@ -54,16 +54,22 @@ class Shape:
 
     def rings(self, width: float, amplitude: float) -> Rings:
         """Components about a Gaussian of a width (m) and amplitude (V/Pa), by its L2 norm."""
+        unit = self._about_unit
+        return Rings(width * unit.radius, width * unit.blur, amplitude * unit.amplitude)
+
+    @cached_property
+    def _about_unit(self) -> Rings:
+        """Components about a Gaussian of unit width and amplitude."""
         if self.scales:
-            blur = width * np.geomspace(self.blur, self.extent, _SCALES)
+            blur = np.geomspace(self.blur, self.extent, _SCALES)
             plain = Rings(np.zeros(_SCALES), blur, np.ones(_SCALES))
         else:
             reach = _REACH * self.extent
             count = max(_FEWEST_RINGS, math.ceil(reach / (_SPACING * self.blur)))
             q = (np.arange(count) + 0.5) * reach / count
             envelope = np.sqrt(q) * np.exp(-0.5 * (q / self.extent) ** 4)
-            plain = Rings(width * q, np.full(count, width * self.blur), envelope)
-        gaussian = amplitude / (2 * np.sqrt(np.pi) * width)
+            plain = Rings(q, np.full(count, self.blur), envelope)
+        gaussian = 1 / (2 * np.sqrt(np.pi))
         return replace(plain, amplitude=plain.amplitude * gaussian / plain.size)
 
 

@@ -224,6 +224,11 @@ class ProfileEstimate:
         return float(np.abs(self.predicted - self.background).max())
 
 
+def fitted_gaussian(points: ScanPoints, *references: RadialSpectrum) -> GaussianFit:
+    """Fit a Gaussian to the points at their stated noise."""
+    return fit_gaussian_to_points(forward_model(points, references), _stated_weights(points))
+
+
 def estimate_profile(
     points: ScanPoints, *references: RadialSpectrum, angular: bool = False
 ) -> ProfileEstimate:
