@@ -19,10 +19,10 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
-from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
+from memscal.estimation.profile import NUMERICAL_FLOOR
 from memscal.measurement.posterior import apparatus_changes, film_transfer, sensor_transfer
 from memscal.measurement.restoration import Restoration
-from memscal.measurement.restore import gaussian_pressure
+from memscal.measurement.restore import gaussian_pressure, plain_pressure
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
 from memscal.model.correlation import scaled
@@ -194,10 +194,34 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
         )
 
 
-#: Centre and noise are estimated twice, the second time from the first one's scan.
-_ROUNDS = 2
 #: Noises that are tried, over the scatter of the residuals.
 _TRIED = np.geomspace(0.02, 2.0, 120)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Centre and signal of a scan, and what they leave of its n points; lengths in m, else V."""
+
+    centre: FloatArray  # (2,)
+    distance: FloatArray  # (n,): from the centre
+    signal: FloatArray  # (n,)
+    residual: FloatArray  # (n,)
+    weight: FloatArray  # (n,): below one of an outlier
+    parameters: int  # fitted
+
+
+def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
+    estimate, _ = gaussian_pressure(scan, apparatus, points)
+    signal, rest = estimate.predicted - estimate.background, estimate.weighed.residual
+    count = estimate.gaussian.jacobian.shape[1]
+    return _Found(estimate.centre, estimate.distance, signal, rest, estimate.outlier_weight, count)
+
+
+def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
+    fit = plain_pressure(scan, apparatus, points)
+    signal, rest = fit.conversion_constant * fit.jacobian[:, 0], points.u - fit.predicted
+    count = fit.jacobian.shape[1]
+    return _Found(fit.centre[0], fit.geometry.radius, signal, rest, np.ones_like(rest), count)
 
 
 def prepared_scan(
@@ -209,20 +233,19 @@ def prepared_scan(
     level, electronic, estimated = _at_nominal(scan, np.zeros_like(scan.u_zz)), stated, False
     if scan.normal_load is None:
         return level, electronic, estimated
+    # Centre and noise are estimated twice, the second time from the first one's scan.
     errors, (x, y) = scan.normal_load_errors, scan.positions
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.stated_load
-    for _ in range(_ROUNDS):
-        estimate, _ = gaussian_pressure(level, apparatus, measured_points(level))
-        distance = np.hypot(x - estimate.centre[0], y - estimate.centre[1])
+    for find in (_found_quickly, _found):
+        found = find(level, apparatus, measured_points(level))
         # How far the voltage nearest to the axis is on the way to a contact that sticks.
-        nearest = int(np.argmin(estimate.distance))
-        voltage = float((estimate.predicted - estimate.background)[nearest])
-        sticking = signal.sticking(float(estimate.distance[nearest]), voltage)
-        slope = signal.slope(distance, sticking)
+        nearest = int(np.argmin(found.distance))
+        sticking = signal.sticking(float(found.distance[nearest]), float(found.signal[nearest]))
+        slope = signal.slope(np.hypot(x - found.centre[0], y - found.centre[1]), sticking)
         of_load = np.abs(slope) * load_share
         electronic, estimated = stated, False
         if scan.u_zz_errors is None and of_load.any():
-            noise = _noise_of_load(estimate, of_load[np.isfinite(level.u_zz)])
+            noise = _noise_of_load(found, of_load[np.isfinite(level.u_zz)])
             electronic, estimated = np.full_like(slope, noise), True
         level = _with_noise(_at_nominal(scan, slope), electronic, of_load)
     return level, electronic, estimated
@@ -250,14 +273,14 @@ def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan
     return replace(scan, u_zz_errors=total, u_zz_correlation=correlation)
 
 
-def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
+def _noise_of_load(found: _Found, of_load: FloatArray) -> float:
     """Noise beside that of the loads, by maximum likelihood of the residuals."""
-    residual, weight = estimate.weighed.residual, estimate.outlier_weight
+    residual, count = found.residual, found.residual.size
     # The fitted parameters lower the scatter of the residuals.
-    fitted = 3 + estimate.model.drift_columns.shape[1]
-    square = weight * residual**2 * residual.size / max(residual.size - fitted, 1)
+    square = found.weight * residual**2 * count / max(count - found.parameters, 1)
     scatter = 1.4826 * float(np.median(np.abs(residual)))
-    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
+    largest = float(np.abs(found.signal).max())
+    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * largest)
     variance = tried[:, None] ** 2 + of_load**2
     return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
 

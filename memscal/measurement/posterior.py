@@ -25,7 +25,7 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from operator import add
@@ -38,7 +38,6 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_trans
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import weigh_departures
 from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
-from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
@@ -89,24 +88,32 @@ class PressureShape:
 
     def transform(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
         """Transform at ``k`` (rad/m) for a width (m), one at k = 0; its derivative by the width."""
-        plain, first = self._order(0, k, width), self._order(1, k, width)
+        plain, first, second = self._orders(k, width)
         slope = -width * k**2 * first
         if self.shear == 0.0:
             return plain, slope
         m = self.exponent
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
-        rise = k * first - ratio * width**2 * k**3 * self._order(2, k, width)
-        x, nu = k * self.film.thickness, self.film.poisson_ratio
-        pull = base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu)
-        share = 0.5 * self.shear * pull
+        rise = k * first - ratio * width**2 * k**3 * second
+        share = 0.5 * self.shear * _pull(self.film, k.tobytes())
         return plain - share * k * width * first, slope - share * rise
 
-    def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
-        """Return the transform of the exponent m + further, at the radius a of this shape."""
+    def _orders(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the transforms of the exponents m, m + 1 and m + 2, at the radius a of m."""
         if math.isinf(self.exponent):
-            return gaussian_transfer(k, width)
-        square = 2 * (self.exponent + 2) * width**2
-        return np.asarray(hyp0f1(self.exponent + further + 2, -square * k**2 / 4))
+            same = gaussian_transfer(k, width)
+            return same, same, same
+        z, b = -(self.exponent + 2) * (k * width) ** 2 / 2, self.exponent + 2
+        first, second = (np.asarray(hyp0f1(b + i, z), np.float64) for i in (1, 2))
+        # Downwards the recurrence is stable (DLMF 10.6.1).
+        return first + z / (b * (b + 1)) * second, first, second
+
+
+@lru_cache(maxsize=16)
+def _pull(film: ElasticFilm, k: bytes) -> FloatArray:
+    """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
+    x, nu = np.frombuffer(k) * film.thickness, film.poisson_ratio
+    return np.asarray(base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
@@ -149,39 +156,56 @@ class ShapeFit:
     log_marginal: float  # marginal likelihood up to a constant of the scan
 
 
-_Linearised = Callable[[FloatArray, PressureShape], tuple[FloatArray, FloatArray]]
+#: Steps of the fits on a line, and the largest relative change of a width in one of them; they end
+#: at changes below the last, in units of the parameters' sizes.
+_STEPS, _LONGEST, _SETTLED = 8, 0.5, 1e-7
 
 
-def _on_line(model: ForwardModel, fit: GaussianFit) -> _Linearised:
-    """Return what linearises a shape on a line: a Taylor series in the shift of a fit's centre."""
-    points, k, axis = model.points, model.k, int(model.points.free[0, 1])
-    places, back = np.unique((points.x, points.y)[axis] - fit.centre[0, axis], return_inverse=True)
+def _fitted_on_line(
+    shapes: Sequence[PressureShape], start: ProfileEstimate, theta: FloatArray, scale: FloatArray
+) -> FloatArray:
+    """Fit force, width, centre and drift of all shapes at once: (shapes, p), from one start."""
+    # By a Taylor series in the shift of the centre, so that the shapes share their waves.
+    points, k, weights = start.points, start.model.k, start.weights
+    axis, middle = int(points.free[0, 1]), theta[2]
+    places, back = np.unique((points.x, points.y)[axis] - middle, return_inverse=True)
     x = np.multiply.outer(places, k)
     zero, one = j0(x), j1(x)
     two = 2 * np.divide(one, x, out=np.full_like(x, 0.5), where=x != 0) - zero
     three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
-    # Derivatives of J0(kx) by the centre, over the factorials: the shapes share them.
+    # Derivatives of J0(kx) by the centre, over the factorials.
     waves = np.stack([zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24])
-    waves *= model.reference.wavenumbers.weights * model.reference.values
+    waves *= start.model.reference.wavenumbers.weights * start.model.reference.values
+    drift = np.repeat(start.model.drift_columns[:, None], len(shapes), axis=1)
+    fitted = np.tile(theta, (len(shapes), 1))
+    for _ in range(_STEPS):
+        forces, widths, shifts = fitted[:, 0], fitted[:, 1], fitted[:, 2] - middle
+        pairs = zip(shapes, widths, strict=True)
+        transforms = np.stack([shape.transform(k, width) for shape, width in pairs], axis=2)
+        # Axes: terms of the series, points, response or its slope by the width, shapes.
+        terms = (waves @ np.moveaxis(transforms, 1, 0).reshape(k.size, -1))[:, back]
+        terms = (terms * points.load[:, None]).reshape(4, points.u.size, 2, -1)
+        powers = shifts ** np.arange(4)[:, None]
+        signal, widening = np.einsum("ts,tnds->dns", powers, terms)
+        moving = np.einsum("ts,tns->ns", np.arange(1, 4)[:, None] * powers[:3], terms[1:, :, 0])
+        columns = np.stack([signal, forces * widening, forces * moving], axis=2)
+        columns = np.concatenate([columns, drift], axis=2)
+        rest = points.u[:, None] - forces * signal - drift[:, 0] @ fitted[:, 3:].T
+        both = np.concatenate([columns * scale, rest[:, :, None]], axis=2)
+        both = points.standardised(both.reshape(points.u.size, -1), weights).reshape(both.shape)
+        step = (np.linalg.pinv(np.moveaxis(both[..., :-1], 1, 0)) @ both[..., -1].T[..., None])[
+            ..., 0
+        ]
+        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step[:, 1:2]), 1e-300))
+        fitted = fitted + step * scale
+        if np.abs(step).max() < _SETTLED:
+            break
+    return fitted
 
-    def linearised(theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
-        terms = waves @ np.stack(shape.transform(k, theta[1]), axis=1)
-        terms = terms[:, back] * points.load[:, None]
-        powers = (theta[2] - fit.centre[0, axis]) ** np.arange(4)
-        signal, widening = np.tensordot(powers, terms, 1).T
-        shift = (np.arange(1, 4) * powers[:3]) @ terms[1:, :, 0]
-        columns = [signal, theta[0] * widening, theta[0] * shift, model.drift_columns]
-        return theta[0] * signal + model.drift_columns @ theta[3:], np.column_stack(columns)
 
-    return linearised
-
-
-def fit_shape(
-    shape: PressureShape, start: ProfileEstimate, on_line: _Linearised | None
-) -> ShapeFit:
-    """Fit a shape, starting from the Gaussian fit, and average departures from it."""
+def fit_shape(shape: PressureShape, start: ProfileEstimate, fit: GaussianFit) -> ShapeFit:
+    """Average departures from the fit of a shape."""
     model, weights = start.model, start.weights
-    fit = _fit(shape, model, weights, start.gaussian, on_line)
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
@@ -206,40 +230,41 @@ def fit_shape(
     )
 
 
-def _fit(
-    shape: PressureShape,
-    model: ForwardModel,
-    weights: FloatArray,
-    start: GaussianFit,
-    on_line: _Linearised | None,
-) -> GaussianFit:
-    """Fit force, width, centre and drift; where that diverges, keep the Gaussian's."""
-    free, standardised = model.points.free, model.points.standardised
-    force, width = start.conversion_constant, max(start.sigma, _NARROWEST * model.points.step)
-    theta = np.concatenate([[force, width], start.centre[free], start.drift])
+def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[GaussianFit]:
+    """Fit force, width, centre and drift of each shape; keep the Gaussian's where that fails."""
+    gaussian, points, free = start.gaussian, start.points, start.points.free
+    force, width = gaussian.conversion_constant, max(gaussian.sigma, _NARROWEST * points.step)
+    theta = np.concatenate([[force, width], gaussian.centre[free], gaussian.drift])
     widths = np.full(1 + int(free.sum()), width)
-    scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
+    scale = np.concatenate([[force], widths, np.full(gaussian.drift.size, np.ptp(points.u))])
+    near = np.tile(theta, (len(shapes), 1))
+    if not points.planar:
+        # Bessel functions at one centre take most steps; the last ones are exact.
+        near = _fitted_on_line(shapes, start, theta, scale)
+    pairs = zip(shapes, near, strict=True)
+    return [
+        _fitted(shape, start, place if _fits(place / scale) else theta, scale)
+        for shape, place in pairs
+    ]
 
-    last: list[GaussianFit] = []
 
-    def exact(theta: FloatArray, shape: PressureShape) -> tuple[FloatArray, FloatArray]:
-        last[:] = [linearise(model, theta, shape.transform)]
-        return last[0].predicted, last[0].jacobian
+def _fits(scaled: FloatArray) -> bool:
+    return bool(scaled[0] > 0 and 1 / _FARTHEST < scaled[1] < _FARTHEST)
 
-    def fitted(linearised: _Linearised, begin: FloatArray) -> FloatArray | None:
-        def misfit(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-            predicted, jacobian = linearised(scaled * scale, shape)
-            residual = standardised(predicted - model.points.u, weights)
-            return residual, standardised(jacobian, weights) * scale
 
-        best = gauss_newton(misfit, begin, tolerance=1e-9)
-        ends = best is not None and best[0] > 0 and 1 / _FARTHEST < best[1] < _FARTHEST
-        return best if ends else None
+def _fitted(
+    shape: PressureShape, start: ProfileEstimate, theta: FloatArray, scale: FloatArray
+) -> GaussianFit:
+    model, weights, last = start.model, start.weights, list[GaussianFit]()
 
-    # Bessel functions at one centre take most steps; the last ones are exact.
-    near = fitted(on_line, theta / scale) if on_line else None
-    if fitted(exact, theta / scale if near is None else near) is None:
-        exact(theta, shape)
+    def misfit(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        last[:] = [linearise(model, scaled * scale, shape.transform)]
+        residual = model.points.standardised(last[0].predicted - model.points.u, weights)
+        return residual, model.points.standardised(last[0].jacobian, weights) * scale
+
+    best = gauss_newton(misfit, theta / scale, tolerance=_SETTLED)
+    if best is None or not _fits(best):
+        misfit(theta / scale)
     return last[0]
 
 
@@ -295,8 +320,9 @@ def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    line = None if estimate.points.planar else _on_line(estimate.model, estimate.gaussian)
-    fits = [fit_shape(shape, estimate, line) for shape in pressure_shapes(scan.set_up.film)]
+    shapes = pressure_shapes(scan.set_up.film)
+    pairs = zip(shapes, fitted_shapes(shapes, estimate), strict=True)
+    fits = [fit_shape(shape, estimate, fit) for shape, fit in pairs]
     log_marginal = np.array([fit.log_marginal for fit in fits])
     weight = np.exp(log_marginal - log_marginal.max())
     weight[weight < _NEGLIGIBLE] = 0.0

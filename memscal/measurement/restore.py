@@ -1,6 +1,7 @@
 """Restoration of the stress at the base of the film from a scan and a calibrated sensor."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from os import PathLike
 
@@ -13,6 +14,7 @@ from memscal.errors import FitError, InputError
 from memscal.estimation import points as scan_points
 from memscal.estimation import profile
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
+from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
@@ -311,12 +313,34 @@ def gaussian_pressure(
     scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
+    through, transfer = _of_pressure(scan, apparatus, points)
+    with _undetermined():
+        return profile.estimate_profile(points, through), transfer
+
+
+def plain_pressure(
+    scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
+) -> GaussianFit:
+    """Return the best Gaussian pressure without departures, in a tenth of the time."""
+    with _undetermined():
+        return profile.fitted_gaussian(points, _of_pressure(scan, apparatus, points)[0])
+
+
+def _of_pressure(
+    scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
+) -> tuple[RadialSpectrum, FloatArray]:
+    """Transform of a unit force's voltages, in V m^2 / N, and that of A G, in V/Pa."""
     # A film passes nothing of exp(-kh) beyond kh = 20: 2e-9 of the load.
     wavenumbers = Wavenumbers.covering(20.0 / scan.set_up.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
-    through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers))
+    return RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers)), transfer
+
+
+@contextmanager
+def _undetermined() -> Iterator[None]:
+    """Say of a pressure that no Gaussian fits what this means."""
     try:
-        return profile.estimate_profile(points, through), transfer
+        yield
     except profile.CentreError:
         raise
     except FitError as failure:
