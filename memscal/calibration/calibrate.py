@@ -14,6 +14,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
+from memscal.calibration.field_uncertainty import field_errors
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
@@ -120,7 +121,7 @@ def assemble(
 
 
 def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
-    if solution.other is None or results is None:
+    if results is None or solution.other is None:
         return None
     parameters = results.parameters.only(_OF_A_ROUTE)
     method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
@@ -263,6 +264,7 @@ def calibrate(
     seed: int = 0,
     override: bool = False,
     relative: bool = False,
+    other: bool = True,
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -321,6 +323,8 @@ def calibrate(
     relative : bool, default False
         For scans at constant depth, or of unknown load: loads count for nothing, A is the reading
         by the reference over its largest stress, and no result states pascals from it.
+    other : bool, default True
+        Whether ``.apparatus.other``, the estimate by the other route, is calculated, too.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -359,16 +363,21 @@ def calibrate(
         from memscal.calibration.film_inference import free_thickness, require_free
 
         require_free(free, scans, prepared.references)
-        start = solve(scans, stresses, chosen, channel, both=False, centre=centre, owners=owners)
+        start = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
         freed = free_thickness(start)
         scans = tuple(freed.of(scans))
         stresses = [reference_profile(s, None) for s in scans]
     solution = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
     effects = _effects(solution, prepared.alternatives)
     results = uncertainties(solution, solution.deconvolution, effects, pairs, reading)
-    beside = solution.other
-    other = None if beside is None else uncertainties(solution, beside, effects, pairs, reading)
-    division = results.division or (other.division if other else None)
+    if isinstance(solution.fields, RasterFields):
+        plane = field_errors(solution, solution.deconvolution, effects, pairs)
+        results = replace(results, field_errors=plane)
+    beside: Results | None = None
+    # Some checks are of the division, whichever the method.
+    if (other or results.division is None) and solution.other is not None:
+        beside = uncertainties(solution, solution.other, effects, pairs, reading)
+    division = results.division or (beside.division if beside else None)
     checks = quality_checks(solution, results, division)
     messages = calibration_messages(solution, results, checks)
     of_method: Any = chosen
@@ -402,7 +411,8 @@ def calibrate(
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     messages = (*override_messages(prepared.overridden), *messages)
-    apparatus = assemble(solution, as_stated[0], results, other, checks, messages, configuration)
+    beside = beside if other else None
+    apparatus = assemble(solution, as_stated[0], results, beside, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
 
 
@@ -542,8 +552,7 @@ def _effects(
         # Two laws differ by too much for the first order: calibrated by the other one, too.
         with suppress(MemscalError):
             others = others or [press_neo_hookean(scan) for scan in scans]
-            both = solution.other is not None
-            exact = solve(scans, others, solution.method, estimate.points.channel, both=both)
+            exact = solve(scans, others, solution.method, estimate.points.channel)
             effects["model_form"] = replace(effects["model_form"], exact=exact)
     return effects
 
@@ -561,10 +570,4 @@ def uncertainties(
     linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
     drawn = None if linear else drawn_scatter(solution)
     results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
-    results = replace(results, parameters=replace(results.parameters, reading=reading))
-    if not isinstance(solution.fields, RasterFields):
-        return results
-    from memscal.calibration.field_uncertainty import field_errors
-
-    plane = field_errors(solution, deconvolution, effects, correlations)
-    return replace(results, field_errors=plane)
+    return replace(results, parameters=replace(results.parameters, reading=reading))

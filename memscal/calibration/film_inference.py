@@ -122,7 +122,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
             stresses = [press_rod(*key) for key in keys]
             with suppress(MemscalError):  # no apparatus function may explain the scans by it
                 channel = solution.estimate.points.channel
-                solved[law] = solve(scans, stresses, solution.method, channel, both=False)
+                solved[law] = solve(scans, stresses, solution.method, channel)
     if len(solved) < 2:
         return None
     estimates = [each.estimate for each in solved.values()]

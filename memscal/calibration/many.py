@@ -144,6 +144,7 @@ def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
 def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:
     """Calibrate one scan; an error is part of its result."""
     index, scan = item
+    options = {**options, "other": False}
     apparatus = attempted(f"Scan {index}", lambda: calibrate(scan, **options).apparatus)
     if isinstance(apparatus, MemscalError):
         return FleetCalibration(index=index, budget={}, error=apparatus)

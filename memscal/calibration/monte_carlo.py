@@ -165,7 +165,7 @@ class DrawnScans:
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
         first, channel = self.solution, self.solution.estimate.points.channel
-        return self._results_of(solve(scans, first.stresses, first.method, channel, both=False))
+        return self._results_of(solve(scans, first.stresses, first.method, channel))
 
     def _results_of(self, solution: Solution) -> FloatArray:
         numbers, g = uncertainty.read_off(solution.deconvolution, self.solution.deconvolution.g.r)

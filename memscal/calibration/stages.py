@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import j1
@@ -43,11 +44,10 @@ def solve(
     method: Method,
     channel: str = "zz",
     *,
-    both: bool = True,
     centre: str | None = COMMON,
     owners: Sequence[int] | None = None,
 ) -> Solution:
-    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back."""
+    """Find A and G."""
     # ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test. ``owners``:
     # the number of the scan that each is a part of.
     require_channel_method(channel, method)
@@ -65,7 +65,7 @@ def solve(
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:
                 raise
-    solution = solved(scans, stresses, estimate, method, both=both)
+    solution = solved(scans, stresses, estimate, method)
     return replace(solution, owners=owners, apart=apart)
 
 
@@ -74,20 +74,15 @@ def solved(
     stresses: Sequence[BaseStress],
     estimate: ProfileEstimate,
     method: Method,
-    *,
-    both: bool,
 ) -> Solution:
     """Find A and G from the estimate of the profile; see :func:`solve`."""
     smoothed = None if estimate.model.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
-    other: Method = WhiteNoise() if isinstance(method, Bayesian) else Bayesian()
-    divisible = smoothed is not None and fields.even and _of_round_fields(estimate)
-    beside = deconvolve(estimate, band, fields, other) if both and divisible else None
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
-    return Solution(*steps, deconvolve(estimate, band, fields, method), beside, gaussian)
+    return Solution(*steps, deconvolve(estimate, band, fields, method), gaussian)
 
 
 def require_profile(
@@ -216,10 +211,21 @@ class Solution:
     fields: Fields
     method: Method
     deconvolution: Deconvolution  # A and G by the method, and their misfit
-    other: Deconvolution | None  # by the other route
     gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
     owners: tuple[int, ...] = (0,)  # which of the scans that were given each is, or is a repeat of
     apart: CentresApart | None = None  # test of a common centre for the repeats, where it was made
+
+    @property
+    def comparable(self) -> bool:
+        """Whether the fields can be divided, so that both routes are open."""
+        return self.smoothed is not None and self.fields.even and _of_round_fields(self.estimate)
+
+    @cached_property
+    def other(self) -> Deconvolution | None:
+        """A and G by the other route, if it is open: Bayesian beside a division, or back."""
+        other: Method = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
+        steps = self.estimate, self.band, self.fields, other
+        return deconvolve(*steps) if self.comparable else None
 
     @property
     def per_repeat(self) -> bool:

@@ -329,8 +329,9 @@ def _replace_exactly(
 ) -> None:
     """Put differences from another calibration, over the root of three, for the first order."""
     # Those of centre, baseline and drift stay.
-    routes = [route for route in (exact.deconvolution, exact.other) if route is not None]
-    other = next(route for route in routes if route.divided == deconvolution.divided)
+    same = exact.deconvolution.divided == deconvolution.divided
+    other = exact.deconvolution if same else exact.other
+    assert other is not None
     r, fit, count = deconvolution.g.r, exact.estimate.gaussian, len(names)
     numbers, g = read_off(other, r)
     of_fit = {"gaussian_sigma": fit.sigma, "conversion_constant_gaussian": fit.conversion_constant}
@@ -527,9 +528,10 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     # Of the division of the Bayesian fit's residuals: A's in standard deviations, or the root of
     # G's squared integral over its expectation, if that is larger.
     estimate = solution.estimate
-    if solution.other is None or division is None:
+    if division is None or not solution.comparable:
         return None
     divided = solution.deconvolution if solution.deconvolution.divided else solution.other
+    assert divided is not None
     rings = ring_areas(divided.g.r)
     # A and G, without the transfer function.
     direct, moved = division.direct[: 1 + rings.size], division.kept[: 1 + rings.size, 1:].copy()

@@ -147,7 +147,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     ones = np.ones_like(weights)
     estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, ones, basis)
     require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")
-    solution = solved([scan], [stress], estimate, method, both=False)
+    solution = solved([scan], [stress], estimate, method)
     effects = input_effects([scan], [stress], estimate)
     return solution, uncertainties(solution, solution.deconvolution, effects, {})
 
