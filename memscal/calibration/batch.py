@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -34,6 +34,8 @@ from memscal.model.stress import StressProfile
 from memscal.version import __version__
 
 _LONGEST_STEM = 80
+#: Shards, as many as balance the workers, and the scans of one.
+_SHARDS, _SMALLEST, _LARGEST = 64, 4, 256
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ class Batch:
     results: Path
     options: Mapping[str, Any]
     artifacts: str
-    shard_size: int
+    shard_size: int | None = None  # by default from the number of scans
+    count: int = 0  # of scans
     version: str = __version__
 
     @cached_property
@@ -92,17 +95,17 @@ class Batch:
 
     def shards(self) -> Iterator[Shard]:
         """Yield the shards in their order, listing the scans as they are needed."""
-        scans, number = manifest_scans(self.source), 0
-        while some := tuple(islice(scans, self.shard_size)):
-            yield Shard(number, number * self.shard_size, some)
-            number += 1
+        assert self.shard_size is not None
+        scans, size = manifest_scans(self.source), self.shard_size
+        shards = iter(lambda: tuple(islice(scans, size)), ())
+        yield from (Shard(i, i * size, some) for i, some in enumerate(shards))
 
     def table(self, shard: Shard) -> Path:
         """Return the path of a shard's table."""
         return self.results / "shards" / f"{shard.name}.parquet"
 
-    def prepare(self, *, resume: bool) -> int:
-        """Make the folder of results, if it may be used, and return the number of scans."""
+    def prepare(self, *, resume: bool) -> Batch:
+        """Make the folder of results, if it may be used; count the scans."""
         arrow()
         count = sum(1 for _ in manifest_scans(self.source))
         if not count:
@@ -113,7 +116,8 @@ class Batch:
             if not resume and any(self.results.iterdir()):
                 cure = "Continue them with --resume, or give another folder."
                 raise OutputError(f"The folder {self.results} exists.", why=stays, cure=cure)
-        shards = -(-count // self.shard_size)
+        size = self.shard_size or self._size_of(count)
+        shards = -(-count // size)
         numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(self.results)]
         if max(numbers, default=0) >= shards:
             problem = f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}."
@@ -126,7 +130,13 @@ class Batch:
             problem = f"The folder {self.results} cannot be made: {error.strerror}."
             raise OutputError(problem, cure=cure) from error
         ensure_writable(self.results / "shards" / "proof")
-        return count
+        return replace(self, shard_size=size, count=count)
+
+    def _size_of(self, count: int) -> int:
+        """Return the size of the shards that are there, or one that makes enough of them."""
+        with suppress(MemscalError):
+            return int(read_shard(self.table(Shard(0, 0, ())), ["place"]).num_rows)
+        return min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
 
     def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
         """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""

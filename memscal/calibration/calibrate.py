@@ -52,6 +52,7 @@ from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
+from memscal.model.sizes import MOST_OF_LINES
 from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
@@ -349,7 +350,8 @@ def calibrate(
     """
     pairs = correlations or {}
     prepared = prepare(
-        opened_scans(scan), reference, alternative, (film_law, mooney_rivlin_ratio, rod_friction),
+        opened_scans(scan, MOST_OF_LINES), reference, alternative,
+        (film_law, mooney_rivlin_ratio, rod_friction),
         pixel_size=pixel_size, override=override, relative=relative,
     )  # fmt: skip
     scans, stresses, owners = prepared.scans, list(prepared.stresses), prepared.owners

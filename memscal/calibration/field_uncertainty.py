@@ -189,6 +189,48 @@ def _summed(planes: FloatArray, rows: ComplexArray, columns: ComplexArray) -> Co
     return np.asarray((rows.real @ planes + 1j * (rows.imag @ planes)) @ columns.T)
 
 
+@dataclass(frozen=True, eq=False)
+class _OfParameters:
+    """What a division does to the posterior's kernels, and its mean, at the nodes."""
+
+    beside: FloatArray  # (inside, p): changes of A G by errors of the parameters
+    lost: FloatArray  # (inside, p + 1): what of kernels and mean the window takes away
+    of_frame: FloatArray  # (p,) and (p + 1,): the same, summed over the nodes
+    sums: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        estimate: ProfileEstimate,
+        axes: tuple[FloatArray, FloatArray],
+        inside: NDArray[np.intp],
+        taper: FloatArray,
+        band: _Band,
+        divided: Callable[[FloatArray], FloatArray],
+    ) -> _OfParameters:
+        """Divide the voltages of each kernel, and hold it against the kernel."""
+        # An error of the parameters moves what was fitted around the raster and the frame that G is
+        # seen in.  Where nothing was measured these cancel.
+        kernels, radius = _kernels(estimate, *axes), np.hypot.outer(*axes[::-1]).ravel()
+        count = estimate.basis.integrals.size
+        lost, beside = np.empty((inside.size, count + 1)), np.empty((inside.size, count))
+        sums, of_frame = np.empty(count + 1), np.empty(count)
+        for some in _chunks(count):
+            columns = kernels(unit := np.eye(count)[:, some])
+            passed = band.passed(columns)
+            voltages = estimate.basis.voltages(estimate.model, estimate.gaussian, unit)
+            moved = passed - divided(voltages)
+            beside[:, some], of_frame[some] = moved, taper @ moved
+            taken = taper[:, None] * passed
+            lost[:, some] = columns[inside] - taken
+            sums[some] = columns.sum(axis=0) - taken.sum(axis=0)
+        # The mean is the Gaussian fit and its corrections.
+        mean = estimate.radial(radius) + estimate.oval_kernel(*axes).ravel()
+        taken = taper * band.passed(mean[:, None])[:, 0]
+        lost[:, -1], sums[-1] = mean[inside] - taken, mean.sum() - taken.sum()
+        return cls(beside, lost, of_frame, sums)
+
+
 def _divided(
     solution: Solution,
     deconvolution: Deconvolution,
@@ -200,7 +242,7 @@ def _divided(
     fields: Any = solution.fields
     estimate, smoothed = solution.estimate, solution.smoothed
     grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
-    kernels, radius = _kernels(estimate, *axes), np.hypot.outer(*axes[::-1]).ravel()
+    radius = np.hypot.outer(*axes[::-1]).ravel()
     # Nodes where G is stated.
     x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in axes)
     inside = np.flatnonzero(np.logical_and.outer(y, x))
@@ -219,24 +261,8 @@ def _divided(
         planes = [np.bincount(node, share * column, box[0] * box[1]) for column in voltages.T]
         return band.divided(np.reshape(planes, (-1, *box)))
 
-    # The posterior mean and its kernels: what of them the window takes away; and what an error of
-    # the parameters moves, of what was fitted around the raster and of the frame that G is seen in.
-    # Where nothing was measured these cancel.
-    count = estimate.basis.integrals.size
-    lost, beside = np.empty((inside.size, count + 1)), np.empty((inside.size, count))
-    sums, of_frame = np.empty(count + 1), np.empty(count)
-    for some in _chunks(count):
-        columns = kernels(unit := np.eye(count)[:, some])
-        passed = band.passed(columns)
-        moved = passed - divided(estimate.basis.voltages(estimate.model, estimate.gaussian, unit))
-        beside[:, some], of_frame[some] = moved, taper @ moved
-        taken = taper[:, None] * passed
-        lost[:, some] = columns[inside] - taken
-        sums[some] = columns.sum(axis=0) - taken.sum(axis=0)
-    # The mean is the Gaussian fit and its corrections.
-    mean = estimate.radial(radius) + estimate.oval_kernel(*axes).ravel()
-    taken = taper * band.passed(mean[:, None])[:, 0]
-    lost[:, -1], sums[-1] = mean[inside] - taken, mean.sum() - taken.sum()
+    by = _OfParameters.of(estimate, axes, inside, taper, band, divided)
+    beside, count = by.beside, by.of_frame.size
     own, shape = np.zeros(fields.confinement.shape), fields.confinement.shape
     np.add.at(own, fields.index, share**2 * noise)
     squared = fftshift(irfft2(rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own), s=shape))
@@ -251,7 +277,7 @@ def _divided(
         variance += np.sum((beside @ spread[:, some]) ** 2, axis=1)
     # A is the sum of A G over the nodes.
     back = irfft2(np.conj(ratio) * rfft2(ifftshift(fields.confinement)), s=shape)
-    by_frame = band.every * (of_frame[None, :] @ gain).dense()[0]
+    by_frame = band.every * (by.of_frame[None, :] @ gain).dense()[0]
     of_a = grid.cell_area * (share * back[fields.index] + by_frame)
 
     def changed(voltages: FloatArray) -> FloatArray:
@@ -263,9 +289,9 @@ def _divided(
     rest = np.sum((changed(inputs) - np.outer(g, of_a @ inputs)) ** 2, axis=1)
     root = np.zeros((count + 1, count + 1))
     root[:-1, :-1], root[-1, -1] = square_root(estimate.covariance), 1.0
-    sums = grid.cell_area * band.every * (sums @ root)
+    sums = grid.cell_area * band.every * (by.sums @ root)
     for some in _chunks(count + 1):
-        rest += np.sum((lost @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)
+        rest += np.sum((by.lost @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)
     planes = np.zeros((2, radius.size))
     planes[:, inside] = np.stack([variance, rest]) / a**2
     return planes

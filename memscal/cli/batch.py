@@ -49,8 +49,9 @@ Examples:
 @option("--scheduler", metavar="ADDRESS")(
     "Scheduler of a Dask cluster, such as tcp://node1:8786, whose workers see the same files."
 )
-@option("--shard-size", click.IntRange(min=2), 256, metavar="SCANS")(
-    "Scans of a shard: a task, and a table. What is under way when a batch is killed is lost."
+@option("--shard-size", click.IntRange(min=2), metavar="SCANS")(
+    "Scans of a shard: a task, and a table. What is under way when a batch is killed is lost.  "
+    "[default: a 64th of the scans, 4 to 256; with --resume as before]"
 )
 @option("--artifacts", click.Choice(("failed", "all", "none")), "failed")(
     "Of which calibrations artifacts are written, too: of those with a failed check, all, or none."
@@ -64,7 +65,7 @@ def command(
     resume: bool,
     workers: int | None,
     scheduler: str | None,
-    shard_size: int,
+    shard_size: int | None,
     artifacts: str,
     as_json: bool,
     **settings: Any,
@@ -84,9 +85,10 @@ def command(
 
     chosen = calibration_settings(**settings)
     batch = Batch(source.resolve(), results.resolve(), chosen, artifacts, shard_size)
-    total, start = batch.prepare(resume=resume), monotonic()
+    batch, start = batch.prepare(resume=resume), monotonic()
+    total = batch.count
     try:
-        outcomes = list(_outcomes(batch, workers, scheduler, total))
+        outcomes = list(_outcomes(batch, workers, scheduler))
     except (KeyboardInterrupt, MemscalError):
         out.note("The shards that are done stay: --resume does the rest.")
         raise
@@ -110,14 +112,12 @@ def command(
     return CHECK_FAILED
 
 
-def _outcomes(
-    batch: Batch, workers: int | None, scheduler: str | None, total: int
-) -> Iterator[ShardOutcome]:
+def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:
     """Yield the outcomes of a batch, and show how far it is."""
     from memscal.parallel import cluster, cores, worker_pool
 
     start = said = monotonic()
-    done = calibrated = 0
+    done, calibrated, total = 0, 0, batch.count
     with ExitStack() as stack:
         if scheduler:
             executor, most = stack.enter_context(cluster(scheduler))

@@ -305,9 +305,10 @@ def _read(
     paths: tuple[Path, ...], reference: Path | None, profile: StressProfile | None
 ) -> list[Scan]:
     from memscal.estimation.reference import require_calibration_rod
-    from memscal.formats.scan import read_scan
+    from memscal.formats.opened import opened_scans
+    from memscal.model.sizes import MOST_OF_LINES
 
-    scans = [read_scan(path) for path in paths]
+    scans = list(opened_scans(paths, MOST_OF_LINES))
     for scan, path in zip(scans, paths, strict=True):
         require_calibration_rod(scan, profile)
         if reference is not None and scan.reference is not None:

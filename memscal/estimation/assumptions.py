@@ -125,11 +125,43 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     own = np.stack([np.ones_like(along), along / np.abs(along).max(), moved], axis=1)
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
-    # Repeats are eliminated one by one, unless their noise is correlated: from a triangular factor.
-    alone = points.decorrelation is None
-    groups = [[i] for i in range(repeats.size)] if alone else [list(range(repeats.size))]
-    weights, common, apart, links = estimate.weights / estimate.outlier_weight, [], [], []
+    common, apart, links = _without_repeats(estimate, model, own, shifted)
     size: FloatArray = np.linalg.norm(model.design, axis=0)
+    (without, rank), (left, _) = (_left_over(np.vstack(stack), size) for stack in (common, apart))
+    count = int(shifted.sum())
+    degrees = model.data.size - 2 * repeats.size - rank - count
+    if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
+        return None
+    stack = np.vstack(apart)
+    coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
+    places = np.zeros(repeats.size)
+    known = [link[:, -1] - link[:, len(link) : -1] @ coefficients for link in links]
+    pairs = zip(links, known, strict=True)
+    places[shifted] = np.concatenate([np.linalg.solve(a[:, : len(a)], b) for a, b in pairs])
+    # Over the scatter that is left: exact whether the noise is stated or not.
+    value = max(without - left, 0.0) / count / (left / degrees)
+    return CentresApart(
+        value=value,
+        limit=float(fdtri(count, degrees, 1 - FALSE_ALARM)),
+        p_value=float(fdtrc(count, degrees, value)),
+        distance=float(max(np.ptp(places[scan == i]) for i in range(points.scans))),
+    )
+
+
+def _without_repeats(
+    estimate: ProfileEstimate,
+    model: residuals.FreeModel,
+    own: FloatArray,
+    shifted: NDArray[np.bool_],
+) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
+    """Eliminate what is each repeat's own (n, 3), with one centre and with shifts; what links both.
+
+    From triangular factors: of repeats one by one, unless their noise is correlated.
+    """
+    points, weights = estimate.points, estimate.weights / estimate.outlier_weight
+    repeats, alone = np.unique(points.repeat), points.decorrelation is None
+    groups = [[i] for i in range(repeats.size)] if alone else [list(range(repeats.size))]
+    common, apart, links = [], [], []
     for group in groups:
         rows = np.flatnonzero(points.repeat[model.point] == repeats[group[0]])
         rows = rows if alone else np.arange(model.point.size)
@@ -142,30 +174,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
         common.append(root[first:, last:])
         apart.append(root[last:, last:])
         links.append(root[first:last, first:])
-    (without, rank), (left, _) = (_left_over(np.vstack(stack), size) for stack in (common, apart))
-    count = int(shifted.sum())
-    degrees = model.data.size - 2 * repeats.size - rank - count
-    if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
-        return None
-    stack = np.vstack(apart)
-    coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
-    places = np.zeros(repeats.size)
-    places[shifted] = np.concatenate(
-        [
-            np.linalg.solve(
-                link[:, : len(link)], link[:, -1] - link[:, len(link) : -1] @ coefficients
-            )
-            for link in links
-        ]
-    )
-    # Over the scatter that is left: exact whether the noise is stated or not.
-    value = max(without - left, 0.0) / count / (left / degrees)
-    return CentresApart(
-        value=value,
-        limit=float(fdtri(count, degrees, 1 - FALSE_ALARM)),
-        p_value=float(fdtrc(count, degrees, value)),
-        distance=float(max(np.ptp(places[scan == i]) for i in range(points.scans))),
-    )
+    return common, apart, links
 
 
 def _left_over(root: FloatArray, size: FloatArray) -> tuple[float, int]:

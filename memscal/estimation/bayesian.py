@@ -19,11 +19,11 @@ the Gaussian itself; its uncertainty is the mean squared error with priors that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import compress, pairwise, product
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +58,7 @@ class Bayesian:
 
 
 @dataclass(frozen=True, eq=False)
-class _LinearModels:
+class _Sensors:
     """Weighted data and columns of flat prior about f sensors, the Gaussian and the families'."""
 
     start: FloatArray  # (f, p): the sensor among all parameters
@@ -67,26 +67,25 @@ class _LinearModels:
     log_determinant: FloatArray  # (f,): of the columns
     data: FloatArray  # (f, n)
     rest: FloatArray  # (f, n): what the flat columns leave over
-    freedom: float
-    added: float  # variance of noise that is expected, but not in the data
-    stated: float  # variance of the noise
 
     @classmethod
-    def of(
-        cls,
-        start: FloatArray,
-        places: FloatArray,
-        flat: FloatArray,
-        data: FloatArray,
-        noise: tuple[float, float, float],
-    ) -> _LinearModels:
-        """Project the weighted flat columns out of the weighted data."""
-        # ``places`` (f, p, flat): where the flat parameters stand among all parameters.
-        scale = np.linalg.norm(flat, axis=1, keepdims=True)
-        q, r = np.linalg.qr(flat / scale)
+    def of(cls, basis: DepartureBasis, columns: FloatArray, data: FloatArray) -> _Sensors:
+        """Project the weighted flat columns out of the weighted data, less a family's sensor."""
+        starts = np.array([block.start for block in basis.blocks[len(basis.rings) :]], np.intp)
+        flat, shape = basis.flat, (1 + starts.size, columns.shape[1])
+        start, places = np.zeros(shape), np.zeros((*shape, flat))
+        # The first two parameters are ln A and ln(width).
+        flat_ones = np.r_[basis.conversion_constant, basis.sigma, np.ones(flat - 2)]
+        places[:, range(flat), range(flat)] = flat_ones
+        each = np.arange(1, len(start))
+        start[each, starts] = 1.0
+        places[each, 1, 1], places[each, starts, 0], places[each, starts + 1, 1] = 0.0, 1.0, 1.0
+        values, data = columns @ places, data - start @ columns.T
+        scale = np.linalg.norm(values, axis=1, keepdims=True)
+        q, r = np.linalg.qr(values / scale)
         size = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)) * scale[:, 0]).sum(axis=1)
         rest = data - _times(q, _times(q, data, transposed=True))
-        return cls(start, (places / scale) @ np.linalg.inv(r), q, size, data, rest, *noise)
+        return cls(start, (places / scale) @ np.linalg.inv(r), q, size, data, rest)
 
     @cached_property
     def means(self) -> FloatArray:
@@ -94,18 +93,25 @@ class _LinearModels:
         along = _times(self.q, self.data, transposed=True)
         return np.asarray(self.start + _times(self.root, along))
 
-    @cached_property
-    def numbers(self) -> tuple[FloatArray, FloatArray]:
-        """Squares of what is left over, expected noise included; the noise's least variances."""
-        power = np.sum(self.rest**2, axis=1) + self.added * self.freedom
-        return power, np.maximum((_ROUNDING * np.abs(self.data).max(axis=1)) ** 2, 1e-300)
-
 
 def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = False) -> FloatArray:
     """Product of each matrix, or of its transpose, with a vector of its own, (h, m)."""
     if transposed:
         matrices = matrices.swapaxes(1, 2)
     return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
+
+
+def _beside(matrices: FloatArray) -> FloatArray:
+    """Columns of matrices (h, n, m) beside each other, (n, h m)."""
+    return np.moveaxis(matrices, 0, 1).reshape(matrices.shape[1], -1)
+
+
+class _Noise(NamedTuple):
+    """Degrees of freedom, and variances of a point of weight one."""
+
+    freedom: float
+    added: float  # of noise that is expected, but not in the data
+    stated: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +122,15 @@ class _Conditionals:
     the flat ones.
     """
 
-    linear: _LinearModels
-    numbers: NDArray[np.intp]  # (h,): places among HYPOTHESES
-    family: NDArray[np.intp]  # (h,): of the sensor among the linear models
+    sensors: _Sensors
+    number: NDArray[np.intp]  # (h,): places among HYPOTHESES
+    family: NDArray[np.intp]  # (h,): of the sensor
+    prior: FloatArray  # (h,): variance of the amplitudes
     changes: FloatArray  # (h, p, m): of all parameters, the flat ones fitted anew
     left: FloatArray  # (h, n, s)
     singular: FloatArray  # (h, s)
     right: FloatArray  # (h, s, m)
     along: FloatArray  # (h, s): the data along the left singular vectors
-    power: FloatArray  # (h, s): their squares, those of the expected noise included
-    prior: FloatArray  # (h,): variance of the amplitudes
     # At the MAP estimate of the noise.
     log_marginal: FloatArray  # (h,)
     scatter: FloatArray  # (h,): variance of the residuals
@@ -133,28 +138,24 @@ class _Conditionals:
 
     @classmethod
     def of(
-        cls,
-        linear: _LinearModels,
-        columns: FloatArray,
-        choice: _Choice,
+        cls, sensors: _Sensors, columns: FloatArray, choice: _Choice, noise: _Noise
     ) -> _Conditionals:
         """Decompose the columns (n, p) that each hypothesis chooses."""
-        numbers, family, places, factors, strength = choice
-        q = linear.q[family]
+        number, family, places, factors, strength = choice
+        q, prior = sensors.q[family], strength**2
         chosen = np.moveaxis(columns[:, places], 1, 0) * factors[:, None, :]
         beside = q.swapaxes(1, 2) @ chosen
-        changes = -(linear.root[family] @ beside)
-        every = np.arange(len(places))[:, None], places, np.arange(places.shape[1])
-        changes[every] += factors
+        changes = -(sensors.root[family] @ beside)
+        changes[np.arange(len(places))[:, None], places, np.arange(places.shape[1])] += factors
         left, singular, right = np.linalg.svd(chosen - q @ beside, full_matrices=False)
-        along = _times(left, linear.rest[family], transposed=True)
-        # Of a vector that meets the flat columns, only what lies beside them carries noise.
+        along = _times(left, sensors.rest[family], transposed=True)
         power = along**2
-        if linear.added:
-            power += linear.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
-        decomposed = left, singular, right, along, power
-        unknown = np.full((3, len(numbers)), np.nan)
-        return cls(linear, numbers, family, changes, *decomposed, strength**2, *unknown)
+        if noise.added:
+            # Of a vector that meets the flat columns, only what lies beside them carries noise.
+            power += noise.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
+        signal = prior[:, None] * singular**2
+        found = _likelihoods(sensors, family, signal, power, noise)
+        return cls(sensors, number, family, prior, changes, left, singular, right, along, *found)
 
     def __getitem__(self, rows: NDArray[np.bool_]) -> _Conditionals:
         """Some of the hypotheses."""
@@ -176,88 +177,57 @@ class _Conditionals:
     def slopes(self) -> FloatArray:
         """Derivatives of the logarithms by the weighted data, (h, n)."""
         explained = self.filter * self.singular * self.along
-        slopes = _times(self.left, explained) - self.linear.rest[self.family]
+        slopes = _times(self.left, explained) - self.sensors.rest[self.family]
         return np.asarray(slopes / self.variance[:, None])
 
-    @cached_property
+    @property
     def means(self) -> FloatArray:
         """Posterior means of all parameters, (h, p)."""
-        data = _times(self.left, self.linear.data[self.family], transposed=True)
-        return np.asarray(self.linear.means[self.family] + _times(self.turned, self.filter * data))
+        data = _times(self.left, self.sensors.data[self.family], transposed=True)
+        return np.asarray(self.sensors.means[self.family] + _times(self.turned, self.filter * data))
 
+    def gain(self, shares: FloatArray) -> FloatArray:
+        """Derivatives of the means by the weighted data, summed by shares (h,): (p, n)."""
+        each = np.bincount(self.family, shares, len(self.sensors.q))
+        some, kept, factor = shares > 0, each > 0, shares[:, None] * self.filter
+        left = self.turned[some] * factor[some, None, :], self.sensors.root[kept]
+        right = self.left[some], each[kept, None, None] * self.sensors.q[kept]
+        both = [np.hstack([*map(_beside, side)]) for side in (left, right)]
+        return np.asarray(both[0] @ both[1].T)
 
-def _gain(groups: Sequence[_Conditionals], shares: FloatArray) -> FloatArray:
-    """Derivatives of the means by the weighted data, summed by the shares of HYPOTHESES: (p, n)."""
-    each, linear = np.zeros(len(groups[0].linear.q)), groups[0].linear
-    factors: list[tuple[FloatArray, FloatArray]] = []
-    for group in _counting(groups, shares > 0):
-        share = shares[group.numbers]
-        np.add.at(each, group.family, share)
-        factors.append((group.turned * (share[:, None] * group.filter)[:, None, :], group.left))
-    kept = each > 0
-    factors.append((each[kept, None, None] * linear.root[kept], linear.q[kept]))
-    left, right = (np.hstack([_beside(f) for f in side]) for side in zip(*factors, strict=True))
-    return np.asarray(left @ right.T)
-
-
-def _covariance_root(groups: Sequence[_Conditionals], shares: FloatArray) -> FloatArray:
-    """Square root (p, c) of the covariances' sum by the shares of HYPOTHESES."""
-    each, linear = np.zeros(len(groups[0].linear.q)), groups[0].linear
-    parts: list[FloatArray] = []
-    for group in _counting(groups, shares > 0):
-        share, prior, variance = shares[group.numbers], group.prior, group.variance
-        np.add.at(each, group.family, share * variance)
+    def covariance_root(self, shares: FloatArray) -> FloatArray:
+        """Square root (p, c) of the sum of covariances by shares (h,)."""
+        each = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
+        some, kept = shares > 0, each > 0
         # Posterior variances along the singular vectors; in all other directions the prior's.
-        left = share * prior * variance / (variance + prior * group.singular.T**2)
-        parts.append(group.turned * (left.T**0.5)[:, None, :])
-        if group.right.shape[1] < group.right.shape[2]:
-            hidden = group.changes - group.turned @ group.right
-            parts.append(hidden * ((share * prior) ** 0.5)[:, None, None])
-    parts.append(linear.root[each > 0] * (each[each > 0] ** 0.5)[:, None, None])
-    return np.hstack([_beside(part) for part in parts])
+        prior, variance = self.prior[:, None], self.variance[:, None]
+        left = shares[:, None] * prior * variance / (variance + prior * self.singular**2)
+        parts = [
+            self.sensors.root[kept] * (each[kept] ** 0.5)[:, None, None],
+            self.turned[some] * (left[some] ** 0.5)[:, None, :],
+        ]
+        if self.right.shape[1] < self.right.shape[2]:
+            hidden = self.changes[some] - self.turned[some] @ self.right[some]
+            parts.append(hidden * ((shares * self.prior)[some] ** 0.5)[:, None, None])
+        return np.hstack([*map(_beside, parts)])
 
 
-def _counting(
-    groups: Sequence[_Conditionals], counts: NDArray[np.bool_]
-) -> Iterator[_Conditionals]:
-    """Those of the hypotheses that count, (h,) of HYPOTHESES."""
-    for group in groups:
-        rows = counts[group.numbers]
-        if rows.any():
-            yield group if rows.all() else group[rows]
-
-
-def _beside(matrices: FloatArray) -> FloatArray:
-    """Columns of matrices (h, n, m) beside each other, (n, h m)."""
-    return np.moveaxis(matrices, 0, 1).reshape(matrices.shape[1], -1)
-
-
-def _conditioned(groups: Sequence[_Conditionals]) -> Iterator[_Conditionals]:
-    """Condition on all hypotheses, the noise at its MAP estimate."""
-    sizes = [group.singular.shape for group in groups]
-    signal, power = np.zeros((2, sum(h for h, _ in sizes), max(s for _, s in sizes)))
-    ends = np.cumsum([0, *(h for h, _ in sizes)])
-    places = [slice(start, end) for start, end in pairwise(ends)]
-    for rows, group in zip(places, groups, strict=True):
-        size = group.singular.shape[1]
-        signal[rows, :size] = group.prior[:, None] * group.singular**2
-        power[rows, :size] = group.power
-    linear, family = groups[0].linear, np.concatenate([group.family for group in groups])
-    total, distinct = (numbers[family] for numbers in linear.numbers)
+def _likelihoods(
+    sensors: _Sensors, family: NDArray[np.intp], signal: FloatArray, power: FloatArray, of: _Noise
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Log marginal likelihoods, variances of the residuals, and of the noise, (h,) each."""
+    total = (np.sum(sensors.rest**2, axis=1) + of.added * of.freedom)[family]
+    distinct = np.maximum((_ROUNDING * np.abs(sensors.data).max(axis=1)) ** 2, 1e-300)[family]
     beyond = np.maximum(total - power.sum(axis=1), 0.0)
-    scatter = np.maximum(total / linear.freedom, distinct)
+    scatter = np.maximum(total / of.freedom, distinct)
     for _ in range(8):
         explained = power * scatter[:, None] / (scatter[:, None] + signal)
-        scatter = np.maximum((beyond + explained.sum(axis=1)) / linear.freedom, distinct)
-    variance = np.maximum(scatter, linear.stated)
+        scatter = np.maximum((beyond + explained.sum(axis=1)) / of.freedom, distinct)
+    variance = np.maximum(scatter, of.stated)
     ratio = signal / variance[:, None]
     square = (beyond + (power / (1 + ratio)).sum(axis=1)) / variance
-    loss = linear.freedom * np.log(variance) + square + np.log(1 + ratio).sum(axis=1)
-    log_marginal = -0.5 * loss - linear.log_determinant[family]
-    for rows, group in zip(places, groups, strict=True):
-        found = log_marginal[rows], scatter[rows], variance[rows]
-        names = "log_marginal", "scatter", "variance"
-        yield replace(group, **dict(zip(names, found, strict=True)))
+    loss = of.freedom * np.log(variance) + square + np.log(1 + ratio).sum(axis=1)
+    return -0.5 * loss - sensors.log_determinant[family], scatter, variance
 
 
 @dataclass(frozen=True)
@@ -356,9 +326,12 @@ def weigh_departures(
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
         prior = least_noise * np.eye(size, columns.shape[1], flat - size)
         columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
-    noise = effective_count + size - flat, expected_noise**2, least_noise**2
-    groups = list(_conditioned(_groups(basis, columns, data, noise)))
-    averaged, gain = _average(groups, expected_noise**2, basis.integrals)
+    noise = _Noise(effective_count + size - flat, expected_noise**2, least_noise**2)
+    families = tuple(fitted.family for fitted in basis.families)
+    choice = _choice(flat, tuple(ring.radius.size for ring in basis.rings), families)
+    sensors = _Sensors.of(basis, columns, data)
+    given = _Conditionals.of(sensors, columns, choice, noise)
+    averaged, gain = _average(given, noise.added, basis.integrals)
     residual = model.points.u - fit.predicted - basis.voltages(model, fit, averaged.mean)
     gain = gain[:, : reduced.data.size]
     return replace(averaged, gain=reduced.by_voltages(gain), residual=residual)
@@ -367,107 +340,60 @@ def weigh_departures(
 class _Choice(NamedTuple):
     """The columns that hypotheses choose, times factors; of none of them the factor is zero."""
 
-    numbers: NDArray[np.intp]  # (h,): places among HYPOTHESES
-    family: NDArray[np.intp]  # (h,): of the sensor among the linear models
+    number: NDArray[np.intp]  # (h,): places among HYPOTHESES
+    family: NDArray[np.intp]  # (h,): of the sensor: 0 of the Gaussian
     places: NDArray[np.intp]  # (h, m)
     factors: FloatArray  # (h, m)
     strength: FloatArray  # (h,): standard deviation of the amplitudes
 
 
 @lru_cache(maxsize=64)
-def _choices(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> list[_Choice]:
-    """Return what the hypotheses choose; those of one amplitude at the most, and the others."""
-    # For shapes of so many columns behind the flat ones, and families of three each behind them.
+def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> _Choice:
+    """Return what the hypotheses choose of the flat columns, the shapes', three of each family."""
     ends = flat + np.cumsum([0, *sizes])
-    of_shape = dict(zip(departures.SHAPES, map(range, ends, ends[1:]), strict=True))
+    of_shape = dict(zip(departures.SHAPES, pairwise(ends), strict=True))
     of_family: dict[Family | None, int] = {None: 0}
     of_family |= {family: i for i, family in enumerate(families, start=1)}
-    rows: tuple[list[Any], list[Any]] = ([], [])
-    for i, hypothesis in enumerate(HYPOTHESES):
-        family, shape, strength = hypothesis.family, hypothesis.shape, hypothesis.strength
-        if family in of_family:
-            places = [] if shape is None else list(of_shape[shape])
-            number, factors = of_family[family], [1.0] * len(places)
-            if family is not None:
-                # The share of a family departs by its own spread, whatever the strength.
-                places.append(ends[-1] + 3 * number - 1)
-                factors, strength = [strength] * len(factors) + [1.0], 1.0
-            rows[len(places) > 1].append((i, number, places, factors, strength))
-    choices = []
-    for of_size in filter(None, rows):
-        # Few decompositions of as many columns take less time than some of each size.
-        most = max(len(places) for _, _, places, *_ in of_size)
-        padded = [
-            (i, number, p + [0] * (most - len(p)), f + [0.0] * (most - len(f)), strength)
-            for i, number, p, f, strength in of_size
-        ]
-        stacked = [np.array(column) for column in zip(*padded, strict=True)]
-        # Without any column the places are no integers.
-        stacked[2] = stacked[2].astype(np.intp)
-        choices.append(_Choice(*stacked))
-    return choices
-
-
-def _groups(
-    basis: DepartureBasis, columns: FloatArray, data: FloatArray, noise: tuple[float, float, float]
-) -> list[_Conditionals]:
-    """The hypotheses by their numbers of amplitudes; none of a family that does not fit."""
-    shapes = len(basis.rings)
-    sizes = tuple(ring.radius.size for ring in basis.rings)
-    starts = np.array([block.start for block in basis.blocks[shapes:]], dtype=np.intp)
-    linear = _linear_models(basis, starts, columns, data, noise)
-    choices = _choices(basis.flat, sizes, tuple(fit.family for fit in basis.families))
-    return [_Conditionals.of(linear, columns, choice) for choice in choices]
-
-
-def _linear_models(
-    basis: DepartureBasis,
-    starts: NDArray[np.intp],
-    columns: FloatArray,
-    data: FloatArray,
-    noise: tuple[float, float, float],
-) -> _LinearModels:
-    """The Gaussian, then the families, whose columns begin at ``starts``."""
-    flat, size, count = basis.flat, columns.shape[1], 1 + starts.size
-    a, each = basis.conversion_constant, np.arange(1, count)
-    # The first two parameters are ln A and ln(width).
-    places = np.zeros((count, size, flat))
-    places[:, range(flat), range(flat)] = np.r_[a, basis.sigma, np.ones(flat - 2)]
-    places[each, 1, 1], places[each, starts, 0], places[each, starts + 1, 1] = 0.0, 1.0, 1.0
-    of_data, start = np.repeat(data[None], count, axis=0), np.zeros((count, size))
-    of_data[1:] -= columns[:, starts].T
-    start[each, starts] = 1.0
-    return _LinearModels.of(start, places, columns @ places, of_data, noise)
+    kept = [(i, h) for i, h in enumerate(HYPOTHESES) if h.family in of_family]
+    # Equal numbers of columns for all: one batch of decompositions.
+    places, factors = np.zeros((2, len(kept), 1 + max(sizes)))
+    strengths = np.array([1.0 if h.family else h.strength for _, h in kept])
+    for row, (_, hypothesis) in enumerate(kept):
+        if hypothesis.family is not None:
+            # The share of a family departs by its own spread, whatever the strength.
+            places[row, -1] = ends[-1] + 3 * of_family[hypothesis.family] - 1
+            factors[row, -1] = 1.0
+        if hypothesis.shape is not None:
+            first, last = of_shape[hypothesis.shape]
+            places[row, : last - first] = range(first, last)
+            factors[row, : last - first] = hypothesis.strength if hypothesis.family else 1.0
+    numbers, of = (
+        [*each] for each in zip(*((i, of_family[h.family]) for i, h in kept), strict=True)
+    )
+    return _Choice(np.array(numbers), np.array(of), places.astype(np.intp), factors, strengths)
 
 
 def _average(
-    groups: Sequence[_Conditionals], added: float, integrals: FloatArray
+    given: _Conditionals, added: float, integrals: FloatArray
 ) -> tuple[WeighedFit, FloatArray]:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
     log_marginal, scatter = np.full(len(HYPOTHESES), -np.inf), np.zeros(len(HYPOTHESES))
-    for group in groups:
-        log_marginal[group.numbers], scatter[group.numbers] = group.log_marginal, group.scatter
+    log_marginal[given.number], scatter[given.number] = given.log_marginal, given.scatter
     priors = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
     estimate, uncertainty = (_posterior(log_marginal, prior) for prior in priors)
-    used = list(_counting(groups, (estimate > 0) | (uncertainty > 0)))
-    places = np.concatenate([group.numbers for group in used])
-    means = np.concatenate([group.means for group in used])
-    p, q = estimate[places], uncertainty[places]
+    used = given[((estimate > 0) | (uncertainty > 0))[given.number]]
+    p, q, means = estimate[used.number], uncertainty[used.number], used.means
     change_of_a = np.full(estimate.size, np.nan)
-    change_of_a[places] = means @ integrals
+    change_of_a[used.number] = means @ integrals
     mean = p @ means
-    apart = means - mean
-    gain = _gain(used, estimate)
-    parts = [q**0.5 * apart.T, _covariance_root(used, uncertainty)]
+    apart, gain = means - mean, used.gain(p)
+    parts = [q**0.5 * apart.T, used.covariance_root(q)]
     if added:
-        own = np.eye(len(HYPOTHESES))[places]
-        parts += [
-            (added * share) ** 0.5 * (_gain(used, one) - gain)
-            for share, one in zip(q, own, strict=True)
-        ]
+        pairs = zip(q, np.eye(q.size), strict=True)
+        parts += [(added * share) ** 0.5 * (used.gain(one) - gain) for share, one in pairs]
     root = np.hstack(parts)
     # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
-    moving = (p[:, None] * apart).T @ np.concatenate([group.slopes for group in used])
+    moving = (p[:, None] * apart).T @ used.slopes
     sums = (
         np.logaddexp.reduce(log_marginal[prior > 0] + np.log(prior[prior > 0])) for prior in priors
     )

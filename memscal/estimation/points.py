@@ -464,6 +464,15 @@ def require_size(scans: Sequence[Scan]) -> None:
         raise too_large(named, size, most, of, why=why, cure=cure)
 
 
+def require_contact_size(scan: Scan, most: int) -> None:
+    """Refuse a contact of more points than its stress is restored or measured from."""
+    if (size := scan.u_zz.size) > most:
+        named = scan.source.file_name if scan.source else "The scan"
+        why = "Its stress has a covariance, which takes memory."
+        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
+        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
+
+
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
     """Rise of a voltage above its median over the outer quarter of the positions, shape (n,)."""
     distance = np.hypot(x - np.median(x), y - np.median(y))

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 from memscal.errors import InputError
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
-from memscal.formats.scan import read_scan, scan_from
+from memscal.formats.scan import scan_from
 from memscal.formats.stress import read_stress, stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
@@ -20,14 +20,17 @@ Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStr
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
-def opened_scan(scan: Scan | Path) -> Scan:
-    """Return a scan that is given itself or as a path."""
-    return read_scan(scan) if isinstance(scan, str | PathLike) else _required(scan)
+def opened_scan(scan: Scan | Path, most: int | None = None) -> Scan:
+    """Return a scan that is given itself or as a path, with ``most`` points in a file."""
+    if not isinstance(scan, str | PathLike):
+        return _required(scan)
+    with open_hdf5(scan) as file:
+        return scan_from(file, most)
 
 
-def opened_scans(scans: Scans) -> tuple[Scan, ...]:
-    """Return scans that are given themselves or as paths, at least one."""
-    return tuple(opened_scan(scan) for scan in _listed(scans))
+def opened_scans(scans: Scans, most: int | None = None) -> tuple[Scan, ...]:
+    """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
+    return tuple(opened_scan(scan, most) for scan in _listed(scans))
 
 
 def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:

@@ -21,6 +21,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
+from memscal.model.sizes import too_large
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA, _SAMPLE = "/entry/data", "/entry/sample"
@@ -73,9 +74,12 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
         return scan_from(file)
 
 
-def scan_from(file: SafeFile) -> Scan:
-    """Read the scan of an open memscal-scan file."""
+def scan_from(file: SafeFile, most: int | None = None) -> Scan:
+    """Read the scan of an open memscal-scan file; one of more than ``most`` points is refused."""
     values.require_schema(file, writer.SCAN_SCHEMA)
+    if most is not None and (size := file.claimed_number(f"{_DATA}/u_zz")) > most:
+        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
+        raise too_large(file.name, size, most, "points", cure=cure)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))

@@ -4,6 +4,7 @@ import math
 import platform
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from os import PathLike
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
+from memscal.estimation.points import require_contact_size
 from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
@@ -22,6 +24,7 @@ from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process, timestamp
 from memscal.model.scan import Scan
+from memscal.model.sizes import MOST_OF_CONTACT
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
@@ -163,10 +166,13 @@ def measure_stress(
     mismatches = (restore.accept_mismatches(data, sensor, override=override) for data in scans)
     overridden = tuple(text for of_scan in mismatches for text in of_scan)
     origins = tuple(one_load.measured_scan(data) for data in scans)
+    singles = [one_load.single_loads(data) for data in scans]
+    for single in chain(*singles):
+        require_contact_size(single, MOST_OF_CONTACT)
     loads = [
         _measure(origin, single, sensor)
-        for origin, data in zip(origins, scans, strict=True)
-        for single in one_load.single_loads(data)
+        for origin, of_scan in zip(origins, singles, strict=True)
+        for single in of_scan
     ]
     profiles, restored, notes = zip(*loads, strict=True)
     checks = stress_checks(profiles, restored)

@@ -26,6 +26,7 @@ from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
+from memscal.model.sizes import MOST_RESTORED
 from memscal.parallel import single_threaded
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
@@ -36,8 +37,9 @@ _OF_THE_FILM = (
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
-    """Refuse a scan of several loads of a curved indenter, or without cov(G)."""
+    """Refuse a scan of several loads of a curved indenter, of many points, or without cov(G)."""
     require_covariance(apparatus)
+    scan_points.require_contact_size(scan, MOST_RESTORED)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
         return

@@ -5,6 +5,9 @@ from memscal.errors import InputError
 #: Points that a calibration takes: of lines, of a raster, and with a stated correlation of noise,
 #: of which the cube of their number is worked with.
 MOST_OF_LINES, MOST_OF_RASTER, MOST_CORRELATED = 2_000_000, 1_000_000, 4_000
+#: Points of one load of a contact: its profile has a covariance of all pairs; a restored stress of
+#: its radii.
+MOST_OF_CONTACT, MOST_RESTORED = 4_000, 100_000
 #: Rows and columns of a table, and pixels along a side of a reference that is a field.
 MOST_ROWS, MOST_COLUMNS, MOST_PIXELS = 20_000_000, 1_000, 2_048
 #: Bytes of a table, of an HDF5 file and of all that is read from one, of one array in it, and of

@@ -17,6 +17,7 @@ import memscal
 from memscal.calibration import calibrate as calibration
 from memscal.errors import FormatError, InputError
 from memscal.estimation import points
+from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.tables import text_table
 from memscal.formats.tables.scan import read_scan_table
 from memscal.formats.tables.text_table import Table, Wanted
@@ -142,6 +143,21 @@ def test_what_is_too_large_is_refused_with_size_limit_and_cure(
     correlation = np.broadcast_to(0.0, (4001, 4001))
     with pytest.raises(InputError, match=r"4,001 points, but at most 4,000(.|\n)*average"):
         replace(memscal.simulate(points=4001), u_zz_correlation=correlation)
+
+
+def test_a_contact_of_too_many_points_does_nothing():
+    apparatus = memscal.calibrate(memscal.simulate()).apparatus
+    for measured, size in ((memscal.measure_stress, 4001), (memscal.restore, 100_001)):
+        with pytest.raises(InputError, match=rf"{size:,} points of one load(.|\n)*Average"):
+            measured(memscal.simulate(points=size), apparatus)
+
+
+def test_a_file_of_too_many_points_is_refused_before_its_arrays_are_read(tmp_path, monkeypatch):
+    memscal.write_scan(memscal.simulate(points=65), tmp_path / "scan.h5")
+    monkeypatch.setattr(calibration, "MOST_OF_LINES", 64)
+    monkeypatch.setattr(SafeFile, "array", lambda *_: pytest.fail("it went on"))
+    with pytest.raises(InputError, match=r"scan.h5 has 65 points, but at most 64(.|\n)*Average"):
+        memscal.calibrate(tmp_path / "scan.h5")
 
 
 @pytest.mark.parametrize(("limit", "words"), [

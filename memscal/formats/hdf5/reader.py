@@ -119,6 +119,13 @@ class SafeFile:
                 self._arrays[path] = values
         return self._arrays[path]
 
+    def claimed_number(self, path: str) -> int:
+        """Return how many numbers a dataset claims to hold, of which none is read; 0 if absent."""
+        if not self.has(path):
+            return 0
+        with damage_named(f"{self.where(path)} cannot be read"):
+            return math.prod(limits.Layout.of(self.where(path), self._dataset(path)).shape)
+
     def text(self, path: str) -> str:
         """Return the text at a path, without characters that do not print."""
         if path not in self._texts:
