@@ -20,7 +20,13 @@ from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
-from memscal.estimation.reference import RECTANGLE, law_at_once, relative, rod_spectrum
+from memscal.estimation.reference import (
+    RECTANGLE,
+    expected_film,
+    law_at_once,
+    relative,
+    rod_spectrum,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
@@ -146,7 +152,7 @@ class DrawnScans:
     @cached_property
     def _nominal(self) -> list[FloatArray]:
         pairs = zip(self.solution.scans, self.solution.estimate.model.references, strict=True)
-        return [_rod(scan, ref, scan) for scan, ref in pairs]
+        return [_rod(_expected(scan), ref, scan) for scan, ref in pairs]
 
     def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""
@@ -173,6 +179,10 @@ class DrawnScans:
         return np.array([*(numbers[name] for name in BUDGETED), *g])
 
 
+def _expected(scan: Scan) -> Scan:
+    return expected_film(scan) if scan.film else scan
+
+
 def _rod(scan: Scan, reference: RadialSpectrum, own: Scan) -> FloatArray:
     """Transform of a scan's rod, by the law of its own; zero where nothing hangs on a film."""
     if own.film is None:
@@ -193,9 +203,10 @@ _COVERAGE = 0.95
 _TAILS = ((1 - _COVERAGE) / 2, (1 + _COVERAGE) / 2)
 #: Shares of u by which the standard uncertainties may differ, and by which the mean may be off.
 _TOLERANCE, _LARGEST_SHIFT = 0.1, 0.25
-#: A cut-off is named where the drawn values lose this share of their scatter, and the budget has
-#: this share of its uncertainty from them.
-_CUT, _COUNTS = 0.05, 0.2
+_NOT_LINEAR = (
+    "The draws scatter by {:.2f} u, and their mean is {:+.2f} u off. The calibration is not linear "
+    "in the noise or an input over its uncertainty."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,7 +364,7 @@ def monte_carlo(
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
     expected, deconvolution = uncertainty.expected_values(solution), solution.deconvolution
     comparisons = tuple(
-        _compared(calibration, name, expected[name], column, model.solved)
+        _compared(calibration, name, expected[name], column)
         for name, column in zip(BUDGETED, samples.T, strict=True)
     )
     first_order = uncertainties(solution, deconvolution, effects, calibration.correlations)
@@ -379,7 +390,6 @@ def _compared(
     name: str,
     expected: float,
     column: FloatArray,
-    solved: Sequence[SolvedInput],
 ) -> BudgetComparison:
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
@@ -407,24 +417,8 @@ def _compared(
         shortest=(float(first), float(last)),
         first_order=u,
         stated=parameters.uncertainty(name),
-        reason="" if agrees else _reason(spread, mean - expected, u, budget, solved),
+        reason="" if agrees else _NOT_LINEAR.format(spread / u, (mean - expected) / u),
     )
-
-
-def _reason(
-    spread: float, off: float, u: float, budget: Mapping[str, float], inputs: Sequence[SolvedInput]
-) -> str:
-    """Return by how much draws and budget disagree, and whether a distribution is cut off."""
-    text = f"The draws scatter by {spread / u:.2f} u, and their mean is {off / u:+.2f} u off."
-    for item in inputs:
-        kept = float(item.truncated(ndtri((np.arange(1000) + 0.5) / 1000)).std())
-        if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:
-            return (
-                f"{text} The {item.source.replace('_', ' ')} is cut off at {item.bounds[1]:g}: its "
-                f"draws scatter by {kept * item.u:.2g}, not by the {item.u:.2g} that the budget "
-                "counts, and to one side."
-            )
-    return f"{text} The calibration is not linear in the noise or an input over its uncertainty."
 
 
 def shortest_interval(draws: FloatArray) -> FloatArray:

@@ -182,8 +182,14 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
 
 
 def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
-    """Choose the reference: the argument, the scan's own, or the rod's solution."""
-    return reference or scan.reference or press_rod(*scan.set_up, scan.rod_friction)
+    """Choose the reference: the argument, the scan's own, or the rod on the expected film."""
+    known = reference or scan.reference
+    return known or press_rod(*expected_film(scan).set_up, scan.rod_friction)
+
+
+def expected_film(scan: Scan) -> Scan:
+    """Return a scan on the film that is expected, of a Poisson's ratio of at most 1/2."""
+    return replace(scan, film=scan.set_up.film.expected)
 
 
 def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
@@ -335,8 +341,9 @@ def reference_sensitivities(
 
 def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of each film property."""
-    # Centred differences of the rod's solution (one-sided at nu = 1/2), or its relative change
-    # for a reference from elsewhere.
+    # Centred differences of the rod's solution, or its relative change for a reference from
+    # elsewhere.
+    scan = expected_film(scan)
     film = scan.set_up.film
     changes: dict[str, FloatArray] = {}
     if film.young_modulus_uncertainty is not None:
@@ -364,7 +371,7 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
 def press_neo_hookean(scan: Scan) -> Contact:
     """Press the rod of a scan on its film as if that were neo-Hookean, and stuck to it."""
     # One that slides differs less from a linear film, and is not solved to any depth.
-    rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    rubber = replace(scan.set_up.film.expected, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     return press_rod(rubber, scan.set_up.indenter, scan.stated_load)
 
 

@@ -41,7 +41,12 @@ from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, dep
 from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
+from memscal.estimation.reference import (
+    expected_film,
+    law_at_once,
+    law_sensitivities,
+    rod_spectrum,
+)
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
@@ -59,6 +64,10 @@ _LEAST_PRESSURE = 0.1
 
 def film_transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
     """Transform of the base's normal stress under a pressure of unit transform."""
+    return _transfer(expected_film(scan), wavenumbers)
+
+
+def _transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
     # A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
     # on a linear film makes the rod's own base stress.  Other indenters sink less.
     linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
@@ -398,12 +407,13 @@ def _of_sensor(apparatus: ApparatusFunction, nodes: bytes) -> tuple[FloatArray, 
 
 def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
+    scan = expected_film(scan)
     linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
     columns = []
     for name in ("thickness", "poisson_ratio"):
-        if ends := more_and_less(scan.film, name):
+        if ends := more_and_less(scan.set_up.film, name):
             *films, share = ends
-            more, less = (film_transfer(replace(scan, film=film), wavenumbers) for film in films)
+            more, less = (_transfer(replace(scan, film=film), wavenumbers) for film in films)
             columns.append(share * (more - less))
     film = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     if law_at_once(replace(scan, film=film)) != LINEAR:

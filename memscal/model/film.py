@@ -1,11 +1,14 @@
 """The elastic film between the indenter and the sensor."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 from memscal.errors import InputError
 from memscal.model.arrays import require_non_negative, require_positive, require_range
 
+#: A normal distribution whose mean is moved by less, in standard deviations, is not cut off.
+_UNCUT = 1e-6
 #: Laws of the film's stress: linear elasticity, and two of rubber at finite strain.
 LINEAR, NEO_HOOKEAN, MOONEY_RIVLIN = LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 
@@ -85,6 +88,26 @@ class ElasticFilm:
         return self.young_modulus / (1 - self.poisson_ratio**2)
 
     @property
+    def expected(self) -> "ElasticFilm":
+        """The film with mean and standard deviation of a Poisson's ratio that ends at 0 and 1/2.
+
+        A stated ratio is normally distributed, cut off at these ends: of 1/2 ± u half a normal
+        distribution is left, of mean 1/2 - 0.80 u and standard deviation 0.60 u.
+        """
+        nu, u = self.poisson_ratio, self.poisson_ratio_uncertainty
+        if not u:
+            return self
+        low, high = -nu / u, (0.5 - nu) / u
+        at_low, at_high = (math.exp(-0.5 * z**2) / math.sqrt(2 * math.pi) for z in (low, high))
+        inside = (math.erf(high / math.sqrt(2)) - math.erf(low / math.sqrt(2))) / 2
+        shift = (at_low - at_high) / inside
+        if abs(shift) < _UNCUT:
+            return self
+        variance = 1 + (low * at_low - high * at_high) / inside - shift**2
+        spread = u * math.sqrt(variance)
+        return replace(self, poisson_ratio=nu + u * shift, poisson_ratio_uncertainty=spread)
+
+    @property
     def law_text(self) -> str:
         """The law in words, with its ratio C2/C1."""
         ratio = self.mooney_rivlin_ratio
@@ -99,7 +122,8 @@ def law_in_words(law: str) -> str:
 
 def more_and_less(record: Any, name: str) -> tuple[Any, Any, float] | None:
     """Return a film or indenter with more and less of a quantity, and u over the difference."""
-    # None where no u is stated; one-sided at the ends of a Poisson's ratio, 0 and 1/2.
+    # None where no u is stated; one-sided at the ends of a Poisson's ratio, 0 and 1/2, beyond which
+    # the expected film's does not go.
     value, u = getattr(record, name), getattr(record, f"{name}_uncertainty", None)
     if not u:
         return None

@@ -226,7 +226,13 @@ def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
     ratio = 0.5 - abs(0.5 - around(film.poisson_ratio, film.poisson_ratio_uncertainty))
     thickness = around(film.thickness, film.thickness_uncertainty)
     return Reality(
-        film=replace(film, young_modulus=modulus, poisson_ratio=ratio, thickness=thickness),
+        film=replace(
+            film,
+            young_modulus=modulus,
+            poisson_ratio=ratio,
+            thickness=thickness,
+            poisson_ratio_uncertainty=None,
+        ),
         rod=replace(rod, radius=around(rod.radius, rod.radius_uncertainty)),
         sphere=replace(sphere, radius=around(sphere.radius, sphere.radius_uncertainty)),
         rod_load_scale=around(1.0, load_uncertainty),
@@ -339,7 +345,7 @@ def simulate_experiment(
         Draw the true values from the stated uncertainties: modulus, Poisson's ratio
         (reflected at 0.5) and thickness of the film, the radii, and the common errors of the
         rod's and of the sphere's loads, which are independent.  The files state the nominal
-        values.
+        values.  Without it, the true values are those, and the mean of a Poisson's ratio.
     gain, thickness_factor : float
         Mistakes: factor on the voltages of the sphere's scans only, and the film's true thickness
         relative to the stated one.
@@ -372,7 +378,8 @@ def simulate_experiment(
     inputs_seed, rod_seed, dry_seed, lubricated_seed = (
         int(stream.generate_state(1)[0]) for stream in np.random.SeedSequence(seed).spawn(4)
     )
-    reality = Reality(film=film, rod=rod, sphere=sphere)
+    expected = replace(film.expected, poisson_ratio_uncertainty=None)
+    reality = Reality(film=film if draw_inputs else expected, rod=rod, sphere=sphere)
     if draw_inputs:
         reality = drawn(reality, load_uncertainty or 0.0, inputs_seed)
     thickness = thickness_factor * reality.film.thickness

@@ -168,7 +168,8 @@ def simulate(
     ----------
     film, rod
         What is pressed on what; the paper's where absent, its film neo-Hookean.  A film that states
-        no law is taken as linear.
+        no law is taken as linear.  Of an uncertain Poisson's ratio that ends at 1/2 the true one is
+        the mean (``film.expected``).
     rod_friction : float, optional
         0: the film slides freely under the rod; ``inf``: it sticks.  By default a linear film
         slides, and one of another law sticks.
@@ -238,7 +239,8 @@ def simulate(
         rod_friction = math.inf
     # The stress in a linear film is proportional to the load: one contact serves for all.
     solved = loads.max(keepdims=True) if linear else loads
-    contacts = [press_rod(film, rod, float(value), rod_friction) for value in solved]
+    true = film.expected
+    contacts = [press_rod(true, rod, float(value), rod_friction) for value in solved]
 
     def blurred(kernel: RadialKernel, order: int = 0) -> FloatArray:
         stress = blurred_stress(contacts, kernel, radius, order=order)
@@ -277,6 +279,7 @@ def simulate(
             "centre": centre[0],
             "centre_y": centre[1],
             "film_law": film.law or LINEAR,
+            "poisson_ratio": true.poisson_ratio,
             **{name: value for name, value in of_law.items() if value is not None},
             **disturbed.in_volts(largest),
             "seed": float(seed),

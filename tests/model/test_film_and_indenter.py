@@ -102,3 +102,14 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
 def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
     with pytest.raises(InputError, match=f"(?i){message}"):
         Profile(r=r, z=z)
+
+
+@pytest.mark.parametrize("nu", [0.5, 0.497, 0.3, 0.0])
+def test_the_expected_poissons_ratio_is_that_of_draws_that_a_film_can_have(nu: float) -> None:
+    film = replace(FILM, poisson_ratio=nu, poisson_ratio_uncertainty=0.004)
+    draws = np.random.default_rng(1).normal(nu, 0.004, 400_000)
+    draws = draws[(draws >= 0) & (draws <= 0.5)]
+    found = film.expected
+    assert found.poisson_ratio == pytest.approx(draws.mean(), abs=5e-5)
+    assert found.poisson_ratio_uncertainty == pytest.approx(draws.std(), rel=0.01)
+    assert replace(film, poisson_ratio_uncertainty=None).expected.poisson_ratio == nu
