@@ -219,9 +219,9 @@ rows.append("|-" * (1 + len(FRICTION)) + "|")
 for loading, loads in comparison.loads.items():
     load = next(load for load in loads if load.load == 2.75 and load.lubrication == "dry")
     peaks = " | ".join(f"{peak / KPA:.1f}" for peak in load.p_max)
-    rises = " | ".join(f"{rise:.1f}" for rise in load.chi_square - load.chi_square.min())
+    rises = " | ".join(f"{rise:.1f}" for rise in load.deviance)
     rows.append(f"| largest stress (kPa), {loading} | {peaks} |")
-    rows.append(f"| χ² above the least, {loading} | {rises} |")
+    rows.append(f"| −2 ln(p/p_max), {loading} | {rises} |")
 Markdown("\n".join(rows))
 
 # %% [markdown]
@@ -377,12 +377,12 @@ draw_maxima(left, yielding, "incremental")
 for load, colour in zip(yielding.loads["incremental"], colours[::2], strict=False):
     reading = load.by_profile
     right.plot(
-        reading.values, reading.chi_square - reading.chi_square.min(), color=colour,
+        reading.values, reading.deviance - reading.deviance.min(), color=colour,
         label=f"{load.load:g} N",
     )  # fmt: skip
 right.axhline(3.84, color=GREY, ls="--", label="95 %")
 right.set(xlim=(0, 0.5), ylim=(0, 12), xlabel=r"effective coefficient $\mu_e$")
-right.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+right.set_ylabel(r"$-2\,\ln(p/p_{max})$")
 right.legend()
 plt.show()
 

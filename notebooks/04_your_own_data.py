@@ -261,12 +261,12 @@ for ax, (state, by_loading) in zip(axes, comparison.joint.items(), strict=True):
     }
     curves["all loads"] = by_loading["incremental"]
     for label, reading in curves.items():
-        rise = reading.chi_square - reading.chi_square.min()
+        rise = reading.deviance - reading.deviance.min()
         ax.plot(reading.values, rise, label=label, lw=2 if label == "all loads" else 1)
     ax.axhline(3.84, color="0.6", ls="--", label="95 %")
     ax.set(title=state, xlim=(0, 0.6), ylim=(0, 12), xlabel="effective friction coefficient")
     ax.legend()
-axes[0].set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+axes[0].set_ylabel(r"$-2\,\ln(p/p_{max})$")
 plt.show()
 
 # %%

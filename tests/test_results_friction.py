@@ -29,7 +29,7 @@ def reading(
     made = BoundedEstimate(
         value=value, standard_uncertainty=u, interval=Interval(low, high),
         reason="" if value is not None else "a lower bound", values=np.array([0.0, 0.1, math.inf]),
-        chi_square=np.array([40.0, 30.0, 50.0]), degrees=29, least=30.0, p_value=0.4,
+        deviance=np.array([40.0, 30.0, 50.0]), degrees=29, least=30.0, p_value=0.4,
     )  # fmt: skip
     return replace(made, **fields)
 
@@ -60,7 +60,7 @@ def test_a_comparison_prints_tables_within_a_hundred_columns(found: FrictionComp
     many = comparison(loadings=("total",), friction_grid=np.linspace(0.0, 1.0, 30))
     for shown in (found, many, comparison(lubrications=("",), loadings=("",))):
         assert max(map(len, str(shown).splitlines())) < 100
-    heads = [t.head[4:] for t in tables(many) if t.title.startswith("χ² of each profile")]
+    heads = [t.head[4:] for t in tables(many) if t.title.startswith("-2 ln(p/p_max)")]
     assert len(heads) > 1
     assert sum(map(len, heads)) == 30
     assert "1.8 [1.4, 2.3] um" in str(found)
@@ -214,7 +214,7 @@ def test_points_within_both_extremes_and_their_uncertainty_are_bracketed() -> No
 def test_lubricated_loads_that_exclude_no_friction_fail_their_check() -> None:
     def check(rise: float) -> QualityCheck:
         along = np.array([30.0 + rise, 30.0, 60.0])
-        joint = {"lubricated": {"total": reading(0.1, 0.05, 0.2, chi_square=along)}}
+        joint = {"lubricated": {"total": reading(0.1, 0.05, 0.2, deviance=along)}}
         return comparison_checks({}, joint)[-1]
 
     assert check(9.0).passed

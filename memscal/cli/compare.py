@@ -69,6 +69,11 @@ Examples:
     "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
     "each load and friction coefficient. Repeated."
 )
+@option("--lubricated", click.Choice(["frictionless", "apart"]))(
+    "Fit lubricated loads with no friction together with the dry ones, which cancels most of what "
+    "A, G and film leave uncertain; or each kind by itself.  [default: together unless the check "
+    "lubricated_frictionless fails]"
+)
 @option("--macroscopic", _COEFFICIENT, metavar="MU")(
     "Friction coefficient measured in sliding, to compare with."
 )
@@ -142,6 +147,7 @@ def command(
             friction=sorted({0.0, *friction, math.inf}) if friction else None,
             loading=options["loadings"] or ("incremental", "total"),
             references=references or None,
+            lubricated=options["lubricated"],
             macroscopic=options["macroscopic"],
             macroscopic_uncertainty=options["macroscopic_uncertainty"],
             interface=interface,

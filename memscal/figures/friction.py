@@ -311,7 +311,7 @@ def _draw_likelihood(
         axes.plot(place, _rise(reading), color=colour, lw=width, label=label)
     draw_levels(axes)
     profiles.friction_axis(axes, "x")
-    axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+    axes.set_ylabel(r"$-2\,\ln(p/p_{max})$")
 
 
 def draw_levels(axes: Axes) -> None:
@@ -326,4 +326,4 @@ def draw_levels(axes: Axes) -> None:
 
 
 def _rise(reading: BoundedEstimate) -> FloatArray:
-    return np.asarray(reading.chi_square) - float(np.min(reading.chi_square))
+    return np.asarray(reading.deviance) - float(np.min(reading.deviance))

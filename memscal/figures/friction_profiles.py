@@ -246,10 +246,10 @@ def friction_set_figure(
             _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
             column[0].set_ylim(bottom=0)
             _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
-            best = int(np.argmin(at_load.chi_square))
+            best = int(np.argmin(at_load.deviance))
             _plot_residuals(column[2], [at_load], best, [COLOURS["measured"]])
             name = friction_name(comparison.friction[best])
-            _note(column[2], rf"least $\chi^2$: $\mu$ = {name}", (0.96, 0.9))
+            _note(column[2], rf"most likely: $\mu$ = {name}", (0.96, 0.9))
         share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:

@@ -16,7 +16,12 @@ from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction import effective
 from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
-from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
+from memscal.friction.checks import (
+    comparison_checks,
+    comparison_messages,
+    frictionless_check,
+    synthetic_messages,
+)
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import load_points, sensor_of
 from memscal.friction.model_comparison import compare_interface
@@ -104,6 +109,9 @@ def require_macroscopic(value: float | None, uncertainty: float | None, *, inter
         )
 
 
+FRICTIONLESS, APART = "frictionless", "apart"
+"""How lubricated loads are fitted: with no friction beside the others, or by themselves."""
+
 #: Calculated stresses reach this multiple of a scan's width.
 _REACH = 1.5
 _MM = 1e-3
@@ -117,6 +125,7 @@ def compare(
     friction: Sequence[float] | None = None,
     loading: str | Sequence[str] = ("incremental", "total"),
     references: Sequence[StressProfile] | None = None,
+    lubricated: str | None = None,
     macroscopic: float | None = None,
     macroscopic_uncertainty: float | None = None,
     interface: bool = False,
@@ -129,7 +138,7 @@ def compare(
     The calculated base stress of a sphere on the film is convolved with the sensor's G, and the
     voltages are compared with it: :math:`U = A\,(G \otimes \sigma_\mu)` with centre, baseline and
     drift of each load free, and with the uncertainties of A G, film, sphere, loads and positions
-    in the likelihood.  The effective friction coefficient is that of least chi-square; its
+    in the likelihood.  The effective friction coefficient is the most likely one; its
     interval is what the profile likelihood does not exclude, and has no upper end where the
     stress tells no large coefficient from another.
 
@@ -147,6 +156,10 @@ def compare(
     references : sequence of StressProfile, optional
         Profiles that were calculated elsewhere, in place of ours: each with its load and friction
         coefficient.  ``friction`` and ``loading`` are theirs then.
+    lubricated : str, optional
+        ``"frictionless"``: lubricated loads have no friction, and are fitted together with the dry
+        ones, which cancels most of what A, G and film leave uncertain; ``"apart"``: each kind by
+        itself.  By default together unless the check ``lubricated_frictionless`` fails.
     macroscopic, macroscopic_uncertainty : float, optional
         A friction coefficient that was measured otherwise, and its standard uncertainty.
     interface : bool
@@ -185,6 +198,9 @@ def compare(
     """
     opened, sensor = opened_contacts(contacts), opened_apparatus(apparatus)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
+    if lubricated not in (None, FRICTIONLESS, APART):
+        problem = f"Lubricated loads cannot be fitted {lubricated!r}."
+        raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     if references is None:
@@ -193,7 +209,9 @@ def compare(
         family = external_family(references, **setting)
         families = {family.loading: family}
     sliding = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
-    comparison = compare_measured(measured, sensor, families, macroscopic=sliding)
+    comparison = compare_measured(
+        measured, sensor, families, lubricated=lubricated, macroscopic=sliding
+    )
     if not interface:
         return comparison
     assert macroscopic is not None
@@ -232,6 +250,7 @@ def compare_measured(
     apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
     *,
+    lubricated: str | None = None,
     macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
     """Compare measured stress with families by loading, which hold every measured load."""
@@ -242,8 +261,9 @@ def compare_measured(
         )
         for name, of_family in confronted.items()
     }
-    loads, joint = _loading_counted(loads, _joint(measured, confronted))
-    checks = (*measured.checks, *comparison_checks(loads, joint))
+    loads, joint = _loading_counted(loads, _joint(measured, confronted, lubricated))
+    stated = measured.noise_stated
+    checks = (*measured.checks, *comparison_checks(loads, joint, noise_stated=stated))
     return FrictionComparison(
         measured=measured,
         friction=next(iter(families.values())).values,
@@ -303,15 +323,30 @@ def _confronted(
 
 
 def _joint(
-    measured: MeasuredStress, confronted: Mapping[str, effective.Confrontation]
+    measured: MeasuredStress,
+    confronted: Mapping[str, effective.Confrontation],
+    lubricated: str | None = APART,
 ) -> dict[str, dict[str, BoundedEstimate]]:
+    """Fit all loads of a kind; the lubricated ones beside the others, if they have no friction."""
     by_lubrication: dict[str, list[int]] = {}
     for i, profile in enumerate(measured.profiles):
         by_lubrication.setdefault(profile.lubrication, []).append(i)
-    return {
+    held = by_lubrication.get("lubricated", [])
+    joint = {
         lubrication: {name: of_all.effective(indices) for name, of_all in confronted.items()}
         for lubrication, indices in by_lubrication.items()
     }
+    if not held or lubricated == APART or next(iter(confronted.values())).family.values[0] > 0:
+        return joint
+    if lubricated is None and not frictionless_check(joint["lubricated"]).passed:
+        return joint
+    for lubrication, indices in by_lubrication.items():
+        if lubrication != "lubricated":
+            joint[lubrication] = {
+                name: replace(of_all.effective(indices, held), beside=len(held))
+                for name, of_all in confronted.items()
+            }
+    return joint
 
 
 def _loading_counted(

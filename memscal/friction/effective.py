@@ -47,6 +47,7 @@ _ONE_SIGMA = 0.6827
 def profile_estimate(
     values: FloatArray,
     coordinates: FloatArray,
+    deviance: FloatArray,
     chi_square: FloatArray,
     value_at: Callable[[float], float],
     *,
@@ -55,23 +56,23 @@ def profile_estimate(
     level: float = 0.95,
     unit: str = "",
 ) -> BoundedEstimate:
-    """Return best value and interval of chi-square (m,) along an increasing bounded coordinate."""
+    """Return best value and interval of -2 ln p (m,) along an increasing bounded coordinate."""
     from scipy.interpolate import CubicSpline
 
-    spline = CubicSpline(coordinates, chi_square)
+    spline = CubicSpline(coordinates, deviance)
     # The lowest point of the spline next to the lowest node.
-    i = int(np.argmin(chi_square))
+    i = int(np.argmin(deviance))
     around = coordinates[max(i - 1, 0) : i + 2]
     turns = spline.derivative().roots(extrapolate=False)
     turns = turns[(around[0] < turns) & (turns < around[-1])]
     best = float(min([coordinates[i], *turns], key=spline))
-    least = float(spline(best))
+    lowest, least = float(spline(best)), float(CubicSpline(coordinates, chi_square)(best))
 
     def interval(at: float) -> Interval:
         rise = float(chdtri(1, 1 - at))
-        inside = np.append(coordinates[chi_square - least <= rise], best)
-        low = _crossing(spline, coordinates, float(inside.min()), -1, least + rise)
-        high = _crossing(spline, coordinates, float(inside.max()), 1, least + rise)
+        inside = np.append(coordinates[deviance - lowest <= rise], best)
+        low = _crossing(spline, coordinates, float(inside.min()), -1, lowest + rise)
+        high = _crossing(spline, coordinates, float(inside.max()), 1, lowest + rise)
         return Interval(
             0.0 if low is None else value_at(low), None if high is None else value_at(high), at
         )
@@ -83,7 +84,8 @@ def profile_estimate(
     else:
         value = value_at(float(np.clip(best, coordinates[0], coordinates[-1])))
         spread = (narrow.high - narrow.low) / 2 if narrow.high and narrow.low > 0 else None
-    return BoundedEstimate(value, spread, wide, reason(wide), values, chi_square, least, unit=unit)
+    above = deviance - lowest + least
+    return BoundedEstimate(value, spread, wide, reason(wide), values, above, least, unit=unit)
 
 
 def _crossing(
@@ -118,7 +120,7 @@ def friction_reason(interval: Interval, last: float) -> str:
     )
 
 
-#: Values along which chi-square is drawn.
+#: Values along which the likelihood is drawn.
 _FINE = 200
 #: Parts of a maximum's uncertainty that the likelihood counts by columns of its own.
 _SYSTEMATIC = {"conversion_constant", "apparatus", "film", "position_scale", "load"}
@@ -126,7 +128,7 @@ _SYSTEMATIC = {"conversion_constant", "apparatus", "film", "position_scale", "lo
 
 @dataclass(frozen=True, eq=False)
 class Confrontation:
-    """Measured loads against a family: chi-square of each along the family's parameter."""
+    """Measured loads against a family: the likelihood of each along the family's parameter."""
 
     family: ProfileFamily
     sensor: Sensor
@@ -135,10 +137,18 @@ class Confrontation:
     loads: tuple[int, ...]  # the family's load of each of the points
     whole: Likelihood  # of all loads, along the fine values
 
-    def effective(self, chosen: Sequence[int]) -> BoundedEstimate:
-        """Return the coefficient that explains some of the loads together, by their profiles."""
-        loads = [self.loads[i] for i in chosen]
-        return self._effective(self.whole.only(chosen), [self.points[i] for i in chosen], loads)
+    def effective(self, chosen: Sequence[int], held: Sequence[int] = ()) -> BoundedEstimate:
+        """Return the coefficient that explains some of the loads together, by their profiles.
+
+        Loads that are ``held`` at no friction tell what errors all loads share.
+        """
+        along = self.whole.only(chosen)
+        if held:
+            along = along.beside(self.whole.only(held))
+        return self._effective(along, *self._of(chosen), held)
+
+    def _of(self, chosen: Sequence[int]) -> tuple[list[LoadPoints], list[int]]:
+        return [self.points[i] for i in chosen], [self.loads[i] for i in chosen]
 
     def effective_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
@@ -148,18 +158,24 @@ class Confrontation:
         along = likelihood(points, self.sensor, self.members, [self.loads[index]])
         return self._effective(along, points, [self.loads[index]])
 
-    def at(self, values: FloatArray, index: int) -> FloatArray:
-        """Return chi-square of one load at values that are among the fine ones."""
+    def at(self, values: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
+        """Return chi-square and -2 ln p of one load at values that are among the fine ones."""
         coordinates = np.array([self.family.coordinate(float(value)) for value in values])
         where = np.searchsorted(self.members.coordinates, coordinates - 1e-12)
-        return self.whole.only([index]).chi_square[where]
+        along = self.whole.only([index])
+        return along.chi_square[where], along.deviance[where]
 
     def _effective(
-        self, along: Likelihood, points: Sequence[LoadPoints], loads: Sequence[int]
+        self,
+        along: Likelihood,
+        points: Sequence[LoadPoints],
+        loads: Sequence[int],
+        held: Sequence[int] = (),
     ) -> BoundedEstimate:
         estimate = profile_estimate(
             along.values,
             along.coordinates,
+            along.deviance,
             along.chi_square,
             self.family.value_at,
             reason=lambda interval: friction_reason(interval, float(self.family.values[-1])),
@@ -169,19 +185,29 @@ class Confrontation:
         return replace(
             estimate,
             least=least,
-            budget={} if estimate.value is None else self._budget(estimate.value, points, loads),
+            budget={}
+            if estimate.value is None
+            else self._budget(estimate.value, points, loads, held),
             degrees=degrees,
             p_value=float(chdtrc(max(degrees, 1), least)),
         )
 
     def _budget(
-        self, value: float, points: Sequence[LoadPoints], loads: Sequence[int]
+        self,
+        value: float,
+        points: Sequence[LoadPoints],
+        loads: Sequence[int],
+        held: Sequence[int],
     ) -> dict[str, float]:
         """Contribution of each source to the coefficient, by the slope at its best value."""
         t = self.family.coordinate(value)
         if t >= 1:
             return {}
         along = likelihood(points, self.sensor, self.family.at(value), loads)
+        if held:
+            frictionless = self.family.at(self.family.values[0])
+            points, loads = self._of(held)
+            along = along.beside(likelihood(points, self.sensor, frictionless, loads))
         stretch = self.family.scale / (1 - t) ** 2
         return {source: stretch * share for source, share in along.budget(0).items()}
 
@@ -228,7 +254,9 @@ def load_comparison(
     (calculated, top), (errors, top_errors) = (
         np.split(values, [-1], axis=1) for values in (calculated, errors)
     )
-    chi_square = confronted.at(family.values, index)
+    chi_square, deviance = confronted.at(family.values, index)
+    by_profile = confronted.effective([index])
+    lowest = float(confronted.whole.only([index]).deviance.min())
     ratio = profile.maximum / float(top[0, 0])
     # Measured and calculated maximum: A and G err together.
     on_axis = predict(points_at(np.zeros(1), points), confronted.sensor, family, load)
@@ -248,11 +276,12 @@ def load_comparison(
         calculated_errors=errors,
         p_max=top[:, 0],
         chi_square=chi_square,
+        deviance=deviance - lowest,
         p_values=np.asarray(chdtrc(points.degrees, chi_square)),
         degrees=points.degrees,
         bracketed=bracketed_share(profile.s_zz, profile.s_zz_errors, calculated, errors),
         by_maximum=confronted.effective_of_maximum(profile, index),
-        by_profile=confronted.effective([index]),
+        by_profile=by_profile,
     )
 
 

@@ -277,7 +277,7 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
 
 
 #: Raised where the same request gives other numbers within one version.
-_REVISION = 2
+_REVISION = 3
 
 
 def _family_key(
@@ -391,8 +391,10 @@ class FamilySetup:
             strength=(strong["spectra"] - spectra) / math.log(STRONGER),
         )
         if ratios is not None:
-            share = (u or 0.0) / (ratios[0] - ratios[1])
-            changes["poisson_ratio"] = (sides[0]["spectra"] - sides[1]["spectra"]) * share
+            slope = (sides[0]["spectra"] - sides[1]["spectra"]) / (ratios[0] - ratios[1])
+            expected = film.expected
+            changes["poisson_ratio"] = slope * (expected.poisson_ratio_uncertainty or 0.0)
+            nominal["spectra"] = spectra + slope * (expected.poisson_ratio - film.poisson_ratio)
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 
     def _solved(

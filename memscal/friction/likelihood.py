@@ -253,6 +253,21 @@ class Standardised:
     volume: FloatArray  # (V,): log-determinants of N and of the flat information
     degrees: int
 
+    def held(self, count: int) -> Standardised:
+        """Return the load with its parameter held at the first value, at ``count`` of others'."""
+
+        def first(values: FloatArray) -> FloatArray:
+            return np.broadcast_to(values[:1], (count, *values.shape[1:]))
+
+        return Standardised(
+            residual=first(self.residual),
+            slope=np.zeros((count, *self.slope.shape[1:])),
+            columns={source: first(column) for source, column in self.columns.items()},
+            noises={name: first(root) for name, root in self.noises.items()},
+            volume=first(self.volume),
+            degrees=self.degrees,
+        )
+
 
 def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     """Divide by the noise, and project out what is flat."""
@@ -310,7 +325,7 @@ def _scaled(whitener: FloatArray, points: LoadPoints, name: str, kind: FloatArra
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Chi-square of one load or several along V values of one parameter."""
+    """Likelihood of one load or several along V values of one parameter."""
 
     values: FloatArray
     coordinates: FloatArray
@@ -322,6 +337,11 @@ class Likelihood:
         loads = tuple(self.loads[i] for i in chosen)
         return replace(self, loads=loads, tables=self.tables.only(chosen))
 
+    def beside(self, held: Likelihood) -> Likelihood:
+        """Add loads whose parameter is held at their first value; all share systematic errors."""
+        loads = (*self.loads, *(load.held(self.values.size) for load in held.loads))
+        return replace(self, loads=loads, tables=_tables(loads))
+
     @property
     def degrees(self) -> int:
         """Points less flat parameters; the parameter itself is not counted."""
@@ -330,7 +350,18 @@ class Likelihood:
     @cached_property
     def chi_square(self) -> FloatArray:
         """Least chi-square over all nuisances, shape (V,)."""
-        return log_likelihood(self.tables.together())[1][:, 0]
+        return self._logs[1]
+
+    @property
+    def deviance(self) -> FloatArray:
+        r""":math:`-2 \ln p(u | \theta)`, (V,): the noise depends on the value, by loads, too."""
+        # Chi-square alone would prefer the value with the larger error bars.
+        return -2 * self._logs[0]
+
+    @cached_property
+    def _logs(self) -> tuple[FloatArray, FloatArray]:
+        logs, chi_square = log_likelihood(self.tables.together())
+        return logs[:, 0], chi_square[:, 0]
 
     @cached_property
     def information(self) -> FloatArray:

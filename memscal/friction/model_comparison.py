@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
@@ -74,12 +75,22 @@ def weigh_slip_length(
     along = curve(slipping, also=np.geomspace(*_WIDEST, _DECADES))
     degrees = rigid.degrees
     laws = [one_of_all("effective Amontons, one coefficient", of_all, of_friction, degrees)]
+    of_each: list[LawCurve] = []
     if len(rigid.points) > 1:
         of_each = [curve(rigid, load=j) for j in range(len(rigid.points))]
         name = "effective Amontons, one for each load"
         laws.append(one_of_each(name, of_each, of_friction, degrees))
     name = f"elasto-plastic at {macroscopic:g}, slip length"
     laws.append(one_of_all(name, along, of_length, degrees))
+    priors = _other_priors(
+        laws[0].name, of_all, along, of_friction, of_length, slipping.family.scale
+    )
+    if of_each:
+        evidence = along.log_evidence(of_length)
+        priors += [
+            PriorChoice(prior.words, evidence - _of_each(of_each, prior)[0], laws[1].name)
+            for prior in _OTHER_FRICTIONS
+        ]
     length = interface_length(along, slipping.family, "slip length")
     return LawComparison(
         lubrication=lubrication,
@@ -87,7 +98,7 @@ def weigh_slip_length(
         laws=tuple(laws),
         factors=_factors(laws),
         length=length,
-        priors=_other_priors(of_all, along, of_friction, of_length, slipping.family.scale),
+        priors=tuple(priors),
         implied=implied_friction(rigid, slipping, length, macroscopic),
     )
 
@@ -113,7 +124,7 @@ def weigh_normal_compliance(measured: Measured) -> LawComparison:
         factors=_factors([rigid, yielding]),
         length=interface_length(along, measured.family, "length of the normal law"),
         priors=tuple(
-            PriorChoice(p.words, along.log_evidence(p) - rigid.log_evidence)
+            PriorChoice(p.words, along.log_evidence(p) - rigid.log_evidence, name)
             for p in (prior, *others)
         ),
     )
@@ -124,31 +135,45 @@ def _log_prior(what: str, low: float, high: float) -> Prior:
     return log_uniform_prior(low, high, words)
 
 
+_OTHER_FRICTIONS = (
+    uniform_prior(2.0, "coefficient uniform from 0 to 2"),
+    log_uniform_prior(0.01, 10, "coefficient log-uniform, 0.01 to 10"),
+)
+
+
 def _other_priors(
-    rigid: LawCurve, slipping: LawCurve, of_friction: Prior, of_length: Prior, scale: float
-) -> tuple[PriorChoice, ...]:
+    law: str,
+    rigid: LawCurve,
+    slipping: LawCurve,
+    of_friction: Prior,
+    of_length: Prior,
+    scale: float,
+) -> list[PriorChoice]:
     """Weigh the slip length against one coefficient under the usual priors and under others."""
     pairs = [(of_length, of_friction)]
     pairs += [(_log_prior("slip length", *ends), of_friction) for ends in _OTHER_SLIP_LENGTHS]
     words = f"slip length uniform in l/(l + {scale / _UM:.3g} um)"
     pairs.append((bounded_prior(scale, words), of_friction))
-    pairs.append((of_length, uniform_prior(2.0, "coefficient uniform from 0 to 2")))
-    pairs.append((of_length, log_uniform_prior(0.01, 10, "coefficient log-uniform, 0.01 to 10")))
-    return tuple(
+    pairs += [(of_length, other) for other in _OTHER_FRICTIONS]
+    return [
         PriorChoice(
             (of_slip if of_mu is of_friction else of_mu).words,
             slipping.log_evidence(of_slip) - rigid.log_evidence(of_mu),
+            law,
         )
         for of_slip, of_mu in pairs
-    )
+    ]
 
 
 def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
     *others, last = laws
-    return tuple(
-        BayesFactor.between(last.name, law.name, last.log_evidence - law.log_evidence)
-        for law in others
-    )
+    factors = []
+    for law in others:
+        best, worse = sorted((last, law), key=lambda each: -each.log_evidence)
+        log_factor = best.log_evidence - worse.log_evidence
+        ratio = best.log_likelihood - worse.log_likelihood
+        factors.append(BayesFactor(best.name, worse.name, log_factor, ratio))
+    return tuple(factors)
 
 
 #: Chance of a misfit below which a law is not believed.
@@ -284,11 +309,15 @@ class LawCurve:
         """Index of the largest likelihood."""
         return int(np.argmax(self.log_likelihood))
 
+    @cached_property
+    def near(self) -> NDArray[np.bool_]:
+        """Nodes that the likelihood does not exclude."""
+        return np.asarray(2 * (self.log_likelihood.max() - self.log_likelihood) < _EXCLUDED)
+
     @property
-    def deviance(self) -> FloatArray:
-        """Chi-square at the largest likelihood, and above it elsewhere by twice its loss."""
-        loss = self.log_likelihood[self.best] - self.log_likelihood
-        return np.asarray(self.chi_square[self.best] + 2 * loss)
+    def near_tables(self) -> Tables:
+        """The tables at these nodes."""
+        return Tables(*(array[self.near] for array in self.tables))
 
     def log_evidence(self, prior: Prior) -> float:
         """Return the logarithm of the likelihood averaged over a prior."""
@@ -333,12 +362,9 @@ def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> Interf
 
 def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
-    # Nodes that one load alone excludes are left out.
-    near = [2 * (c.log_likelihood.max() - c.log_likelihood) < _EXCLUDED for c in curves]
-    pairs = list(zip(curves, near, strict=True))
-    tables = [Tables(*(array[nodes] for array in c.tables)) for c, nodes in pairs]
-    weights = [prior.weights(along.edges)[nodes] for along, nodes in pairs]
-    log_evidence, error = evidence_of_each(tables, weights)
+    near = [along.near for along in curves]
+    tables = [along.near_tables for along in curves]
+    log_evidence, error = _of_each(curves, prior)
     start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
     chosen, top, chi_square = _best_of_each(tables, start)
     triples = zip(curves, near, chosen, strict=True)
@@ -346,6 +372,12 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
     left = degrees - len(curves)
     p_value = _p_value(left, chi_square)
     return InterfaceLaw(name, best, log_evidence, top, error, chi_square, left, p_value)
+
+
+def _of_each(curves: Sequence[LawCurve], prior: Prior) -> tuple[float, float]:
+    """Return the log evidence of one parameter of each load under a prior, and its error."""
+    weights = [prior.weights(along.edges)[along.near] for along in curves]
+    return evidence_of_each([along.near_tables for along in curves], weights)
 
 
 def _p_value(degrees: int, least: float) -> float:
@@ -416,7 +448,8 @@ def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> Bound
     return profile_estimate(
         along.values,
         along.coordinates,
-        along.deviance,
+        -2 * along.log_likelihood,
+        along.chi_square,
         family.value_at,
         reason=lambda interval: _length_reason(what, interval, float(family.values[-1])),
         two_sided=True,

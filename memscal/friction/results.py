@@ -59,11 +59,13 @@ class Interval:
 class BoundedEstimate:
     r"""A friction coefficient or a length (``unit`` m) by profile likelihood, with its interval.
 
-    ``value`` is that of least chi-square, ``None`` where the data give no more than a bound, for
-    the ``reason`` in words; ``standard_uncertainty`` half of the interval of 68.3 %, ``None`` where
-    that has an open end.  ``interval`` holds what the data do not exclude.  ``chi_square`` (m,)
-    along ``values`` (m,), which may end in ``inf``, is of a length :math:`-2\ln p(u | \theta)` up
-    to a constant; ``least``, ``degrees`` (0 of one datum) and ``p_value`` are of its least value.
+    ``value`` is that of the largest likelihood, ``None`` where the data give no more than a bound,
+    for the ``reason`` in words; ``standard_uncertainty`` half of the interval of 68.3 %, ``None``
+    where that has an open end.  ``interval`` holds what the data do not exclude.  ``deviance``
+    (m,), along ``values`` (m,) that may end in ``inf``, is :math:`-2\ln p(u | \theta)` up to a
+    constant, by which its least value is chi-square there: ``least``, of ``degrees`` (0 of one
+    datum) and ``p_value``.
+    ``beside``: how many lubricated loads were fitted with it, held at no friction.
     ``budget``: contribution of each source to the standard uncertainty; ``loading`` is that of the
     loading's definition.  Printed, it is the value with its interval, or the bound, rounded
     outward.
@@ -80,17 +82,18 @@ class BoundedEstimate:
     interval: Interval
     reason: str
     values: FloatArray
-    chi_square: FloatArray
+    deviance: FloatArray
     least: float
     budget: Mapping[str, float] = field(default_factory=dict)
     degrees: int = 0
     p_value: float = 1.0
     unit: str = ""
+    beside: int = 0
 
     @property
     def best(self) -> float:
-        """Value of least chi-square, ``inf`` included: to draw, not to report."""
-        return float(self.values[np.argmin(self.chi_square)]) if self.value is None else self.value
+        """Value of the largest likelihood, ``inf`` included: to draw, not to report."""
+        return float(self.values[np.argmin(self.deviance)]) if self.value is None else self.value
 
     def __str__(self) -> str:
         """Return the value with its interval, or the bound that is left of it."""
@@ -134,7 +137,8 @@ class LoadComparison:
     the base stress ``p0_max``, in Pa; in the uncertainty of their ``ratio`` errors of A and G count
     together.  ``calculated`` (m, n): G convolved with the base stress at the profile's n radii for
     each of the m coefficients, with what G, film, indenter and common load leave uncertain, in Pa;
-    ``p_max`` (m,): maxima.  ``chi_square`` (m,) is that of the scan against each; ``bracketed`` the
+    ``p_max`` (m,): maxima.  ``chi_square`` (m,) is that of the scan against each, ``deviance`` (m,)
+    twice the loss of its log likelihood from the best coefficient to each; ``bracketed`` the
     share of points between no friction and full stick within 1.96 standard uncertainties.
     ``by_maximum`` and ``by_profile`` are the two readings of the effective friction coefficient.
     """
@@ -151,6 +155,7 @@ class LoadComparison:
     calculated_errors: FloatArray
     p_max: FloatArray
     chi_square: FloatArray
+    deviance: FloatArray
     p_values: FloatArray
     degrees: int
     bracketed: float
@@ -281,11 +286,13 @@ class InterfaceLaw:
 class PriorChoice:
     """The logarithm of the yielding law's Bayes factor over the rigid one under another prior.
 
-    It is negative where the data favour the rigid law; ``prior`` is in words with its range.
+    It is negative where the data favour the rigid law, ``against``; ``prior`` is in words with its
+    range.
     """
 
     prior: str
     log_factor: float
+    against: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +316,7 @@ class LawComparison:
     """Laws of the interface over all ``loads`` (l,), in N, of one lubrication.
 
     The last of ``laws`` yields over ``length``; ``factors`` weigh it against each of the others,
-    ``priors`` against the first under other priors.  ``implied`` says what a slip length means at
+    ``priors`` do under other priors.  ``implied`` says what a slip length means at
     each load; it is ``None`` of a normal law.
     """
 
@@ -323,9 +330,16 @@ class LawComparison:
 
     @property
     def yielding_preferred(self) -> bool:
-        """Whether the evidence for the law that yields is positive against every other."""
-        others = max(law.log_evidence for law in self.laws[:-1])
-        return 2 * (self.laws[-1].log_evidence - others) >= POSITIVE
+        """Whether the evidence for the law that yields is positive, by likelihood and priors, too.
+
+        Its largest likelihood is above that of every law with as many parameters or fewer, and no
+        other prior turns the evidence.
+        """
+        *others, yielding = self.laws
+        evident = 2 * (yielding.log_evidence - max(law.log_evidence for law in others)) >= POSITIVE
+        rivals = [law for law in others if len(law.best) <= len(yielding.best)]
+        likelier = all(yielding.log_likelihood > law.log_likelihood for law in rivals)
+        return evident and likelier and all(prior.log_factor > 0 for prior in self.priors)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -34,8 +34,8 @@ SHARED_SOURCES = ("apparatus", "film", "position_scale")
 #: What the shapes of pressure leave open of the mean force of several, whose shapes differ.
 _NEGLIGIBLE_MEAN = 0.005
 _FORCE = (
-    "A failure means that A or the gain of the channel, the load, or the unit of one of them is "
-    "wrong."
+    "A failure means that gain, load or a unit differ between the calibration and this scan. It "
+    "does not test A: a factor that is wrong in both, such as of one balance, changes nothing."
 )
 _BLIND = (
     " It does not depend on the shape of G nor on the film's thickness, and tells nothing of them: "

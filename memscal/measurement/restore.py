@@ -133,9 +133,10 @@ def _force(restored: Restoration) -> QualityCheck:
         abs(restored.force - load) / allowed,
         FORCE_LIMIT,
         f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
-        f"of {load:.4g} N, in their standard uncertainty. A failure means that A, the load or the "
-        "unit of one of them is wrong, or that the film's Poisson's ratio, which decides how much "
-        "lies beyond the scan, is.",
+        f"of {load:.4g} N, in their standard uncertainty. A failure means that gain, load or unit "
+        "differ between the calibration and this scan, or that the film's Poisson's ratio, which "
+        "decides how much lies beyond the scan, is wrong. A factor that is wrong in both, such as "
+        "of one balance, changes nothing.",
     )
 
 

@@ -21,6 +21,8 @@ class BayesFactor:
     r"""Ratio of the evidences of two laws, by their names.
 
     :math:`\ln B = \ln p(u | \text{favoured}) - \ln p(u | \text{against})` is not negative.
+    ``log_likelihood_ratio`` is that of the largest likelihoods, which no prior changes; ``None``
+    where it was not asked for.
 
     >>> factor = BayesFactor("elasto-plastic", "Amontons", 4.0)
     >>> print(f"{factor.value:.0f}: {factor.words}")
@@ -30,11 +32,7 @@ class BayesFactor:
     favoured: str
     against: str
     log_factor: float
-
-    @classmethod
-    def between(cls, law: str, other: str, log_ratio: float) -> BayesFactor:
-        """Return the factor for whichever is favoured, from the ln of the ratio of evidences."""
-        return cls(law, other, log_ratio) if log_ratio >= 0 else cls(other, law, -log_ratio)
+    log_likelihood_ratio: float | None = None
 
     @property
     def value(self) -> float:

@@ -20,7 +20,13 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from memscal.model.arrays import ByContent, FloatArray, frozen_array
-from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
+from memscal.model.checks import (
+    NOISE_UNSTATED,
+    Checked,
+    Message,
+    QualityCheck,
+    state_of_checks,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import VOLTS, Reading, format_measured
@@ -258,6 +264,11 @@ class MeasuredStress(Result, Checked, ByContent):
     def messages(self) -> tuple[Message, ...]:
         """Notes and warnings of the measurement, the most serious first."""
         return self.process.messages
+
+    @property
+    def noise_stated(self) -> bool:
+        """Whether every scan states its noise, so that a misfit shows in a chi-square."""
+        return all(message.kind != NOISE_UNSTATED for message in self.messages)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the measured stress to a file (memscal-stress).

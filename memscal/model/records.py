@@ -340,6 +340,7 @@ CALCULATED = (
     Quantity("p_max", _P, "largest calculated stress"),
     FIT[0],
     FIT[2],
+    Quantity("deviance", _COUNT, "twice the loss of the log likelihood", "-2 ln(p/p_max)"),
 )
 DRY_AGAINST_LUBRICATED = (
     STRESS_NUMBERS.quantities[0],
@@ -361,8 +362,9 @@ BAYES_FACTOR = (
     Quantity("against", "text", "law"),
     Quantity("log_factor", _COUNT, "ln of the Bayes factor"),
     Quantity("words", "text", "evidence"),
+    Quantity("log_likelihood_ratio", _COUNT, "ln of the ratio of the largest likelihoods"),
 )
-PRIOR = (Quantity("prior", "text", "prior"), BAYES_FACTOR[2])
+PRIOR = (Quantity("against", "text", "law"), Quantity("prior", "text", "prior"), BAYES_FACTOR[2])
 COMPARED_LAWS = (
     Quantity("lubrication", "text", "dry or lubricated"),
     Quantity("loads", "force", "loads", axes=_PER_LOAD),

@@ -181,7 +181,9 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "degrees": load.degrees,
         "profiles": [
             members(records.CALCULATED, None, **dict(zip(names, row, strict=True)))
-            for row in zip(mu, sticking, load.p_max, load.chi_square, load.p_values, strict=True)
+            for row in zip(
+                mu, sticking, load.p_max, load.chi_square, load.p_values, load.deviance, strict=True
+            )
         ],
     }
 
@@ -190,9 +192,10 @@ def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
     return {
         **interface_laws.bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate),
+        "lubricated_beside": estimate.beside,
         "profile_likelihood": {
             "friction_coefficient": _shortened(estimate.values),
-            "chi2": _shortened(estimate.chi_square),
+            "deviance": _shortened(estimate.deviance),
         },
     }
 
@@ -280,7 +283,7 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
     return [
         _maxima_table(comparison),
         *friction,
-        *(table for way in comparison.loadings for table in _chi_square_tables(comparison, way)),
+        *(table for way in comparison.loadings for table in _likelihood_tables(comparison, way)),
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
@@ -322,6 +325,8 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
     if not shear:
         head = [*_LABELS, "by the maximum", "by the profile", "χ²/ν", "p", "bracketed"]
     rows = []
+    # An estimated noise is as large as the misfit: a chi-square by it says nothing.
+    fit = _fit if comparison.measured.noise_stated else lambda _: ("", "")
     for lubrication, by_loading in comparison.joint.items():
         count = 0
         for i, load in enumerate(loads):
@@ -331,13 +336,14 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
             count += 1
             labels = _labels(i + 1, profile)
             if isinstance(load, BoundedEstimate):
-                rows.append([*labels, str(load), *_fit(load)])
+                rows.append([*labels, str(load), *fit(load)])
             else:
-                cells = [str(load.by_maximum), str(load.by_profile), *_fit(load.by_profile)]
+                cells = [str(load.by_maximum), str(load.by_profile), *fit(load.by_profile)]
                 rows.append([*labels, *cells, f"{100 * load.bracketed:.0f} %"])
         if count > 1:
             joint, name = by_loading[loading], lubrication or "not stated"
-            cells = [str(joint), *_fit(joint)]
+            name += " + lubricated" if joint.beside else ""
+            cells = [str(joint), *fit(joint)]
             rows.append(["", name, "all", *(cells if shear else ["", *cells, ""])])
     return Table(f"Effective friction coefficient, {way} [{level} interval]", head, rows)
 
@@ -348,21 +354,21 @@ def _fit(reading: BoundedEstimate) -> tuple[str, str]:
     return f"{reading.least / reading.degrees:.2f}", f"{reading.p_value:.2g}"
 
 
-def _chi_square_tables(comparison: FrictionComparison, loading: str) -> Iterator[Table]:
-    """Return chi-square of each load against each calculated profile, in as few tables as fit."""
+def _likelihood_tables(comparison: FrictionComparison, loading: str) -> Iterator[Table]:
+    """Return what each load says of each calculated profile, in as few tables as fit."""
     loads = comparison.loads[loading]
     way = f"{loading} loading" if loading else "profiles as given"
     labels = [[*_labels(i, load.profile), f"{load.degrees}"] for i, load in enumerate(loads, 1)]
     head = [*_LABELS, "ν"]
     columns = [
-        [friction_name(float(mu)), *(_short(float(load.chi_square[i])) for load in loads)]
+        [friction_name(float(mu)), *(_short(float(load.deviance[i])) for load in loads)]
         for i, mu in enumerate(comparison.friction)
     ]
     room = _WIDTH - sum(2 + max(map(len, column)) for column in zip(head, *labels, strict=True))
     for fitting in _fitting(columns, room):
         values = zip(*(column[1:] for column in fitting), strict=True)
         rows = [[*label, *row] for label, row in zip(labels, values, strict=True)]
-        title = f"χ² of each profile against friction coefficients, {way}"
+        title = f"-2 ln(p/p_max) of each profile by friction coefficient, {way}"
         yield Table(title, [*head, *(column[0] for column in fitting)], rows)
 
 
@@ -378,12 +384,12 @@ def _fitting(columns: Sequence[list[str]], room: int) -> Iterator[list[list[str]
     yield fitting
 
 
-def _short(chi_square: float) -> str:
-    if not math.isfinite(chi_square):
+def _short(value: float) -> str:
+    if not math.isfinite(value):
         return "-"
-    if chi_square >= _LONG:
-        return f"{chi_square:.0e}".replace("e+0", "e")
-    return f"{chi_square:.1f}" if chi_square < _WIDE else f"{chi_square:.0f}"
+    if value >= _LONG:
+        return f"{value:.0e}".replace("e+0", "e")
+    return f"{value:.1f}" if value < _WIDE else f"{value:.0f}"
 
 
 def _budget_table(comparison: FrictionComparison | ShearComparison) -> Table:

@@ -23,10 +23,10 @@ def tables(comparison: results.InterfaceComparison) -> list[Table]:
     """Return evidence and lengths, and what a slip length means at each load."""
     shown = []
     for direction, compared in comparison.by_direction.items():
-        rows = [[prior.prior, f"{prior.log_factor:.1f}"] for prior in compared.priors]
-        title = f"The same against {compared.laws[0].name}, under other priors"
+        rows = [[p.against, p.prior, f"{p.log_factor:.1f}"] for p in compared.priors]
+        title = "The same under other priors"
         shown += [_law_table(direction, compared), _length_table(direction, compared)]
-        shown.append(Table(title, ["prior", "ln of the Bayes factor"], rows))
+        shown.append(Table(title, ["law", "prior", "ln of the factor"], rows))
         if compared.implied is not None:
             shown.append(_implied_table(compared.implied))
     return shown
@@ -66,10 +66,12 @@ def _length_table(direction: str, compared: results.LawComparison) -> Table:
         yielding = factor.favoured == compared.laws[-1].name
         law, side = (factor.against, "for") if yielding else (factor.favoured, "against")
         value = f"{factor.value:.3g}" if factor.value < 1e6 else f"{factor.value:.1e}"
-        rows.append([law, value, f"{side} it, {factor.words}"])
+        ratio = factor.log_likelihood_ratio
+        likelier = "" if ratio is None else f"{ratio if yielding else -ratio:+.1f}"
+        rows.append([law, value, f"{side} it, {factor.words}", likelier])
     level = f" [{percent(compared.length.interval.level)} interval]" if "[" in length else ""
     title = f"The law that yields, {words} {length}{level}, against the others"
-    return Table(title, ["law", "Bayes factor", "evidence"], rows)
+    return Table(title, ["law", "Bayes factor", "evidence", "ln of likelihoods"], rows)
 
 
 def _implied_table(implied: results.ImpliedFriction) -> Table:

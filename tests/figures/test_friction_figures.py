@@ -165,7 +165,7 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
     one, joint = found.loads["incremental"][0], found.joint["dry"]["incremental"]
     for label, reading in (("0.34 N", one.by_profile), ("all loads", joint)):
         t, rise = (np.asarray(values) for values in curves[label].get_data())
-        np.testing.assert_allclose(rise, reading.chi_square - reading.least, atol=1e-9)
+        np.testing.assert_allclose(rise, reading.deviance - reading.least, atol=1e-9)
         assert t[np.argmin(rise)] == pytest.approx(float(friction_position(reading.best)))
 
 

@@ -185,3 +185,15 @@ def test_a_normal_compliance_is_found_where_it_is_the_truth() -> None:
 def test_nothing_measured_is_refused() -> None:
     with pytest.raises(InputError, match="measured profiles, but none"):
         compare_interface([], None, macroscopic=1.6)
+
+
+def test_a_law_is_preferred_only_if_likelihood_and_every_prior_speak_for_it() -> None:
+    found = weighed("slipping", 16e-6)
+    assert {prior.against for prior in found.priors} == {law.name for law in found.laws[:-1]}
+    one = found.factors[0]
+    ratio = found.laws[-1].log_likelihood - found.laws[0].log_likelihood
+    assert one.log_likelihood_ratio == pytest.approx(ratio)
+    turned = replace(found.priors[0], log_factor=-0.1)
+    assert not replace(found, priors=(*found.priors, turned)).yielding_preferred
+    less = replace(found.laws[-1], log_likelihood=found.laws[0].log_likelihood - 1)
+    assert not replace(found, laws=(*found.laws[:-1], less)).yielding_preferred

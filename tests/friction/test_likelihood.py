@@ -58,11 +58,11 @@ def generalised(residual: np.ndarray, covariance: np.ndarray, flat: np.ndarray) 
 
 def test_chi_square_is_that_of_generalised_least_squares(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=1)
-    chi_square = found.at(FRICTIONS, 0)
+    chi_square, deviance = found.at(FRICTIONS, 0)
     whole = found.whole.chi_square[np.isin(found.members.values, FRICTIONS)]
     for i, value in enumerate(FRICTIONS):
         assert whole[i] == pytest.approx(generalised(*dense(found, value)), rel=1e-6)
-    assert chi_square.shape == FRICTIONS.shape
+    assert chi_square.shape == deviance.shape == FRICTIONS.shape
 
 
 def test_one_load_of_several_is_that_load_alone(laboratory: Laboratory) -> None:
@@ -123,3 +123,43 @@ def test_chi_square_is_that_of_the_whole_covariance(laboratory: Laboratory) -> N
     root = np.vstack(columns)
     expected = rest @ np.linalg.solve(np.eye(rest.size) + root @ root.T, rest)
     assert whole.chi_square[i] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory: Laboratory) -> None:
+    found = laboratory.drawn(0.15, seed=8)
+    together = found.whole.only([0]).beside(found.whole.only([1]))
+    for value in (0.0, 0.1, 0.3):
+        free, held = (dense(found, each) for each in (value, 0.0))
+        size = found.points[0].u.size
+        residual = np.concatenate([free[0][:size], held[0][size:]])
+        members = [found.family.at(each) for each in (value, 0.0)]
+        pairs = zip(found.points, members, (0, 1), strict=True)
+        shared = np.concatenate([joined(predict(p, found.sensor, m, i)) for p, m, i in pairs])
+        noise = np.zeros((2 * size, 2 * size))
+        for whole, at, rows in ((free, value, slice(size)), (held, 0.0, slice(size, None))):
+            own = np.concatenate([joined(p) for p in predicted_of(found, at)])
+            noise[rows, rows] = (whole[1] - own @ own.T)[rows, rows]
+        flat = np.vstack([free[2][:size], held[2][size:]])
+        i = int(np.argmin(np.abs(found.members.values - value)))
+        expected = generalised(residual, noise + shared @ shared.T, flat)
+        assert together.chi_square[i] == pytest.approx(expected, rel=1e-6)
+    assert together.information[30] > found.whole.only([0]).information[30]
+
+
+def predicted_of(found: Confrontation, value: float) -> list[Predicted]:
+    members = found.family.at(value)
+    pairs = zip(found.loads, found.points, strict=True)
+    return [predict(points, found.sensor, members, load) for load, points in pairs]
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.2])
+def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> None:
+    # By chi-square alone it is half a standard deviation too large: larger noise fits better.
+    laboratory, errors = Laboratory.of(), []
+    t = laboratory.family.coordinate(friction)
+    for seed in range(100):
+        along = laboratory.drawn(friction, seed).whole
+        i = int(np.argmin(along.deviance))
+        errors.append((along.coordinates[i] - t) * np.sqrt(along.information[i]))
+    assert abs(np.mean(errors)) < 0.15 + 3.3 * np.std(errors) / np.sqrt(len(errors))
+    assert np.std(errors) == pytest.approx(1.0, abs=3.3 / np.sqrt(2 * len(errors)))

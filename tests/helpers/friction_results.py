@@ -41,7 +41,7 @@ def reading(
         value=value, standard_uncertainty=spread, interval=memscal.Interval(float(inside[0]), high),
         reason="" if value is not None else "A large coefficient is not excluded: a lower bound.",
         budget={} if spread is None else {"noise": 0.8 * spread, "thickness": 0.6 * spread},
-        values=values, chi_square=chi_square, degrees=degrees, least=least, p_value=0.31, **fields,
+        values=values, deviance=chi_square, degrees=degrees, least=least, p_value=0.31, **fields,
     )  # fmt: skip
 
 
@@ -90,7 +90,9 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.Loa
         ratio=profile.maximum / p0, ratio_uncertainty=0.012, calculated=calculated,
         calculated_errors=_COMMON * calculated,
         p_max=np.array([float(stress(0.0, load, mu, loading)) for mu in grid]),
-        chi_square=np.array([misfit(mu) for mu in grid]), p_values=np.full(grid.size, 0.2),
+        chi_square=np.array([misfit(mu) for mu in grid]),
+        deviance=np.array([misfit(mu) for mu in grid]) - curve.min(),
+        p_values=np.full(grid.size, 0.2),
         degrees=29,
         bracketed=float((np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors).mean()),
         by_maximum=reading(fine, datum, degrees=0), by_profile=reading(fine, curve),
@@ -124,7 +126,7 @@ def comparison(
     )
     measured = SimpleNamespace(
         profiles=tuple(profiles), scans=tuple(_scan(lubrication) for lubrication in lubrications),
-        checks=(), messages=(), overridden=(),
+        checks=(), messages=(), overridden=(), noise_stated=True,
     )  # fmt: skip
     given: dict[str, Any] = {
         "measured": measured, "friction": friction_grid, "loads": by_loading, "joint": joint,
@@ -170,7 +172,7 @@ def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: A
 
 def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memscal.BoundedEstimate:
     chosen = [one.by_profile for one in of_each if one.lubrication == lubrication]
-    return reading(chosen[0].values, np.sum([one.chi_square for one in chosen], axis=0))
+    return reading(chosen[0].values, np.sum([one.deviance for one in chosen], axis=0))
 
 
 def _differences(profiles: Sequence[Any]) -> tuple[memscal.DryAgainstLubricated, ...]:
