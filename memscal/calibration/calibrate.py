@@ -117,6 +117,7 @@ def assemble(
             input_reference=reference.source,
         ),
         budget=results.budget,
+        kernel_changes=results.kernel_changes,
         other=_other(solution, other),
     )
 

@@ -218,6 +218,8 @@ class Results:
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
     by_voltage: VoltageMap  # (p, n): derivatives of the parameters
+    # (n,) by input, where none are correlated: of A G(r) over A by one uncertainty, in 1/m^2
+    kernel_changes: Mapping[str, FloatArray]
     division: DivisionMap | None = None  # that was propagated
     field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
@@ -298,8 +300,17 @@ def propagate(
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(np.hstack(scatter)[count:stop], axis=1),
         by_voltage=by_voltage[:count],
+        kernel_changes={}
+        if correlations
+        else {source: _of_kernel(columns[source][:stop, 0], deconvolution) for source in effects},
         division=division,
     )
+
+
+def _of_kernel(change: FloatArray, deconvolution: Deconvolution) -> FloatArray:
+    """Change of A G(r) over A, from those of the parameters, A the first, and of G."""
+    g, a = deconvolution.g.radial, deconvolution.conversion_constant
+    return np.asarray(change[-g.size :] + g * (change[0] / a))
 
 
 def changes_by(

@@ -9,11 +9,20 @@ from memscal.errors import FormatError
 from memscal.formats import groups
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
+from memscal.formats.hdf5.writer import (
+    ARTIFACT_SCHEMA,
+    Group,
+    Node,
+    file_tree,
+    si,
+    to_json,
+    write_tree,
+)
 from memscal.formats.units import reading_of
-from memscal.formats.values import altered, require_schema, units_of
+from memscal.formats.values import altered, require_schema, text_list, units_of
 from memscal.model import apparatus, records
 from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
+from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 
 
@@ -47,6 +56,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         load=load,
         reference=groups.read_profile(file, load=load),
         process=process,
+        kernel_changes=_read_changes(file),
         other=_read_other(file, reading),
     )
 
@@ -76,6 +86,8 @@ def artifact_tree(data: ApparatusData) -> Group:
         **groups.reference_groups(data.reference),
         "process": write_record(records.PROCESS, data.process),
     }
+    if data.kernel_changes:
+        children["kernel_changes"] = _changes_group(data)
     if data.other is not None:
         name, radial = data.other.route, data.other.radial_profile
         children |= {
@@ -84,6 +96,27 @@ def artifact_tree(data: ApparatusData) -> Group:
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
     return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": "apparatus_function"}))
+
+
+_CHANGES = "/entry/kernel_changes"
+
+
+def _changes_group(data: ApparatusData) -> Group:
+    """Return what one standard uncertainty of each input does to A G, beside the radii."""
+    names, changes = zip(*data.kernel_changes.items(), strict=True)
+    group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})
+    radii = si(data.radial_profile.r, "length", ("r",))
+    beside = {"names": to_json("inputs", list(names)), **group.children, "r": radii}
+    return replace(group, children=beside)
+
+
+def _read_changes(file: SafeFile) -> dict[str, FloatArray]:
+    if not file.has(f"{_CHANGES}/names"):
+        return {}
+    names = text_list(file, f"{_CHANGES}/names")
+    sizes = {"input": len(names), "r": file.array("/entry/radial_profile/r").size}
+    read = read_record(records.KERNEL_CHANGES, file, _CHANGES, sizes=sizes)["kernel_changes"]
+    return dict(zip(names, read, strict=True))
 
 
 def _read_other(file: SafeFile, reading: Reading) -> apparatus.OtherEstimate | None:

@@ -56,6 +56,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         "/entry/apparatus_function": records.FIELD,
         "/entry/radial_profile": records.RADIAL_VERSION_1_0,
         "/entry/radial_covariance": records.RADIAL_COVARIANCE,
+        "/entry/kernel_changes": records.KERNEL_CHANGES,
         "/entry/radial_profile_bayesian": records.RADIAL,
         "/entry/radial_profile_division": records.RADIAL,
         "/entry/transfer_function": records.TRANSFER,

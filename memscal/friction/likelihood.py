@@ -12,7 +12,7 @@ and changes its sign with the side of the centre.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,8 +24,9 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Tables, log_likelihood
-from memscal.measurement.posterior import apparatus_changes, sensor_transfer
+from memscal.measurement.posterior import apparatus_changes, changes_by_film, sensor_transfer
 from memscal.model.arrays import FloatArray
+from memscal.model.film import ElasticFilm
 from memscal.model.measured_stress import MeasuredProfile
 
 
@@ -153,13 +154,20 @@ class Sensor:
     changes: FloatArray  # (K, q): its independent changes by one standard uncertainty
     conversion_constant: float  # A, in V/Pa
     order: int = 0  # one of a tangential channel
+    # (K,): its changes by one uncertainty of what the contacts' film shares, by source.
+    by_film: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def of_shape(self) -> Sensor:
         """The sensor with the changes of A G that those of G alone bring: its integral stays."""
-        of_conversion = self.wavenumbers.integrals(self.changes)
-        scaled = np.outer(self.transfer, of_conversion) / self.conversion_constant
-        return replace(self, changes=self.changes - scaled)
+        by_film = {source: self._shaped(c[:, None])[:, 0] for source, c in self.by_film.items()}
+        return replace(self, changes=self._shaped(self.changes), by_film=by_film)
+
+    def _shaped(self, changes: FloatArray) -> FloatArray:
+        of_conversion = self.wavenumbers.integrals(changes)
+        return np.asarray(
+            changes - np.outer(self.transfer, of_conversion) / self.conversion_constant
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,11 +181,19 @@ class Predicted:
     columns: Mapping[str, FloatArray]  # (V, n, q): changes by each systematic source's uncertainty
 
 
-def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float) -> Sensor:
+def sensor_of(
+    apparatus: ApparatusFunction,
+    family: ProfileFamily,
+    reach: float,
+    film: ElasticFilm | None = None,
+) -> Sensor:
     """Return a sensor at a family's nodes, with the changes of A G that change the signal."""
+    # With the contacts' ``film``: what it shares with the sensor's counts as one error.
     nodes = family.wavenumbers
     middle = family.spectra[family.values.size // 2]
-    changes = apparatus_changes(apparatus, nodes.k)
+    shared = changes_by_film(apparatus, film, nodes.k)
+    shared = {source: change for source, change in shared.items() if source in family.changes}
+    changes = apparatus_changes(apparatus, nodes.k, shared)
     bessel = j1 if family.order else j0
     kernel = bessel(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
     largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
@@ -188,7 +204,8 @@ def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float)
         _, sizes, axes = np.linalg.svd(signals, full_matrices=False)
         changes = changes @ axes[sizes > _NEGLIGIBLE * sizes[0]].T
     a = apparatus.conversion_constant
-    return Sensor(nodes, a * sensor_transfer(apparatus, nodes.k), changes, a, family.order)
+    transfer = a * sensor_transfer(apparatus, nodes.k)
+    return Sensor(nodes, transfer, changes, a, family.order, shared)
 
 
 def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: int) -> Predicted:
@@ -200,7 +217,10 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     changed = [bessel.values(change * spectra) for change in sensor.changes.T]
     columns = {"apparatus": np.stack(changed, axis=-1)} if changed else {}
     for source, change in members.changes.items():
-        columns[source] = bessel.values(transfer * change[:, load])[..., None]
+        both = transfer * change[:, load]
+        if source in sensor.by_film:
+            both = both + sensor.by_film[source] * spectra
+        columns[source] = bessel.values(both)[..., None]
     columns["load"] = (points.load_share * by_load)[..., None]
     columns["position_scale"] = (points.position_share * points.radius * slope)[..., None]
     return Predicted(

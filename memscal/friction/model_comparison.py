@@ -229,7 +229,8 @@ def _measured(
         of_load = load_points(profile)
         # Loads count from that of the calculated contact.
         points.append(replace(of_load, log_load=of_load.log_load + math.log(profile.load / load)))
-    return Measured(points, sensor_of(apparatus, family, reach), family)
+    film = profiles[0].scan.film
+    return Measured(points, sensor_of(apparatus, family, reach, film), family)
 
 
 def _messages(

@@ -20,7 +20,12 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR
-from memscal.measurement.posterior import apparatus_changes, film_transfer, sensor_transfer
+from memscal.measurement.posterior import (
+    apparatus_changes,
+    changes_by_film,
+    film_transfer,
+    sensor_transfer,
+)
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, plain_pressure
 from memscal.mechanics.indent import indent
@@ -427,10 +432,16 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     row, state = on_axis * transfer, posterior.state[:nodes]
     maximum, a = float(row @ state), apparatus.conversion_constant
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
-    of_sensor = apparatus_changes(apparatus, np.append(k, 0.0))
-    # G = (A G)/A: its own change beside that of what was restored with it.
-    of_g = (of_sensor[:-1] - transfer[:, None] * of_sensor[-1]) / a
-    changes["apparatus"] = changes["apparatus"] + on_axis * state @ of_g
+    shared = changes_by_film(apparatus, restored.scan.film, np.append(k, 0.0))
+    of_film = [shared.get(name, np.zeros(k.size + 1)) for name in posterior.film_inputs]
+    of_kernel = {
+        "apparatus": apparatus_changes(apparatus, np.append(k, 0.0), shared),
+        "film": np.reshape(of_film, (-1, k.size + 1)).T,
+    }
+    for source, change in of_kernel.items():
+        # G = (A G)/A: its own change beside that of what was restored with it.
+        of_g = (change[:-1] - transfer[:, None] * change[-1]) / a
+        changes[source] = changes[source] + on_axis * state @ of_g
     budget = {source: float(np.linalg.norm(change)) for source, change in changes.items()}
     noise = float(row @ posterior.covariances["scan"][:nodes, :nodes] @ row)
     return maximum, {"noise": float(np.sqrt(max(noise, 0.0))), **budget}

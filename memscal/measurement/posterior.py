@@ -25,7 +25,7 @@ stress by the wrong :math:`T`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from operator import add
@@ -295,6 +295,7 @@ class Posterior:
     covariances: Mapping[str, FloatArray]  # (s, s) by source, independent
     shifts: Mapping[str, FloatArray]  # (n, q) by source: change of the voltages, in V
     changes: Mapping[str, FloatArray]  # (s, q) by source: change of the state
+    film_inputs: tuple[str, ...]  # whose uncertainties the columns of source ``film`` are
     residual: FloatArray  # (n,), in V
     found_noise: float  # of a point of weight one, in V, or over the stated uncertainties
     resolved_wavenumber: float  # where the uncertainty is a third of the Gaussian's, rad/m
@@ -343,13 +344,20 @@ def posterior_of(
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan, model.reference.wavenumbers)
     scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
-    of_film = _film_changes(scan, model.reference.wavenumbers)
-    of_sensor = apparatus_changes(apparatus, model.k)
+    by_film = _film_changes(scan, model.reference.wavenumbers)
+    shared = changes_by_film(apparatus, scan.film, model.k)
+    of_sensor = apparatus_changes(apparatus, model.k, shared)
+    names, nothing = tuple(dict.fromkeys([*by_film, *shared])), np.zeros(nodes)
+    # One error of a film that sensor and contact share changes A G and the film's transfer.
+    of_film, of_kernel = (
+        np.array([known.get(name, nothing) for name in names]).reshape(-1, nodes).T
+        for known in (by_film, shared)
+    )
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
     scaled = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
     shifts = {
         "apparatus": _signals(estimate, mean, of_sensor * film[:, None]),
-        "film": _signals(estimate, mean, of_film * transfer[:, None]),
+        "film": _signals(estimate, mean, of_film * transfer[:, None] + of_kernel * film[:, None]),
         "position_scale": scaled[:, None],
     }
     covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
@@ -366,6 +374,7 @@ def posterior_of(
         covariances=covariances,
         shifts=shifts,
         changes=changes,
+        film_inputs=names,
         residual=np.average([fit.residual for fit in fits], axis=0, weights=shares),
         found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
@@ -381,13 +390,53 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
 
 
-def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
-    """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa."""
-    return _of_sensor(apparatus, k.tobytes())[1]
+def apparatus_changes(
+    apparatus: ApparatusFunction, k: FloatArray, without: Iterable[str] = ()
+) -> FloatArray:
+    """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa.
+
+    Those ``without`` which they are asked for are left to :func:`changes_by_film`.
+    """
+    return _of_sensor(apparatus, k.tobytes(), tuple(without))[1]
+
+
+#: Properties of a film that sensor and contact have in common, by their names in budgets.
+_OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
+
+
+def changes_by_film(
+    apparatus: ApparatusFunction, film: ElasticFilm | None, k: FloatArray
+) -> dict[str, FloatArray]:
+    """Return changes (n,) of the transform of A G, in V/Pa, by the film that a contact shares.
+
+    By one standard uncertainty of each property; empty of another film than the sensor's.
+    """
+    known = apparatus.film
+    if film is None or known is None or not _alike(film, known):
+        return {}
+    r, a = apparatus.radial_profile.r, apparatus.conversion_constant
+    changes = {name: apparatus.kernel_changes.get(name) for name in _OF_FILM}
+    return {
+        name: a * hankel_transform(r, change, k)
+        for name, change in changes.items()
+        if change is not None
+    }
+
+
+def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
+    """Whether two films state the same properties and uncertainties."""
+    names = [name + end for name in _OF_FILM for end in ("", "_uncertainty")]
+    pairs = [(getattr(film, name), getattr(other, name)) for name in names]
+    return film.name == other.name and all(
+        (a is None) == (b is None) and math.isclose(a or 0.0, b or 0.0, rel_tol=1e-6)
+        for a, b in pairs
+    )
 
 
 @lru_cache(maxsize=16)
-def _of_sensor(apparatus: ApparatusFunction, nodes: bytes) -> tuple[FloatArray, FloatArray]:
+def _of_sensor(
+    apparatus: ApparatusFunction, nodes: bytes, without: tuple[str, ...] = ()
+) -> tuple[FloatArray, FloatArray]:
     """Return transfer function and changes, which all profiles of one sensor share."""
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
@@ -395,6 +444,8 @@ def _of_sensor(apparatus: ApparatusFunction, nodes: bytes) -> tuple[FloatArray, 
     if profile.conversion_correlation is not None:
         shared = a * u_a * profile.conversion_correlation * profile.g_errors
         covariance = covariance + np.outer(shared, profile.g) + np.outer(profile.g, shared)
+    for name in without:
+        covariance = covariance - np.multiply.outer(*[a * apparatus.kernel_changes[name]] * 2)
     # Rings far out count by their area.
     ring = np.sqrt(profile.r + profile.r[1])
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
@@ -405,18 +456,20 @@ def _of_sensor(apparatus: ApparatusFunction, nodes: bytes) -> tuple[FloatArray, 
     return transforms[:, 0], transforms[:, 1:]
 
 
-def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
+def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> dict[str, FloatArray]:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
     scan = expected_film(scan)
     linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
-    columns = []
+    columns: dict[str, FloatArray] = {}
     for name in ("thickness", "poisson_ratio"):
         if ends := more_and_less(scan.set_up.film, name):
             *films, share = ends
             more, less = (_transfer(replace(scan, film=film), wavenumbers) for film in films)
-            columns.append(share * (more - less))
+            columns[name] = share * (more - less)
     film = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     if law_at_once(replace(scan, film=film)) != LINEAR:
-        changes = law_sensitivities(scan, linear).values()
-        columns += [_per_pressure(scan, linear, change * scan.stated_load) for change in changes]
-    return np.stack(columns, axis=1) if columns else np.zeros((wavenumbers.k.size, 0))
+        columns |= {
+            name: _per_pressure(scan, linear, change * scan.stated_load)
+            for name, change in law_sensitivities(scan, linear).items()
+        }
+    return columns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
 
@@ -175,8 +176,10 @@ class ApparatusData(Checked):
 
     ``film``, ``indenter`` and ``load`` are ``None`` where a scan with a reference states none.
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
-    of the conversion constant and of both Gaussian widths by source; ``other`` is the estimate by
-    the route that was not chosen, where there is one.
+    of the conversion constant and of both Gaussian widths by source; ``kernel_changes`` (n,), at
+    the radii of ``radial_profile``, are those of A G over A by one standard uncertainty of each
+    input, in 1/m^2, empty where inputs are correlated; ``other`` is the estimate by the route that
+    was not chosen, where there is one.
     """
 
     field: ApparatusField
@@ -192,6 +195,7 @@ class ApparatusData(Checked):
     reference: StressProfile
     process: Process
     budget: Mapping[str, Mapping[str, float]]
+    kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
     other: OtherEstimate | None = None
 
     def __repr__(self) -> str:

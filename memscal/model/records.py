@@ -147,6 +147,19 @@ RADIAL_COVARIANCE = record(
     signal="g_covariance",
 )
 _G, _COVARIANCE = RADIAL.quantities, RADIAL_COVARIANCE.quantities
+KERNEL_CHANGES = record(
+    "NXdata",
+    Quantity(
+        "kernel_changes",
+        _PER_AREA,
+        "A G over A by one uncertainty",
+        axes=("input", "r"),
+        required=True,
+        stored="changes",
+    ),
+    signal="kernel_changes",
+)
+"""Changes of A G over A by one standard uncertainty of each input, in the order of names."""
 RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="g")
 """The radial profile in files of version 1.0, which held its covariance."""
 TRANSFER = record(

@@ -24,7 +24,8 @@ def calibrated(scan, film=LINEAR_FILM, rod=PAPER_ROD):
 
 @pytest.mark.parametrize(("source", "change"), [
     ("thickness", lambda: {"film": replace(LINEAR_FILM, thickness=2.02e-3)}),
-    ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.495)}),
+    # Of 0.5 ± 0.005 half a normal distribution is left, with 0.603 of its standard deviation.
+    ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.5 - 0.603 * 0.005)}),
     ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
 ])  # fmt: skip
 def test_each_input_of_the_reference_counts_what_moving_it_changes(source, change) -> None:
@@ -117,3 +118,19 @@ def test_the_rows_are_derivatives(name: str, kernel: FloatArray) -> None:
     above, below = functionals(kernel + change)[name], functionals(kernel - change)[name]
     expected = (above.value - below.value) / 2
     assert functionals(kernel)[name].row @ change == pytest.approx(expected, rel=0.05)
+
+
+def test_kernel_changes_are_those_of_calibrations_with_another_film() -> None:
+    scan = memscal.simulate(noise=0.002, seed=4)
+    found, film = memscal.calibrate(scan, method="evidence").apparatus, scan.set_up.film
+    u, kernels = film.thickness_uncertainty or 0.0, []
+    for thickness in (film.thickness + u, film.thickness - u):
+        other = replace(scan, film=replace(film, thickness=thickness))
+        of_other = memscal.calibrate(other, method="evidence").apparatus
+        g = np.interp(found.radial_profile.r, of_other.radial_profile.r, of_other.radial_profile.g)
+        kernels.append(of_other.conversion_constant / found.conversion_constant * g)
+    difference = (kernels[0] - kernels[1]) / 2
+    apart = found.kernel_changes["thickness"] - difference
+    assert np.linalg.norm(apart) < 0.05 * np.linalg.norm(difference)
+    between = {("thickness", "poisson_ratio"): 0.5}
+    assert not memscal.calibrate(scan, correlations=between).apparatus.kernel_changes
