@@ -122,8 +122,8 @@ class BoundedEstimate:
 
 def _rounded(value: float, low: float, high: float) -> str:
     """Return a value and its interval, with the digits that follow from its closer end."""
-    # Two digits of the distance to it if that begins with 1 or 2, one otherwise.
-    sides = [side for side in (value - low, high - value) if side > 0]
+    # Two digits of the distance to it if that begins with 1 or 2, one otherwise; zero is no end.
+    sides = [side for side in (value - low if low > 0 else 0.0, high - value) if side > 0]
     places = max(0, -math.floor(math.log10(min(sides) / 3))) if sides else 3
     ends = (f"{end:.{places}f}" if end > 0 else "0" for end in (low, high))
     return f"{value:.{places}f} [{', '.join(ends)}]"
