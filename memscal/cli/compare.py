@@ -2,13 +2,14 @@
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from memscal.cli import output as out
+from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, option, output_options
 
 
@@ -50,6 +51,7 @@ Examples:
   memscal compare sensor.apparatus.h5 dry.h5 --friction 0.1 --friction 0.2 --json
   memscal compare sensor.apparatus.h5 dry.h5 --loading incremental --interface --macroscopic 1.6
   memscal compare sensor.apparatus.h5 dry.h5 --reference fem0.h5 --reference fem03.h5
+  memscal compare shear.apparatus.h5 dry.stress.h5 --channel xz
 """
 
 
@@ -79,6 +81,10 @@ Examples:
 )
 @option("--macroscopic-uncertainty", Quantity("ratio", open_low=False), metavar="U")(
     "Standard uncertainty (k = 1) of --macroscopic."
+)
+@option("--channel", click.Choice(["zz", "xz", "yz"]), "zz")(
+    "xz or yz: compare the shear that a tangential channel measured, by its own ARTIFACT, with the "
+    "points of one STRESS file (experimental)."
 )
 @option("--interface", is_flag=True)(
     "Also explain the profiles by an interface that yields before it slips, at the "
@@ -115,8 +121,10 @@ def command(
 
     A failed quality check is exit code 1: the results are printed all the same.
     """
-    _check_usage(options)
+    _check_usage(options, scans)
     cache = cache_from(options["cache"], options["no_cache"])
+    if options["channel"] != "zz":
+        return _of_shear(artifact, scans[0], cache, options, as_json=as_json)
 
     from memscal.apparatus import load_apparatus
     from memscal.cli.failures import exit_code_of
@@ -132,7 +140,7 @@ def command(
     if folder is not None:
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
-    inputs, friction = [artifact, *scans, *options["references"]], options["friction"]
+    inputs = [artifact, *scans, *options["references"]]
     outputs = figures = [*single, *named.values()]
     if folder is not None and not folder.is_dir():
         if folder.exists():
@@ -144,7 +152,7 @@ def command(
         comparison = compare(
             data,
             apparatus,
-            friction=sorted({0.0, *friction, math.inf}) if friction else None,
+            friction=_frictions(options),
             loading=options["loadings"] or ("incremental", "total"),
             references=references or None,
             lubricated=options["lubricated"],
@@ -184,7 +192,55 @@ def command(
     return exit_code_of(comparison.checks, failed)
 
 
-def _check_usage(options: Mapping[str, Any]) -> None:
+def _of_shear(
+    artifact: Path, stress: Path, cache: Path | None, options: Mapping[str, Any], *, as_json: bool
+) -> int:
+    """Compare the points of a tangential channel in a file of measured stress."""
+    from memscal.apparatus import load_apparatus
+    from memscal.errors import InputError
+    from memscal.friction.compare import compare_shear
+    from memscal.summaries.comparison import file_json
+
+    apparatus, channel = load_apparatus(artifact), options["channel"]
+    if (of_artifact := apparatus.sensor.channel) != channel:
+        problem = f"The artifact {artifact} is of channel {of_artifact}, not of {channel}."
+        cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
+        raise InputError(problem, cure=cure)
+    settings = {"friction": _frictions(options), "loading": options["loadings"]}
+    with out.working("Comparing with calculated contacts"):
+        comparison = compare_shear(
+            stress,
+            apparatus,
+            override=options["override"],
+            cache=cache,
+            workers=min(2, os.cpu_count() or 1),
+            **{name: value for name, value in settings.items() if value},
+        )
+    if as_json:
+        out.emit_json(comparison.to_dict() | {"artifact": file_json(apparatus.source)})
+    else:
+        out.emit_tables(*comparison.tables())
+    out.show_messages(comparison.messages)
+    return DONE
+
+
+def _frictions(options: Mapping[str, Any]) -> list[float] | None:
+    """Return the coefficients that are asked for, between none and full stick."""
+    return sorted({0.0, *options["friction"], math.inf}) if options["friction"] else None
+
+
+#: Options that the comparison of a shear does not have.
+_NOT_OF_SHEAR = ("references", "lubricated", "macroscopic", "interface", "single", "folder")
+
+
+def _check_usage(options: Mapping[str, Any], scans: Sequence[Path]) -> None:
+    if options["channel"] != "zz":
+        if len(scans) > 1:
+            raise click.UsageError(f"--channel {options['channel']} takes one STRESS file.")
+        if given := [name for name in _NOT_OF_SHEAR if options[name]]:
+            named = {"references": "reference", "single": "figure", "folder": "figures"}
+            name = named.get(given[0], given[0])
+            raise click.UsageError(f"--{name} has no effect with --channel {options['channel']}.")
     friction, loadings, macroscopic = (
         options[name] for name in ("friction", "loadings", "macroscopic")
     )

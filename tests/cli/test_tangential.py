@@ -41,3 +41,28 @@ def test_a_method_that_divides_fields_is_refused_by_a_dry_run(run: Run, sheared:
     done = run("calibrate", sheared, "--channel", "xz", "--method", "wiener", "--dry-run")
     done.exits(3, "bayesian")
     assert names(sheared.parent) == ["scan.h5"]
+
+
+def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run, folder: Path):
+    made = memscal.simulate_experiment(
+        friction=0.1, loads=[1.37], lubricated_loads=[1.37], channels=("zz", "xz"), seed=1
+    )
+    for channel in ("zz", "xz"):
+        found = memscal.calibrate(made.rod, channel=channel, method="bayesian").apparatus
+        found.save(folder / f"{channel}.apparatus.h5")
+    measured = memscal.measure_stress(made.dry, folder / "zz.apparatus.h5")
+    measured.save(folder / "dry.stress.h5")
+    options = ("--channel", "xz", "--friction", 0.1, "--loading", "total", "--no-cache")
+    done = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options, "--json")
+    friction = (0.0, 0.1, np.inf)
+    alone = memscal.compare_shear(
+        measured, folder / "xz.apparatus.h5", friction=friction, loading="total"
+    )
+    joint = done.exits(0).json["joint"][0]
+    assert joint["interval"]["low"] == pytest.approx(alone.joint["dry"]["total"].interval.low)
+    run("compare", folder / "zz.apparatus.h5", folder / "dry.stress.h5", *options).exits(
+        3, "of channel zz"
+    )
+    figure = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options,
+                 "--figure", "f.png")  # fmt: skip
+    figure.exits(2, "no effect")
