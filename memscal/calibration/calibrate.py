@@ -26,6 +26,7 @@ from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import loads_differ, require_size, scans_by_load
 from memscal.estimation.reference import (
     at_load_of,
+    expected_spectra,
     film_of,
     is_source,
     press_neo_hookean,
@@ -549,6 +550,7 @@ def _effects(
         others = [alternatives[i] or stress for i, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]
         spectra = reference_spectra(others, points, estimate.model.reference.wavenumbers)
+        spectra = expected_spectra(scans, others, spectra)
     effects = dict(input_effects(scans, solution.stresses, estimate, spectra))
     contacts = all(isinstance(stress, Contact) for stress in solution.stresses)
     if "model_form" in effects and (others or contacts):

@@ -24,7 +24,7 @@ from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
-from memscal.estimation.reference import reference_spectra
+from memscal.estimation.reference import expected_spectra, reference_spectra
 from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
 from memscal.mechanics.contact import BaseStress
 from memscal.model.arrays import FloatArray
@@ -90,7 +90,7 @@ def require_profile(
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     measured = [points.measured_points(scan, channel) for scan in scans]
-    references = reference_spectra(stresses, measured)
+    references = expected_spectra(scans, stresses, reference_spectra(stresses, measured))
     outcome: ProfileEstimate | Exception
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.

@@ -187,6 +187,21 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     return known or press_rod(*expected_film(scan).set_up, scan.rod_friction)
 
 
+def expected_spectra(
+    scans: Sequence[Scan], stresses: Sequence[BaseStress], references: Sequence[RadialSpectrum]
+) -> tuple[RadialSpectrum, ...]:
+    """Move transforms of stresses that are of a film as stated to those of the expected film."""
+    moved = []
+    for scan, stress, reference in zip(scans, stresses, references, strict=True):
+        film, made_on = scan.film, film_of(stress)
+        stated = film is not None and made_on is not None and film.expected != film
+        if stated and film and made_on and film.poisson_ratio == made_on.poisson_ratio:
+            change = _difference(scan, reference, (expected_film(scan), scan))
+            reference = replace(reference, values=reference.values + change)
+        moved.append(reference)
+    return tuple(moved)
+
+
 def expected_film(scan: Scan) -> Scan:
     """Return a scan on the film that is expected, of a Poisson's ratio of at most 1/2."""
     return replace(scan, film=scan.set_up.film.expected)

@@ -110,7 +110,7 @@ class Plan:
     def signal(self) -> float:
         """Voltage to expect with the rod right above the sensor, in V."""
         wavenumbers = Wavenumbers.covering(_LARGEST_KH / self.film.thickness, self.film.thickness)
-        contact = press_rod(self.film, self.rod, self.load)
+        contact = press_rod(self.film.expected, self.rod, self.load)
         spectrum = contact.base_spectrum(wavenumbers.k) * self.kernel.transform(wavenumbers.k)
         peak = RadialSpectrum(wavenumbers, spectrum).at(np.zeros(1))[0]
         return float(self.conversion_constant * peak)
@@ -451,7 +451,7 @@ def design(
     'thickness'
     >>> finer = memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")
     >>> finer.plan.repeats
-    3
+    2
     """
     targets = require_targets(want or {}, vary)
     plan = Plan(

@@ -132,7 +132,7 @@ def test_a_budget_counts_that_poissons_ratio_never_exceeds_one_half() -> None:
     # By the mean and the standard deviation of half a normal distribution.
     assert width.ratio == pytest.approx(1.0, rel=spread_limit(100))
     assert abs(width.mean - width.value) < 4 * width.first_order / np.sqrt(100)
-    assert found.agrees
+    assert width.agrees
 
 
 def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:

@@ -92,7 +92,7 @@ def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
 def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
     found = calibrated(shear_scan(seed=3))
     apparatus, estimate = found.apparatus, found.solution.estimate
-    contact = memscal.indent(apparatus.film, apparatus.indenter, load=1.0)
+    contact = memscal.indent(apparatus.film.expected, apparatus.indenter, load=1.0)
     r = np.linspace(0.0, 30e-3, 1501)
     profile = apparatus.predict(r, contact.base_shear(r))
     side = np.sign(estimate.points.x - estimate.centre[0])

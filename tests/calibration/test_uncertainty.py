@@ -24,8 +24,8 @@ def calibrated(scan, film=LINEAR_FILM, rod=PAPER_ROD):
 
 @pytest.mark.parametrize(("source", "change"), [
     ("thickness", lambda: {"film": replace(LINEAR_FILM, thickness=2.02e-3)}),
-    # Of 0.5 ± 0.005 half a normal distribution is left, with 0.603 of its standard deviation.
-    ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.5 - 0.603 * 0.005)}),
+    # Of 0.5 ± 0.005 half a normal distribution is left: of mean 0.5 - 0.00399, and 0.00301.
+    ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.5 - 0.0070)}),
     ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
 ])  # fmt: skip
 def test_each_input_of_the_reference_counts_what_moving_it_changes(source, change) -> None:

@@ -49,7 +49,7 @@ def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run: Run, artifact: Pat
     memscal.write_scan(replace(scan, u_zz=1.2 * scan.u_zz), folder / "gain.h5")
     done = run("apply", artifact, "gain.h5").exits(CHECK_FAILED)
     assert "FAILED: applied force" in done.out
-    assert "A or the gain of the channel" in done.err
+    assert "gain, load or a unit differ" in done.err
     assert "gain.stress.h5" in names(folder)
 
 

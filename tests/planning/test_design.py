@@ -133,7 +133,7 @@ def reaches(planned: Design, want: dict[str, float]) -> bool:
 
 
 @pytest.mark.parametrize(("want", "vary", "told"), [
-    ({"sigma": 0.01}, "repeats", r"the best is .* of sigma of 2\.4.*\n.*thickness"),
+    ({"sigma": 0.01}, "repeats", r"the best is .* of sigma of 2\.38.*\n.*thickness"),
     ({"A": 0.005}, "step", r"\nload alone contributes 1 %"),
     ({"resolved": 7e3}, "repeats", "passes little"),
     ({"resolved": 20e3}, "half_range", "best is a resolved wavenumber"),

@@ -14,7 +14,7 @@ from memscal.simulation.rod_scan import PAPER_FILM
 
 KERNEL = GaussianMixture(sigmas=(400e-6,))
 QUIET = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
-LINEAR = replace(PAPER_FILM, law="linear")
+LINEAR = replace(PAPER_FILM, law="linear", poisson_ratio_uncertainty=None)
 BOTH = {"channels": ("zz", "xz"), "shear_kernel": KERNEL, "shear_conversion_constant": 4e-8}
 
 
