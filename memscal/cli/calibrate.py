@@ -232,6 +232,9 @@ def calibration_settings(
     "Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
     "scatters with the budget of uncertainties. Each draw is calibrated like the scan."
 )
+@option("--compact", is_flag=True)(
+    "Leave G over the plane out of the artifact where it is round, which halves its size."
+)
 @force_option
 @option("--dry-run", is_flag=True)(
     "Read and check every input, print what would be done, and write nothing."
@@ -248,6 +251,7 @@ def command(
     sweeping: bool,
     sweep_figure: Path | None,
     draws: int | None,
+    compact: bool,
     force: bool,
     dry_run: bool,
     **settings: Any,
@@ -296,7 +300,8 @@ def command(
         contents |= out.rendered(calibration.plot, figures)
         if sweep_figure is not None:
             contents |= out.rendered(further["sweep"].plot, [sweep_figure])
-    calibration.apparatus.save(output, overwrite=force)
+    apparatus = calibration.apparatus.compact() if compact else calibration.apparatus
+    apparatus.save(output, overwrite=force)
     out.write_files(contents, force=force)
     return _show(calibration, further, outputs, as_json)
 

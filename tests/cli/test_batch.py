@@ -127,8 +127,11 @@ def test_what_fails_is_a_row_and_failed_checks_have_an_artifact(results: Path) -
     kept = rows[rows["artifact"].notna()]
     assert not kept["passed"].any()
     assert set(kept["place"]) == set(rows["place"][~rows["passed"]]) - set(errors["place"])
-    a = memscal.load_apparatus(results / kept["artifact"][DRIFTING]).conversion_constant
-    assert a * 1e3 == pytest.approx(kept["conversion_constant"][DRIFTING], rel=1e-9)
+    apparatus = memscal.load_apparatus(results / kept["artifact"][DRIFTING])
+    assert apparatus.plane is None
+    assert apparatus.conversion_constant * 1e3 == pytest.approx(
+        kept["conversion_constant"][DRIFTING], rel=1e-9
+    )
 
 
 def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
