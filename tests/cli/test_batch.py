@@ -250,7 +250,7 @@ def test_a_summary_as_json_is_that_of_the_tables(results: Path, folder: Path, ru
     assert told["checks"] == {name: failed.count(name) for name in failed}
     (reason,) = [o["reason"] for o in told["outliers"] if o["path"] == f"scans/s{LARGE}.h5"]
     z = (a[LARGE] - a.median()) / spread
-    assert reason.startswith(f"A {z:.1f} above the median")
+    assert reason.startswith(f"A {z:.1f} deviations above the median")
     assert json.dumps(told)
 
 
