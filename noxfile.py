@@ -105,6 +105,13 @@ def coverage(session: nox.Session) -> None:
 
 
 @nox.session
+def judges(session: nox.Session) -> None:
+    """Have other programs validate the files that the built wheel writes."""
+    with outside_the_checkout(session, requirements=group("judges")):
+        run_pytest(session, "-m", "judges", "tests/judges", *session.posargs)
+
+
+@nox.session
 def lint(session: nox.Session) -> None:
     """Check style, formatting, spelling, and the set-up of the repository itself."""
     session.install(*group("lint"))

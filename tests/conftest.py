@@ -12,7 +12,10 @@ for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
 import pytest  # noqa: E402
+from helpers.nexus import definitions_folder, structure, violations  # noqa: E402
 from hypothesis import settings  # noqa: E402
+
+from memscal.formats.hdf5 import writer  # noqa: E402
 
 # A deadline is a clock: on a busy machine it would fail what is right.
 settings.register_profile("memscal", deadline=None, print_blob=True)
@@ -42,6 +45,27 @@ def seed() -> int:
     value = secrets.randbits(32)
     logging.getLogger(__name__).info("seed %d", value)
     return value
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _every_file_is_valid(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Validate the files that tests write against our application definitions."""
+    encode, seen = writer.tree_to_bytes, set[frozenset[str]]()
+    folder = tmp_path_factory.mktemp("nexus")
+
+    def validated(root: writer.Group) -> bytes:
+        data, layout = encode(root), structure(root)
+        if layout not in seen and root.attributes.get(writer.SCHEMA_ATTRIBUTE) in writer.DEFINED:
+            if not seen:
+                definitions_folder(folder / "definitions")
+            seen.add(layout)
+            (folder / "written.h5").write_bytes(data)
+            assert violations(folder / "written.h5", folder / "definitions") == []
+        return data
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(writer, "tree_to_bytes", validated)
+        yield
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -285,12 +285,16 @@ def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | Non
     return read_film(file, film) if file.has(film) else None, rod_or_sphere
 
 
+#: NeXus has samples and sensors say what moves them: nothing here, the indenter moves.
+_NOWHERE = {"depends_on": "."}
+
+
 def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
     stated = {"lubrication": lubrication, "lubricant": lubricant}
     contact = write_record(records.SAMPLE, stated).children
     of = {} if film is None else {"film": write_record(records.FILM, film)}
-    return Group("NXsample", {**of, **contact})
+    return Group("NXsample", {**of, **contact, **_NOWHERE})
 
 
 def indenter_group(
@@ -337,7 +341,9 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(sensor: StressSensor) -> Group:
     """Return the NXinstrument that holds the sensor."""
-    return Group("NXinstrument", {"stress_sensor": write_record(records.SENSOR, sensor)})
+    group = write_record(records.SENSOR, sensor)
+    group = replace(group, children={**group.children, **_NOWHERE})
+    return Group("NXinstrument", {"stress_sensor": group})
 
 
 def read_sensor(file: SafeFile, path: str) -> StressSensor:

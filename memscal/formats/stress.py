@@ -30,11 +30,11 @@ _CHANNELS = ("zz", "xz", "yz")
 _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 
-def _read_points(file: SafeFile, path: str, of: Reading) -> dict[str, MeasuredPoints]:
+def _read_points(file: SafeFile, name: str, of: Reading) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
     points: dict[str, MeasuredPoints] = {}
     for channel in _CHANNELS:
-        if file.has(group := f"{path}/points_{channel}"):
+        if file.has(group := f"/entry/points_{channel}/{name}"):
             stored = read_record(points_record(channel).read_in(of), file, group)
             points[channel] = MeasuredPoints(**{"noise": None} | stored)
     return points
@@ -172,6 +172,7 @@ def _entry(measured: MeasuredStress) -> Group:
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", list(profiles)),
         **profiles,
+        **_beside(measured.profiles),
         "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **of_artifact),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
@@ -202,26 +203,35 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     numbers = dict(write_record(records.STRESS_NUMBERS.read_in(of), _numbers(profile)).children)
     # What not every profile has comes last.
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
-    if profile.curve_r.size:
-        optional["curve"] = write_record(records.STRESS_CURVE, profile)
-    by_source = profile.covariances.items()
-    covariances = {_PREFIX + source: si(c, "stress squared", _AXES) for source, c in by_source}
-    points = {
-        f"points_{channel}": write_record(points_record(channel).read_in(of), of_channel)
-        for channel, of_channel in profile.points.items()
-    }
-    budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
     children: dict[str, Node] = {
         **arrays.children,
-        "sources": to_json("sources", list(profile.covariances)),
-        **covariances,
         "scan": writer.count(scans.index(profile.scan) + 1),
         **numbers,
-        "budget": groups.budget_group(budget, _BUDGET),
-        **points,
         **optional,
     }
     return replace(arrays, children=children)
+
+
+def _beside(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
+    """Return covariances, budgets, fitted curves and points of all profiles."""
+    # Apart from the profiles: programs that read NeXus take a NXdata within another for its signal.
+    groups_of: dict[str, dict[str, Node]] = {}
+    for i, profile in enumerate(profiles, 1):
+        of, name = profile.scan.reading, f"profile_{i}"
+        covariance = write_record(records.STRESS_COVARIANCE, profile)
+        by_source = profile.covariances.items()
+        parts = {_PREFIX + source: si(c, "stress squared", _AXES) for source, c in by_source}
+        sources = {"sources": to_json("sources", list(profile.covariances))}
+        covariance = replace(covariance, children={**covariance.children, **parts, **sources})
+        budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
+        groups_of.setdefault("covariances", {})[name] = covariance
+        groups_of.setdefault("budgets", {})[name] = groups.budget_group(budget, _BUDGET)
+        if profile.curve_r.size:
+            groups_of.setdefault("curves", {})[name] = write_record(records.STRESS_CURVE, profile)
+        for channel, points in profile.points.items():
+            group = write_record(points_record(channel).read_in(of), points)
+            groups_of.setdefault(f"points_{channel}", {})[name] = group
+    return {name: Group("NXcollection", of_profiles) for name, of_profiles in groups_of.items()}
 
 
 def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
@@ -235,22 +245,28 @@ def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
     return numbers
 
 
+def _beside_or_in(file: SafeFile, group: str, name: str, within: str) -> str:
+    """Return where a part of a profile stands: version 1.0 held it within the profile."""
+    return beside if file.has(beside := f"/entry/{group}/{name}") else within
+
+
 def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProfile:
     arrays = read_record(records.STRESS_PROFILE, file, path)
-    n = arrays["r"].size
-    sources = text_list(file, f"{path}/sources")
+    n, name = arrays["r"].size, path.rpartition("/")[2]
+    of_covariance = _beside_or_in(file, "covariances", name, path)
+    sources = text_list(file, f"{of_covariance}/sources")
     of_sources = [
         Quantity(_PREFIX + name, "stress squared", axes=_AXES, required=True) for name in sources
     ]
-    stored = read_record(record("NXdata", *of_sources), file, path, sizes={"r": n})
-    budget = groups.read_budget(file, f"{path}/budget")
+    stored = read_record(record("NXdata", *of_sources), file, of_covariance, sizes={"r": n})
+    budget = groups.read_budget(file, _beside_or_in(file, "budgets", name, f"{path}/budget"))
     if not sources or not budget.keys() >= _BUDGET.keys():
         problem = f"{file.where(path)} states no covariance of its stress, or no budget."
         raise FormatError(problem, why="Measured stress without uncertainty means little.")
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
     profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
-    if file.has(f"{path}/curve"):
-        profile |= read_record(records.STRESS_CURVE, file, f"{path}/curve")
+    if file.has(curve := _beside_or_in(file, "curves", name, f"{path}/curve")):
+        profile |= read_record(records.STRESS_CURVE, file, curve)
     for end in ("", "_uncertainty"):
         across = profile.get(f"centre_y{end}", 0.0)
         profile[f"centre{end}"] = np.array([profile[f"centre{end}"], across])
@@ -262,5 +278,5 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
         covariances={source: stored[f"{_PREFIX}{source}"] for source in sources},
         force_budget=budget["force"],
         maximum_budget=budget["maximum"],
-        points=_read_points(file, path, scan.reading),
+        points=_read_points(file, name, scan.reading),
     )

@@ -157,7 +157,7 @@ KERNEL_CHANGES = record(
         required=True,
         stored="changes",
     ),
-    signal="kernel_changes",
+    signal="changes",
 )
 """Changes of A G over A by one standard uncertainty of each input, in the order of names."""
 RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="g")
@@ -212,13 +212,18 @@ PROCESS = record(
 STRESS_PROFILE = record(
     "NXdata",
     Quantity("r", _L, "distance from the centre", "r", _R, required=True),
-    Quantity("r", _L, "distance from the centre", axes=("r_prime",), stored="r_prime"),
     Quantity("x", _L, "position along x", "x", _R, required=True),
     Quantity("y", _L, "position along y", "y", _R),
     Quantity("s_zz", _P, "measured normal stress", "S_zz", _R, required=True),
     Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R, required=True),
-    Quantity("covariance", "stress squared", "covariance of S_zz", axes=_RR, required=True),
     signal="s_zz",
+)
+STRESS_COVARIANCE = record(
+    "NXdata",
+    STRESS_PROFILE.quantities[0],
+    Quantity("r", _L, "distance from the centre", axes=("r_prime",), stored="r_prime"),
+    Quantity("covariance", "stress squared", "covariance of S_zz", axes=_RR, required=True),
+    signal="covariance",
 )
 STRESS_NUMBERS = record(
     "NXdata",
@@ -254,7 +259,7 @@ def points_record(channel: str) -> Record:
         "NXdata",
         Quantity("x", _L, "position along x", axes=point, required=True),
         Quantity("y", _L, "position along y", axes=point, required=True),
-        Quantity("x_errors", _L, axes=point, required=True, stored="position_errors"),
+        Quantity("x_errors", _L, axes=point, required=True),
         Quantity("u", _U, "voltage", axes=point, required=True, stored=u),
         Quantity("weight", _ONE, axes=point, required=True, stored="outlier_weight"),
         Quantity("load", "force", axes=point, required=True, stored="normal_load"),

@@ -81,7 +81,7 @@ def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path: Path):
 
 
 def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path):
-    write_tree(file_tree("memscal-scan", Group("NXentry", {"key": KEY})), entry(tmp_path))
+    write_tree(file_tree("another-kind", Group("NXentry", {"key": KEY})), entry(tmp_path))
     assert find_contact_table(tmp_path, KEY) is None
     keep_contact_table(tmp_path, KEY, table())
     with h5py.File(entry(tmp_path), "r+") as file:

@@ -26,6 +26,8 @@ REFERENCE_SCHEMA = "memscal-reference"
 ARTIFACT_SCHEMA = "memscal-artifact"
 STRESS_SCHEMA = "memscal-stress"
 SCHEMA_VERSION = "1.1.0"
+#: Those with an application definition, in ``formats/definitions``.
+DEFINED = (SCAN_SCHEMA, REFERENCE_SCHEMA, ARTIFACT_SCHEMA, STRESS_SCHEMA)
 
 SCHEMA_ATTRIBUTE = "memscal_schema"
 VERSION_ATTRIBUTE = "memscal_schema_version"
@@ -48,6 +50,14 @@ class Number:
 
 
 @dataclass(frozen=True, eq=False)
+class Text:
+    """A string with attributes; one without is a plain ``str``."""
+
+    value: str
+    attributes: Mapping[str, Attribute]
+
+
+@dataclass(frozen=True, eq=False)
 class Group:
     """A NeXus group: its class, children by name, and attributes."""
 
@@ -65,7 +75,7 @@ class Group:
         return attributes
 
 
-Node = Group | Number | str
+Node = Group | Number | Text | str
 
 
 def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
@@ -142,13 +152,14 @@ def content_digest(items: Iterable[DigestItem]) -> str:
 def _attributes(node: Node) -> dict[str, Any]:
     if isinstance(node, Group):
         return node.all_attributes
-    return {"units": node.units, **node.attributes} if isinstance(node, Number) else {}
+    units = {"units": node.units} if isinstance(node, Number) else {}
+    return {} if isinstance(node, str) else {**units, **node.attributes}
 
 
 def _canonical(value: Any) -> tuple[str, list[int], bytes | memoryview]:
     if value is None or isinstance(value, Group):
         return "group", [], b""
-    if isinstance(value, str):
+    if isinstance(value, (str, Text)):
         return "text", [], _plain_text(value)
     value = value.values if isinstance(value, Number) else value
     kind = "integer" if value.dtype.kind in "iu" else "float"
@@ -166,8 +177,11 @@ _COMPRESSION = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chu
 
 
 def file_tree(schema: str, entry: Group) -> Group:
-    """Return the root of a file around its entry: schema, contents list and digest."""
+    """Return the root of a file around its entry: schema, definition, contents and digest."""
     schemas = {SCHEMA_ATTRIBUTE: schema, VERSION_ATTRIBUTE: SCHEMA_VERSION}
+    if schema in DEFINED:
+        definition = Text(f"NX{schema.replace('-', '_')}", {"version": SCHEMA_VERSION})
+        entry = replace(entry, children={"definition": definition, **entry.children})
     root = Group("NXroot", {"entry": entry}, {"default": "entry", **schemas})
     listed = _with_contents(root, "")
     # The list names itself, so it is made once with a place for itself and once in full.
@@ -199,7 +213,11 @@ def tree_to_bytes(root: Group) -> bytes:
             elif isinstance(node, Number):
                 _write_number(file, path, node)
             else:
-                file.create_dataset(path, data=_plain_text(node), dtype=_TEXT, track_times=False)
+                text = file.create_dataset(
+                    path, data=_plain_text(node), dtype=_TEXT, track_times=False
+                )
+                for name, value in _attributes(node).items():
+                    _write_attribute(text, name, value)
         _attach_scales(file, root)
     return memory.getvalue()
 
@@ -230,7 +248,8 @@ def _write_attribute(item: Any, name: str, value: Attribute) -> None:
         item.attrs.create(name, _plain_text(value), dtype=_TEXT)
 
 
-def _plain_text(text: str) -> bytes:
+def _plain_text(text: str | Text) -> bytes:
+    text = text.value if isinstance(text, Text) else text
     return printable(text, len(text)).encode("utf-8", "replace")
 
 
