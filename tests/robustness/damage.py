@@ -1,0 +1,266 @@
+"""Damage to valid files: bytes, values of HDF5 with the digest made anew, cells of tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from hypothesis import strategies as st
+
+from memscal.formats.hdf5.writer import CONTENTS_PATH, DIGEST_ATTRIBUTE, content_digest
+
+NUMBERS = (
+    0.0, -0.0, 1.0, -1.0, 1e-9, 1e9, 1e-297, 1e200, 1e303, 1e308, 5e-324, float("nan"),
+    float("inf"), float("-inf"),
+)  # fmt: skip
+SHAPES = ((), (0,), (1,), (2,), (7,), (7, 1), (1, 7), (3, 3), (2, 2, 2), (1, 1, 1, 1, 1))
+TYPES = ("f2", "f4", "f8", ">f8", "i1", "u1", "i8", "u8", "bool", "c16", "S4", "O")
+UNITS = (
+    "", "1", "m", "mm", "km", "furlong", "um", "µm", "mV", "V", "pA", "Pa", "N", "kN", "rad/mm",
+    "1/mm^2", "degC", "m/0", "m**1e9", "((((", "1e400 m", "__import__", "\x1b[2J", "x" * 5000,
+)  # fmt: skip
+TEXTS = (
+    "", " ", "NaN", "Infinity", "null", "[]", "{}", "[1e999]", '{"a":', '["a", "a"]', "[" * 5000,
+    '{"A": NaN}', "-1", "rod", "sphere", "1.0.0", "9.9.9", "../../etc", "a/b", "\x1b]0;x\x07",
+    "\u202e\u2066", "x" * 100_000,
+)  # fmt: skip
+CELLS = (
+    "", " ", "nan", "NaN", "inf", "-inf", "1e999", "1,5", "1.5.2", "0x10", '"', '"1"', "'", "=1+1",
+    "1e-400", "-1", "1e200", "\x00", "µ", "\ufeff", "9" * 400, "TRUE", "#N/A", "1\t2",
+)  # fmt: skip
+
+
+class ByteChange(NamedTuple):
+    """A change of bytes: where (a share of the file), what, and how much."""
+
+    kind: str
+    where: float
+    size: int
+    value: int
+
+
+BYTES = st.lists(
+    st.builds(
+        ByteChange,
+        st.sampled_from(("flip", "set", "delete", "insert", "repeat", "truncate", "zero")),
+        st.floats(0, 1),
+        st.integers(1, 64),
+        st.integers(0, 255),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+def change_bytes(data: bytes, changes: Sequence[ByteChange]) -> bytes:
+    """Return data with changes of bytes."""
+    for kind, where, size, value in changes:
+        at = int(where * max(len(data) - 1, 0))
+        before, piece, after = data[:at], data[at : at + size], data[at + size :]
+        data = {
+            "flip": before + bytes(b ^ (1 << value % 8) for b in piece[:1]) + piece[1:] + after,
+            "set": before + bytes([value]) * len(piece) + after,
+            "delete": before + after,
+            "insert": before + bytes([value]) * size + piece + after,
+            "repeat": before + piece * 3 + after,
+            "truncate": before,
+            "zero": before + bytes(len(piece)) + after,
+        }[kind]
+    return data
+
+
+class Edit(NamedTuple):
+    """An edit of an HDF5 file: what is done to the item of a number, with what."""
+
+    kind: str
+    item: int
+    number: float
+    shape: tuple[int, ...]
+    dtype: str
+    text: str
+    unit: str
+
+
+EDITS = st.lists(
+    st.builds(
+        Edit,
+        st.sampled_from((
+            "scale", "fill", "element", "replace", "units", "units", "text", "delete", "attribute",
+            "drop attribute", "group", "sparse", "chunks",
+        )),
+        st.integers(0, 10_000),
+        st.sampled_from(NUMBERS),
+        st.sampled_from(SHAPES),
+        st.sampled_from(TYPES),
+        st.sampled_from(TEXTS),
+        st.sampled_from(UNITS),
+    ),
+    min_size=1,
+    max_size=4,
+)  # fmt: skip
+
+
+def edit_hdf5(data: bytes, edits: Sequence[Edit], *, digest: bool) -> bytes:
+    """Return an HDF5 file with edits; with ``digest`` it states that of what it then holds."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "edited.h5")
+        path.write_bytes(data)
+        with h5py.File(path, "r+", libver=("earliest", "v110")) as file:
+            for edit in edits:
+                _edit(file, edit)
+            if digest and DIGEST_ATTRIBUTE in file.attrs:
+                _sign(file)
+        return path.read_bytes()
+
+
+def _items(file: h5py.File) -> list[str]:
+    paths: list[str] = []
+    file.visit(lambda name: paths.append(f"/{name}"))
+    return [path for path in paths if not path.startswith("/entry/contents")]
+
+
+def _edit(file: h5py.File, edit: Edit) -> None:
+    paths = _items(file)
+    datasets = [path for path in paths if isinstance(file[path], h5py.Dataset)]
+    numbers = [path for path in datasets if file[path].dtype.kind in "fiu"]
+    chosen = {"text": [p for p in datasets if p not in numbers], "delete": paths}
+    chosen |= {"attribute": ["/", *paths], "drop attribute": ["/", *paths], "group": datasets}
+    among = chosen.get(edit.kind, numbers)
+    if not among:
+        return
+    path = among[edit.item % len(among)]
+    item = file[path]
+    with np.errstate(all="ignore"):
+        if edit.kind == "scale":
+            item[...] = np.nan_to_num(item[()] * edit.number).astype(item.dtype)
+        elif edit.kind == "fill":
+            item[...] = _as(edit.number, item.dtype)
+        elif edit.kind == "element" and item.size:
+            values = item[()].reshape(-1)
+            values[edit.item % values.size] = _as(edit.number, item.dtype)
+            item[...] = values.reshape(item.shape)
+        elif edit.kind in ("replace", "sparse", "chunks"):
+            _replace(file, path, edit)
+        elif edit.kind == "units":
+            item.attrs["units"] = edit.unit
+        elif edit.kind == "text":
+            del file[path]
+            file[path] = edit.text.replace("\x00", "")
+        elif edit.kind in ("delete", "group"):
+            del file[path]
+            if edit.kind == "group":
+                file.create_group(path)
+        elif edit.kind == "attribute":
+            names = sorted(set(item.attrs) - {DIGEST_ATTRIBUTE}) or ["units"]
+            item.attrs[names[edit.item % len(names)]] = edit.text[:1000].replace("\x00", "")
+        elif edit.kind == "drop attribute" and (names := sorted(item.attrs)):
+            del item.attrs[names[edit.item % len(names)]]
+
+
+def _as(number: float, dtype: np.dtype[Any]) -> Any:
+    return number if dtype.kind == "f" else int(np.clip(np.nan_to_num(number), 0, 100))
+
+
+def _replace(file: h5py.File, path: str, edit: Edit) -> None:
+    attributes = dict(file[path].attrs)
+    of, name = file[path].parent, path.rpartition("/")[2]
+    del file[path]
+    shape, options = edit.shape, {}
+    if edit.kind == "sparse":  # claims much, and holds nothing
+        shape, options = (2**27, 3), {"chunks": (2**12, 3), "compression": "gzip"}
+    elif edit.kind == "chunks":
+        shape, options = (40,), {"chunks": (20,), "compression": "gzip", "shuffle": True}
+    dtype: Any = h5py.string_dtype() if edit.dtype == "O" else edit.dtype
+    made = of.create_dataset(name, shape, dtype, **options)
+    if edit.kind != "sparse" and np.dtype(made.dtype).kind in "fiu" and made.size:
+        made[...] = _as(min(max(np.nan_to_num(edit.number), -6e4), 6e4), made.dtype)
+    for key in attributes.keys() & {"units"}:
+        made.attrs[key] = attributes[key]
+
+
+def _sign(file: h5py.File) -> None:
+    """Have the file state its digest and the list of its contents, as its writer would."""
+    contents = {"/": sorted(set(file.attrs) - {DIGEST_ATTRIBUTE})}
+    for path in [*_items(file), "/entry/contents"]:
+        names = set(file[path].attrs) - {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}
+        contents[path] = sorted(names)
+    for path in [p for p in file.get("/entry/contents", ()) if p != "data"]:
+        contents[f"/entry/contents/{path}"] = []
+    contents[CONTENTS_PATH] = []
+    text = json.dumps(contents, sort_keys=True)
+    if CONTENTS_PATH in file:
+        del file[CONTENTS_PATH]
+    file[CONTENTS_PATH] = text
+    found = []
+    for path, names in sorted(contents.items()):
+        item = file[path]
+        value = None
+        if isinstance(item, h5py.Dataset):
+            value = item[()]
+            text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+            value = text if isinstance(text, str) else np.asarray(value)
+            if not isinstance(value, str) and value.dtype.kind not in "fiub":
+                return  # no digest covers it
+        attributes = {name: _plain(item.attrs[name]) for name in names}
+        found.append((path, value, attributes))
+    file.attrs[DIGEST_ATTRIBUTE] = content_digest(found)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return tuple(map(_plain, value))
+    return value.item() if isinstance(value, np.generic) else value
+
+
+class CellChange(NamedTuple):
+    """A change of the text of a table."""
+
+    kind: str
+    row: int
+    column: int
+    text: str
+
+
+TABLE = st.lists(
+    st.builds(
+        CellChange,
+        st.sampled_from((
+            "cell", "cell", "drop", "double", "insert", "separator", "encoding", "line ends",
+        )),
+        st.integers(0, 100),
+        st.integers(0, 5),
+        st.sampled_from(CELLS),
+    ),
+    min_size=1,
+    max_size=5,
+)  # fmt: skip
+
+
+def change_table(data: bytes, changes: Sequence[CellChange]) -> bytes:
+    """Return a table of text with changes of cells, rows, separators or encoding."""
+    lines, end, encoding = data.decode().splitlines(), "\n", "utf-8"
+    for kind, row, column, text in changes:
+        row %= max(len(lines), 1)
+        cells = lines[row].split(",") if lines else [""]
+        if kind == "cell" and lines:
+            cells[column % len(cells)] = text
+            lines[row] = ",".join(cells)
+        elif kind in ("drop", "double") and lines:
+            lines[row : row + 1] = [] if kind == "drop" else [lines[row]] * 2
+        elif kind == "insert":
+            lines.insert(row, text)
+        elif kind == "separator":
+            lines = [line.replace(",", (";", "\t", " ", "|")[column % 4]) for line in lines]
+        elif kind == "encoding":
+            encoding = ("utf-16", "utf-8-sig", "latin-1", "utf-32")[column % 4]
+        else:
+            end = ("\r\n", "\r", "\n\n", "\x0b")[column % 4]
+    return end.join(lines).encode(encoding, "replace")
+
+
+Damage = Callable[[bytes], bytes]

@@ -1,0 +1,165 @@
+"""Damaged inputs, drawn by hypothesis: each is read or refused, in little time and memory.
+
+The whole campaign (``nox --session robustness``) draws a hundred times as many.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import resource
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from helpers.builders import make_artifact, make_profile, make_scan
+from helpers.console import names
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from robustness.damage import (
+    BYTES,
+    EDITS,
+    TABLE,
+    change_bytes,
+    change_table,
+    edit_hdf5,
+)
+
+import memscal
+from memscal.cli import main
+from memscal.formats.artifact import write_artifact
+from memscal.formats.reference import write_reference
+from memscal.formats.scan import write_scan
+
+#: How many times as many inputs as in reduced form; ``nox --session robustness`` draws the whole.
+FACTOR = int(os.environ.get("MEMSCAL_ROBUSTNESS") or 1)
+#: Documented exit codes: done, a check failed, usage, input refused, output not written.
+CODES = {0, 1, 2, 3, 4}
+SECONDS, GIBIBYTE = 20.0, 2**30
+COUNTS: Counter[str] = Counter()
+
+
+def drawn(reduced: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Settings of a test that draws so many inputs in reduced form."""
+    return settings(
+        max_examples=FACTOR * reduced,
+        deadline=None,
+        database=None,
+        phases=(Phase.explicit, Phase.generate),  # to shrink a failure takes longer than to read it
+        suppress_health_check=list(HealthCheck),
+    )
+
+
+@contextlib.contextmanager
+def little_memory() -> Iterator[None]:
+    """Bound what this process may take beyond what it holds."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (held + GIBIBYTE, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+class Good(dict[str, bytes]):
+    """The bytes of a good file of each kind, which a failing example does not print."""
+
+    def __repr__(self) -> str:
+        return "good"
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Good:
+    """The bytes of a good file of each kind."""
+    folder = tmp_path_factory.mktemp("good")
+    experiment = Path(__file__).parents[2] / "calibration_data" / "sphere_experiment"
+    # Of a linear film a rod that is not in the table is solved in milliseconds.
+    film = memscal.ElasticFilm(
+        young_modulus=2.2e6, poisson_ratio=0.48, thickness=2e-3, law="linear"
+    )
+    scan = memscal.simulate(noise=0.005, seed=1, points=33, film=film)
+    apparatus = memscal.calibrate(scan).apparatus
+    contact = memscal.read_scan(experiment / "sphere_dry.h5")
+    memscal.measure_stress(contact, apparatus, override=True).save(folder / "stress")
+    write_scan(scan, folder / "scan")
+    write_scan(make_scan("raster"), folder / "raster")
+    write_scan(make_scan("points"), folder / "points")
+    write_reference(make_profile(), folder / "reference")
+    write_artifact(make_artifact(), folder / "artifact")
+    apparatus.compact().save(folder / "compact")
+    rows = zip(scan.x * 1e3, scan.u_zz * 1e3, strict=True)
+    lines = ["x (mm),u_zz (mV)", *(f"{x:.4f},{u:.6f}" for x, u in rows)]
+    (folder / "table").write_text("\n".join(lines))
+    meshes = Path(__file__).parents[1] / "formats" / "data"
+    (folder / "mesh").write_bytes((meshes / "getfem_film.vtu").read_bytes())
+    return Good({path.name: path.read_bytes() for path in folder.iterdir()})
+
+
+def survives(folder: Path, data: bytes, *commands: tuple[str, ...], name: str = "in.h5") -> None:
+    """Run commands on a damaged file, and look at what each leaves."""
+    for path in folder.iterdir():
+        path.unlink()
+    (folder / name).write_bytes(data)
+    for command in commands:
+        said, shown = io.StringIO(), io.StringIO()
+        start = time.process_time()
+        with warnings.catch_warnings(), contextlib.chdir(folder), little_memory():
+            # What a user would see of numpy, scipy or h5py.
+            warnings.simplefilter("error")
+            with contextlib.redirect_stderr(said), contextlib.redirect_stdout(shown):
+                code = main([*command])
+        words = said.getvalue() + shown.getvalue()
+        COUNTS[f"{command[0]}: exit {code}"] += 1
+        assert code in CODES, f"{command}: exit {code}\n{words[-3000:]}"
+        assert "Traceback" not in words, words[-3000:]
+        assert "\x1b" not in words, words[-1000:]
+        assert time.process_time() - start < SECONDS, f"{command} took too long"
+        assert (folder / name).read_bytes() == data
+        written = {*names(folder)} - {name}
+        assert not written or code in (0, 1), f"{command} left {written}"
+        for path in written:
+            (folder / path).unlink()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for the damaged file and what is made of it."""
+    return tmp_path_factory.mktemp("damaged")
+
+
+LOOKED_AT = (("check", "in.h5"), ("inspect", "in.h5", "--json"))
+USED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "scan": (("calibrate", "in.h5", "-o", "out.h5"),),
+    "raster": (("calibrate", "in.h5", "--dry-run"),),
+    "points": (("calibrate", "in.h5", "--dry-run"),),
+    "reference": (),
+    "artifact": (),
+    "compact": (),
+    "stress": (),
+}
+
+
+@drawn(40)
+@given(kind=st.sampled_from(sorted(USED)), changes=BYTES)
+def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
+    survives(folder, change_bytes(good[kind], changes), *LOOKED_AT, *USED[kind])
+
+
+@drawn(100)
+@given(kind=st.sampled_from(sorted(USED)), edits=EDITS, digest=st.booleans())
+def test_edited_values_are_read_or_refused(good, folder, kind, edits, digest) -> None:
+    data = edit_hdf5(good[kind], edits, digest=digest)
+    survives(folder, data, *LOOKED_AT, *USED[kind])
+
+
+@drawn(60)
+@given(changes=st.one_of(TABLE, BYTES))
+def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
+    change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
+    run = ("import", "in.csv", "-o", "out.h5", "--x", "x", "--u", "u_zz", "--load", "1")
+    survives(folder, change(good["table"], changes), run, name="in.csv")

@@ -1,0 +1,153 @@
+"""Runs that are killed or told to end, full disks, flipped bits: outputs are whole or not there.
+
+The whole campaign is ``nox --session robustness``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from helpers.builders import make_artifact, make_scan
+from helpers.console import names, run_program
+
+import memscal
+from memscal.errors import MemscalError
+from memscal.formats.artifact import write_artifact
+from memscal.formats.inspection import check, describe
+from memscal.formats.scan import write_scan
+
+FACTOR = int(os.environ.get("MEMSCAL_ROBUSTNESS") or 1)
+COMMAND = ("calibrate", "scan.h5", "-o", "out.h5", "--figure", "out.png", "--report", "out.html")
+OUTPUTS = {"out.h5", "out.png", "out.html"}
+#: What the shell says of a process that a signal has ended, and what the program says.
+CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a scan."""
+    write_scan(memscal.simulate(noise=0.005, seed=1, points=33), tmp_path / "scan.h5")
+    return tmp_path
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "memscal", *arguments],
+        cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def timed(folder: Path) -> float:
+    """How long a run takes; what it writes is removed."""
+    begin = time.monotonic()
+    process = start(folder, *COMMAND)
+    process.communicate()
+    assert process.returncode in (0, 1)
+    for name in OUTPUTS:
+        (folder / name).unlink()
+    return time.monotonic() - begin
+
+
+def interrupted(folder: Path, number: signal.Signals, delay: float) -> tuple[int, str]:
+    """Run the command, send a signal after a while; return exit code and messages."""
+    process = start(folder, *COMMAND)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(delay)
+    process.send_signal(number)
+    said = process.communicate()[1]
+    return process.returncode, said
+
+
+def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
+    folder: Path, seed: int
+) -> None:
+    draw, whole = random.Random(seed), timed(folder)
+    for _ in range(6 * FACTOR):
+        code, _ = interrupted(folder, signal.SIGKILL, draw.uniform(0, 1.1 * whole))
+        assert code in (0, 1, -signal.SIGKILL)
+        for name in OUTPUTS & {*names(folder)}:
+            path = folder / name
+            assert path.stat().st_size > 1000
+            if name.endswith(".h5"):
+                assert all(finding.passed for finding in check(path))
+            path.unlink()
+    process = start(folder, *COMMAND)
+    process.communicate()
+    assert process.returncode in (0, 1)
+    assert {*names(folder)} == OUTPUTS | {"scan.h5"}
+
+
+def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder: Path, seed: int) -> None:
+    draw, whole = random.Random(seed), timed(folder)
+    for _ in range(2 * FACTOR):
+        for number, expected in CODES.items():
+            code, said = interrupted(folder, number, draw.uniform(0, whole))
+            # Before its first line of Python runs, the system ends it.
+            assert code in (0, 1, expected, -number), said
+            assert "Traceback" not in said
+            left = {*names(folder)} - {"scan.h5"}
+            assert left == (OUTPUTS if code in (0, 1) else set())
+            for name in left:
+                (folder / name).unlink()
+
+
+@contextlib.contextmanager
+def full_disk(folder: Path, size: int) -> Iterator[Path]:
+    """A small file system, where this process may mount one; otherwise a limit of every file."""
+    disk = folder / "disk"
+    disk.mkdir()
+    options = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", os.fspath(disk)]
+    mounted = subprocess.run(options, check=False, capture_output=True).returncode == 0
+    try:
+        yield disk
+    finally:
+        if mounted:
+            subprocess.run(["umount", os.fspath(disk)], check=True)
+
+
+@pytest.mark.parametrize("kibibytes", [4, 64, 300, 800])
+def test_a_disk_that_fills_leaves_what_was_there(folder: Path, kibibytes: int) -> None:
+    with full_disk(folder, kibibytes * 1024) as disk:
+        old = b"what was there"
+        (disk / "out.h5").write_bytes(old)
+        outputs = [f"disk/out.{kind}" for kind in ("h5", "png", "html")]
+        command = ["calibrate", "scan.h5", "--force", "-o", outputs[0], "--figure", outputs[1]]
+        limit = None if os.path.ismount(disk) else kibibytes * 1024
+        done = run_program(*command, "--report", outputs[2], cwd=folder, limit=limit)
+        assert "Traceback" not in done.stderr
+        assert done.returncode == 4, done.stderr
+        assert names(disk) == ["out.h5"]
+        assert (disk / "out.h5").read_bytes() == old
+
+
+def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path: Path, seed: int) -> None:
+    draw = random.Random(seed)
+    write_artifact(make_artifact(), tmp_path / "artifact.h5")
+    write_scan(make_scan(), tmp_path / "scan.h5")
+    for name in ("artifact.h5", "scan.h5"):
+        path = tmp_path / name
+        good, known = path.read_bytes(), described(path)
+        for _ in range(40 * FACTOR):
+            damaged, at = bytearray(good), draw.randrange(len(good))
+            damaged[at] ^= 1 << draw.randrange(8)
+            path.write_bytes(damaged)
+            if all(finding.passed for finding in check(path)):
+                assert described(path) == known, f"the bit flipped in byte {at} of {name}"
+        path.write_bytes(good)
+
+
+def described(path: Path) -> dict[str, object]:
+    """What a file holds, apart from the digest of its bytes."""
+    try:
+        return {key: value for key, value in describe(path).items() if key != "sha256"}
+    except MemscalError as failure:
+        return {"refused": str(failure)}
