@@ -181,13 +181,13 @@ def command(
     they are. The numbers of readings, repeats, places and missing values are printed, and
     kept in the notes of the file.
     """
-    from memscal.formats.meshes.mesh_files import is_mesh
+    from memscal.formats.meshes.mesh_files import is_mesh, with_drawn_in
 
     mesh = is_mesh(table)
     options["repeat"] = options["repeat"] or None
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    prove_writable([output], force=force, inputs=[table])
+    prove_writable([output], force=force, inputs=with_drawn_in(table))
     if kind == "scan":
         from memscal.formats.scan import write_scan
 

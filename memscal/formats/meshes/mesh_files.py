@@ -50,6 +50,21 @@ _AS_VTU = (
 )
 
 
+def _addresses(data: bytes) -> Iterator[tuple[str, str]]:
+    """Yield the name of the file and the path inside it of every array kept in another file."""
+    for address in _ADDRESS.finditer(data):
+        file_name, inside = (text.decode("utf-8", "replace").strip() for text in address.groups())
+        yield file_name, "/" + inside.strip("/")
+
+
+def with_drawn_in(path: Path) -> list[Path]:
+    """Return a file that is imported and those that it draws in: none of them may be replaced."""
+    if _KINDS.get(path.suffix.lower()) != "xdmf":
+        return [path]
+    names = {name for name, _ in _addresses(read_bytes(path)) if "\0" not in name}
+    return [path, *(path.parent / name for name in sorted(names))]
+
+
 def heavy_arrays(
     data: bytes, path: str
 ) -> tuple[dict[str, np.ndarray[Any, Any]], list[SourceFile]]:
@@ -59,9 +74,7 @@ def heavy_arrays(
     arrays = {}
     files: dict[str, SafeFile] = {}
     with contextlib.ExitStack() as opened:
-        for address in _ADDRESS.finditer(data):
-            words = [text.decode("utf-8", "replace").strip() for text in address.groups()]
-            file_name, inside = words[0], "/" + words[1].strip("/")
+        for file_name, inside in _addresses(data):
             file_stem, ending = os.path.splitext(file_name)
             if file_stem != stem or ending.lower() not in _HDF5_ENDINGS:
                 raise UnsafeFileError(
