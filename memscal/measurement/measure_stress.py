@@ -13,7 +13,7 @@ from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
-from memscal.estimation.points import require_contact_size
+from memscal.estimation.points import require_contact_size, require_span
 from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
@@ -165,6 +165,8 @@ def measure_stress(
     restore.require_covariance(sensor)
     mismatches = (restore.accept_mismatches(data, sensor, override=override) for data in scans)
     overridden = tuple(text for of_scan in mismatches for text in of_scan)
+    for data in scans:
+        require_span(data)
     origins = tuple(one_load.measured_scan(data) for data in scans)
     singles = [one_load.single_loads(data) for data in scans]
     for single in chain(*singles):

@@ -40,6 +40,7 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     """Refuse a scan of several loads of a curved indenter, of many points, or without cov(G)."""
     require_covariance(apparatus)
     scan_points.require_contact_size(scan, MOST_RESTORED)
+    scan_points.require_span(scan)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
         return
