@@ -8,6 +8,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
+from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -56,12 +57,13 @@ def command(
         stress = measure_stress(data, artifact, override=options["override"])
     with out.working("Drawing"):
         drawn = out.rendered(stress.plot, figures)
-    stress.save(written, overwrite=force)
-    out.write_files(drawn, force=force)
-    if as_json:
-        out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
-    else:
-        out.emit_tables(*tables(stress))
+    with together():
+        stress.save(written, overwrite=force)
+        out.write_files(drawn, force=force)
+        if as_json:
+            out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
+        else:
+            out.emit_tables(*tables(stress))
     out.show_messages(stress.messages)
     for path in (written, *figures):
         out.message(f"Written: {path}")

@@ -17,6 +17,7 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
 from memscal.cli.options import FILE, Quantity, force_option, json_option, option, options_of
+from memscal.formats.files import together
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -296,9 +297,15 @@ def command(
         contents |= out.rendered(calibration.plot, figures)
         if sweep_figure is not None:
             contents |= out.rendered(further["sweep"].plot, [sweep_figure])
-    calibration.apparatus.save(output, overwrite=force)
-    out.write_files(contents, force=force)
-    return _show(calibration, further, outputs, as_json)
+    with together():
+        calibration.apparatus.save(output, overwrite=force)
+        out.write_files(contents, force=force)
+        _print(calibration, further, output, as_json)
+    out.show_messages(calibration.apparatus.process.messages)
+    for path in outputs:
+        out.message(f"Written: {path}")
+    checks = calibration.apparatus.checks
+    return exit_code_of(checks, then=f" {output.name} was written and is marked so.")
 
 
 def _read(
@@ -368,21 +375,16 @@ def _rehearse(
     out.message("Nothing was written (--dry-run).")
 
 
-def _show(
+def _print(
     calibration: Calibration,
     further: Mapping[str, Sweep | MonteCarlo],
-    outputs: Sequence[Path],
+    output: Path,
     as_json: bool,
-) -> int:
+) -> None:
     if as_json:
-        files = {"schema_version": "1", "artifact": str(outputs[0])}
+        files = {"schema_version": "1", "artifact": str(output)}
         values = {name: result.to_dict() for name, result in further.items()}
         out.emit_json(files | calibration.to_dict() | values)
     else:
         tables = [table for result in further.values() for table in result.tables()]
         out.emit_tables(*calibration.tables(), *tables)
-    out.show_messages(calibration.apparatus.process.messages)
-    for path in outputs:
-        out.message(f"Written: {path}")
-    checks = calibration.apparatus.checks
-    return exit_code_of(checks, then=f" {outputs[0].name} was written and is marked so.")

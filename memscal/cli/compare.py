@@ -11,6 +11,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, option, output_options
+from memscal.formats.files import together
 
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
@@ -170,18 +171,17 @@ def command(
 
             for stem, draw in comparison_figures(comparison).items():
                 ready |= out.rendered(draw, [named[stem]])
-    if folder is not None:
-        folder.mkdir(exist_ok=True)
-    out.write_files(ready, force=force)
-    if as_json:
-        files = {
-            "artifact": file_json(apparatus.source),
-            "references": [file_json(profile.source) for profile in references],
-            "figures": [str(path) for path in figures],
-        }
-        out.emit_json(comparison.to_dict() | files)
-    else:
-        out.emit_tables(*comparison.tables())
+    with together(folder):
+        out.write_files(ready, force=force)
+        if as_json:
+            files = {
+                "artifact": file_json(apparatus.source),
+                "references": [file_json(profile.source) for profile in references],
+                "figures": [str(path) for path in figures],
+            }
+            out.emit_json(comparison.to_dict() | files)
+        else:
+            out.emit_tables(*comparison.tables())
     out.show_messages(notes(comparison))
     for path in figures:
         out.message(f"Written: {path}")

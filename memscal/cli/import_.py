@@ -12,6 +12,7 @@ from memscal.cli import options as common
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, option, output_options, si
 from memscal.cli.output import emit, emit_json, message, prove_writable, show_messages
+from memscal.formats.files import together
 from memscal.model.checks import marked_texts
 from memscal.summaries.table import readable
 
@@ -188,24 +189,25 @@ def command(
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     prove_writable([output], force=force, inputs=with_drawn_in(table))
-    if kind == "scan":
-        from memscal.formats.scan import write_scan
+    with together():
+        if kind == "scan":
+            from memscal.formats.scan import write_scan
 
-        scan = _read_scan(table, options)
-        notes = scan.notes
-        write_scan(scan.scan, output, overwrite=force)
-    else:
-        from memscal.formats.reference import write_reference
+            scan = _read_scan(table, options)
+            notes = scan.notes
+            write_scan(scan.scan, output, overwrite=force)
+        else:
+            from memscal.formats.reference import write_reference
 
-        reference = _read_reference(table, mesh, options)
-        notes = reference.notes
-        write_reference(reference.profile, output, overwrite=force)
-    warnings = [note for note in notes if note.severity == "warning"]
-    if as_json:
-        head = {"schema_version": "1", "output": str(output), "format": kind}
-        emit_json({**head, "notes": marked_texts(notes)})
-    else:
-        emit(readable("\n".join(note.text for note in notes if note not in warnings)))
+            reference = _read_reference(table, mesh, options)
+            notes = reference.notes
+            write_reference(reference.profile, output, overwrite=force)
+        warnings = [note for note in notes if note.severity == "warning"]
+        if as_json:
+            head = {"schema_version": "1", "output": str(output), "format": kind}
+            emit_json({**head, "notes": marked_texts(notes)})
+        else:
+            emit(readable("\n".join(note.text for note in notes if note not in warnings)))
     show_messages(warnings)
     message(f"Written: {output}")
     return DONE

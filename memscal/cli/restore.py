@@ -9,6 +9,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
+from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -46,7 +47,7 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     A failed quality check is exit code 1: the result is written all the same.
     """
     from memscal.apparatus import load_apparatus
-    from memscal.formats.reference import read_reference
+    from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan
 
     output, expected, figures = (options[name] for name in ("output", "expected", "figures"))
@@ -70,16 +71,15 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
                 out.note(f"No contact is shown beside the result: {failure.problem}")
     with out.working("Drawing"):
         drawn = out.rendered(restored.plot, figures)
-    if output is not None:
-        from memscal.formats.reference import write_reference
-
-        write_reference(restored.profile(), output, overwrite=force)
-    out.write_files(drawn, force=force)
-    if as_json:
-        written = None if output is None else str(output)
-        out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
-    else:
-        out.emit_tables(*restored.tables())
+    with together():
+        if output is not None:
+            write_reference(restored.profile(), output, overwrite=force)
+        out.write_files(drawn, force=force)
+        if as_json:
+            written = None if output is None else str(output)
+            out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
+        else:
+            out.emit_tables(*restored.tables())
     out.show_messages(restored.messages)
     for path in files:
         out.message(f"Written: {path}")

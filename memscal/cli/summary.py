@@ -7,6 +7,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, option, output_options
+from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -44,11 +45,12 @@ def command(
 
         page = fleet_page(fleet, str(results.resolve().name)).encode("utf-8")
         contents = {output: page, **out.rendered(fleet.plot, figures)}
-    out.write_files(contents, force=force)
-    if as_json:
-        out.emit_json({"schema_version": "1", "page": str(output), **fleet.to_dict()})
-    else:
-        out.emit_tables(*fleet.tables())
+    with together():
+        out.write_files(contents, force=force)
+        if as_json:
+            out.emit_json({"schema_version": "1", "page": str(output), **fleet.to_dict()})
+        else:
+            out.emit_tables(*fleet.tables())
     for path in contents:
         out.message(f"Written: {path}")
     return DONE

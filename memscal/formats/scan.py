@@ -1,15 +1,13 @@
 """memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
 
-import contextlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from memscal.errors import FormatError, OutputError, placed
 from memscal.formats import groups, values
-from memscal.formats.files import ensure_writable
+from memscal.formats.files import ensure_writable, together
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -275,19 +273,6 @@ def write_scans(
     """Write scans as memscal-scan files of one folder, all of them or none."""
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
-    made = not target.exists()
-    try:
-        target.mkdir(exist_ok=True)
-        with TemporaryDirectory("", ".memscal-", target, ignore_cleanup_errors=True) as staging:
-            for name, scan in scans.items():
-                write_scan(scan, Path(staging, name))
-            for name in scans:
-                os.replace(Path(staging, name), target / name)
-    except OSError as error:
-        problem = f"The output {target} cannot be written: {error.strerror}."
-        raise OutputError(problem, cure="Choose another folder.") from error
-    finally:
-        if made:
-            # Of a folder that holds the scans this takes nothing away.
-            with contextlib.suppress(OSError):
-                target.rmdir()
+    with together(target):
+        for name, scan in scans.items():
+            write_scan(scan, target / name, overwrite=overwrite)

@@ -98,7 +98,8 @@ def test_what_cannot_be_is_refused_with_its_reason(scan: Scan, words: str) -> No
 
 
 @pytest.mark.parametrize(("x", "words"), [
-    (1e3, r"data/x\).*mm stated as m,"), (201.168e3, r"1.2e-06 to 2.5e-05 times"), (1e-3, "too short|So short"),
+    (1e3, r"data/x\).*mm stated as m,"), (201.168e3, r"1.2e-06 to 2.5e-05 times"),
+    (1e-3, "too short|So short"),
     (1e200, r"8e\+197 m(.|\n)*Check the values and their unit"),
 ], ids=["m", "furlongs", "um", "1e200"])  # fmt: skip
 @pytest.mark.parametrize("measured", [memscal.measure_stress, memscal.restore])

@@ -1,5 +1,7 @@
 """Outputs that cannot be written: known before anything is computed, and nothing is lost."""
 
+import errno
+import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -88,6 +90,31 @@ def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, 
     monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
+
+
+@pytest.mark.parametrize(("arguments", "old", "failing"), [
+    (["calibrate", "scan.h5", "-o", "a.h5", "--figure", "b.svg"], ["a.h5", "b.svg"], "b.svg"),
+    (["simulate", "--experiment", "sphere", "-o", "."],
+     ["rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5"], "sphere_lubricated.h5"),
+])  # fmt: skip
+@pytest.mark.usefixtures("scan")
+def test_where_one_output_cannot_be_replaced_all_stay(
+    run: Run, folder: Path, monkeypatch: Patch, arguments, old, failing
+):
+    rename = os.replace
+
+    def replace(source: Path, target: Path) -> None:
+        if Path(target).name == failing:
+            raise OSError(errno.EIO, "broken")
+        rename(source, target)
+
+    for name in old:
+        (folder / name).write_bytes(OLD)
+    before = names(folder)
+    monkeypatch.setattr(os, "replace", replace)
+    run(*arguments, "--force").exits(4, failing, "what was there before is untouched")
+    assert {(folder / name).read_bytes() for name in old} == {OLD}
+    assert names(folder) == before
 
 
 def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: Patch):

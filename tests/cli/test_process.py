@@ -27,6 +27,15 @@ def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path
     assert "Exception ignored" not in done.stderr
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="The system has no /dev/full.")
+def test_a_result_that_cannot_be_printed_is_not_written_either(scan: Path, folder: Path):
+    with open("/dev/full", "w") as full:
+        done = run_program("calibrate", "scan.h5", cwd=folder, stdout=full.fileno())
+    assert done.returncode == 4
+    assert "cannot be printed: No space left" in done.stderr
+    assert os.listdir(folder) == ["scan.h5"]
+
+
 def test_a_terminal_without_the_characters_still_shows_the_right_number(scan: Path, folder: Path):
     done = run_program("calibrate", "scan.h5", cwd=folder, PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
