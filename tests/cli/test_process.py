@@ -27,9 +27,9 @@ def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path
     assert "Exception ignored" not in done.stderr
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="The system has no /dev/full.")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="The system has no /dev/full.")
 def test_a_result_that_cannot_be_printed_is_not_written_either(scan: Path, folder: Path):
-    with open("/dev/full", "w") as full:
+    with Path("/dev/full").open("w") as full:
         done = run_program("calibrate", "scan.h5", cwd=folder, stdout=full.fileno())
     assert done.returncode == 4
     assert "cannot be printed: No space left" in done.stderr
