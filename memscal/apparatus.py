@@ -1,6 +1,8 @@
 """Apparatus function: predicted voltages, convolved stresses, measured stresses."""
 
-from dataclasses import dataclass, field, fields
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
 from typing import ClassVar
@@ -12,7 +14,7 @@ from scipy.special import j0, j1
 from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline, ring_areas
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
-from memscal.model.apparatus import ApparatusData
+from memscal.model.apparatus import ApparatusData, ApparatusField
 from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Result
@@ -22,6 +24,8 @@ _LARGEST_RADIUS = 1.0
 #: What may be left of a stress at the end of its table.
 _DECAYED = 0.01
 _FEWEST_RADII = 4
+#: A round G over the plane differs from its profile's by less, as a share of the largest G.
+_ROUND = 1e-4
 #: Positions of a field are even to this share of their step.
 _UNEVEN = 1e-3
 
@@ -172,6 +176,25 @@ class ApparatusFunction(Result, ApparatusData):
         """
         self.require_pascals()
         return np.asarray(u_zz, dtype=np.float64) / self.conversion_constant
+
+    def compact(self) -> ApparatusFunction:
+        """Return a copy whose artifact leaves G over the plane out, where G is round.
+
+        ``field`` of such an artifact is made from ``radial_profile``.  G stays where that differs
+        from it by 1e-4 of the largest G: that of a sensor that is not round, or of a raster.
+
+        Examples
+        --------
+        >>> import memscal
+        >>> apparatus = memscal.calibrate(memscal.simulate(noise=0.002, seed=3)).apparatus
+        >>> apparatus.compact().plane is None
+        True
+        """
+        if self.plane is None:
+            return self
+        of_profile, g = ApparatusField.of_profile(self.radial_profile), self.plane.g
+        alike = g.shape == of_profile.g.shape and np.allclose(g, of_profile.g, 0, _ROUND * g.max())
+        return replace(self, plane=None) if alike else self
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the apparatus function to an artifact file.

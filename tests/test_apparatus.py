@@ -1,7 +1,8 @@
 """The apparatus function in use, against closed forms and direct quadrature."""
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,7 @@ def test_a_field_is_convolved_with_g_over_the_plane() -> None:
     sensor, force = np.array([[0.5, 0.2], [0.2, 0.3]]) * 1e-6, np.array([[1.0, -0.6], [-0.6, 2.0]])
     axis = np.linspace(-4e-3, 4e-3, 161)
     field = ApparatusField(axis, axis, elliptic(axis, axis, sensor), np.zeros((161, 161)))
-    data = make_artifact(field=field)
+    data = make_artifact(plane=field)
     apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
     x, y = np.linspace(-8e-3, 8e-3, 101), np.linspace(-9e-3, 9e-3, 91)
     stress = 3.0 * elliptic(x, y, force * 1e-6)
@@ -208,6 +209,36 @@ def test_an_artifact_keeps_its_arrays_and_names_its_parameters():
         apparatus.radial_profile.g[0] = 1.0
     with pytest.raises(InputError, match="There is no parameter conversion"):
         apparatus.parameters["conversion"]
+
+
+def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path: Path) -> None:
+    whole = memscal.calibrate(memscal.simulate(noise=0.005, seed=2)).apparatus
+    compact = whole.compact()
+    sizes = []
+    for name, apparatus in (("whole.h5", whole), ("compact.h5", compact)):
+        apparatus.save(tmp_path / name)
+        sizes.append((tmp_path / name).stat().st_size)
+    assert sizes[1] < 0.55 * sizes[0]
+    read = memscal.load_apparatus(tmp_path / "compact.h5")
+    assert (read.plane, read.content_digest) == (None, compact.content_digest)
+    assert read.content_digest != whole.content_digest
+    np.testing.assert_allclose(read.field.g, whole.field.g, atol=1e-5 * whole.field.g.max())
+    np.testing.assert_allclose(read.field.g_errors, whole.field.g_errors, rtol=1e-6)
+    x, y = np.linspace(-8e-3, 8e-3, 101), np.linspace(-9e-3, 9e-3, 91)
+    stress = elliptic(x, y, np.array([[1.0, -0.6], [-0.6, 2.0]]) * 1e-6)
+    expected = whole.convolve(x, stress, y=y)
+    np.testing.assert_allclose(read.convolve(x, stress, y=y), expected, atol=1e-5 * expected.max())
+
+
+def test_g_that_is_not_round_stays_in_a_compact_artifact() -> None:
+    apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
+    axis = np.linspace(-SUPPORT, SUPPORT, 801)
+    oval = elliptic(axis, axis, np.diag([1.01, 1 / 1.01]) * SIGMA**2)
+    field = ApparatusField(axis, axis, oval, np.zeros_like(oval))
+    kept = replace(apparatus, plane=field).compact()
+    assert kept.plane is field
+    of_profile = ApparatusField.of_profile(apparatus.radial_profile)
+    assert replace(apparatus, plane=of_profile).compact().plane is None
 
 
 def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:

@@ -12,7 +12,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from memscal.apparatus import ApparatusFunction
 from memscal.calibration.calibrate import calibrate
 from memscal.calibration.many import attempted
 from memscal.errors import MemscalError, OutputError
@@ -29,7 +28,6 @@ from memscal.formats.fleet import (
 )
 from memscal.formats.scan import read_scan
 from memscal.model.provenance import timestamp
-from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.version import __version__
 
@@ -222,7 +220,9 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
         return row | _of_error(scan) | {"input_sha256": _sha256_of_file(path)}
     row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}
     row["input_sha256"] = scan.source and scan.source.sha256
-    apparatus = attempted(item.path, lambda: _calibrated(batch, scan))
+    apparatus = attempted(
+        item.path, lambda: calibrate(scan, other=False, **batch.options).apparatus
+    )
     if isinstance(apparatus, MemscalError):
         return row | _of_error(apparatus)
     if batch.artifacts == "all" or (batch.artifacts == "failed" and not apparatus.passed):
@@ -230,17 +230,8 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
         artifact = Path("artifacts", shard.name, name)
         row["artifact"] = artifact.as_posix()
         (batch.results / artifact).parent.mkdir(parents=True, exist_ok=True)
-        apparatus.save(batch.results / artifact, overwrite=True)
+        apparatus.compact().save(batch.results / artifact, overwrite=True)
     return row | fleet_row(apparatus)
-
-
-def _calibrated(batch: Batch, scan: Scan) -> ApparatusFunction:
-    """Calibrate a scan, by the other route, too, where its artifact is written."""
-    in_full = batch.artifacts == "all"
-    apparatus = calibrate(scan, other=in_full, **batch.options).apparatus
-    if batch.artifacts == "failed" and not apparatus.passed:
-        return calibrate(scan, **batch.options).apparatus
-    return apparatus
 
 
 def _of_error(error: MemscalError) -> dict[str, str]:

@@ -96,7 +96,7 @@ def assemble(
     else:
         scatter, plane = plane
     return ApparatusFunction(
-        field=ApparatusField(g.x, g.y, g.image, plane, scatter),
+        plane=ApparatusField(g.x, g.y, g.image, plane, scatter),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=_transfer(solution, results),
         reconvolution=_reconvolution(solution),

@@ -233,6 +233,9 @@ def calibration_settings(
     "Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
     "scatters with the budget of uncertainties. Each draw is calibrated like the scan."
 )
+@option("--compact", is_flag=True)(
+    "Leave G over the plane out of the artifact where it is round, which halves its size."
+)
 @force_option
 @option("--dry-run", is_flag=True)(
     "Read and check every input, print what would be done, and write nothing."
@@ -249,6 +252,7 @@ def command(
     sweeping: bool,
     sweep_figure: Path | None,
     draws: int | None,
+    compact: bool,
     force: bool,
     dry_run: bool,
     **settings: Any,
@@ -297,15 +301,16 @@ def command(
         contents |= out.rendered(calibration.plot, figures)
         if sweep_figure is not None:
             contents |= out.rendered(further["sweep"].plot, [sweep_figure])
+    apparatus = calibration.apparatus.compact() if compact else calibration.apparatus
     with together():
-        calibration.apparatus.save(output, overwrite=force)
+        apparatus.save(output, overwrite=force)
         out.write_files(contents, force=force)
         _print(calibration, further, output, as_json)
-    out.show_messages(calibration.apparatus.process.messages)
+    out.show_messages(apparatus.process.messages)
     for path in outputs:
         out.message(f"Written: {path}")
-    checks = calibration.apparatus.checks
-    return exit_code_of(checks, then=f" {output.name} was written and is marked so.")
+    then = f" {output.name} was written and is marked so."
+    return exit_code_of(apparatus.checks, then=then)
 
 
 def _read(

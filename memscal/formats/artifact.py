@@ -25,6 +25,10 @@ from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadi
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 
+#: A compact artifact has none.
+_PLANE = "/entry/apparatus_function"
+_CHANGES = "/entry/kernel_changes"
+
 
 def artifact_from(file: SafeFile) -> ApparatusData:
     """Read the apparatus function of an open memscal-artifact file; refuse one that was changed."""
@@ -43,7 +47,9 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
     of_scan = records.RECONVOLUTION.read_in(reading)
     return ApparatusData(
-        field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
+        plane=ApparatusField(**read_record(records.FIELD, file, _PLANE))
+        if file.has(_PLANE)
+        else None,
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
         transfer=apparatus.TransferFunction(**transfer),
         reconvolution=apparatus.Reconvolution(**read_record(of_scan, file, "/entry/reconvolution")),
@@ -73,7 +79,6 @@ def artifact_tree(data: ApparatusData) -> Group:
     sensor, of_scan = data.sensor.name, records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
-        "apparatus_function": write_record(records.FIELD, data.field),
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
         "transfer_function": write_record(records.TRANSFER, data.transfer),
@@ -95,10 +100,11 @@ def artifact_tree(data: ApparatusData) -> Group:
             f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
-    return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": "apparatus_function"}))
-
-
-_CHANGES = "/entry/kernel_changes"
+    default = "radial_profile"
+    if data.plane is not None:
+        default = "apparatus_function"
+        children[default] = write_record(records.FIELD, data.plane)
+    return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": default}))
 
 
 def _changes_group(data: ApparatusData) -> Group:

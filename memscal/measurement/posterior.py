@@ -36,7 +36,7 @@ from scipy.special import hyp0f1, j0, j1
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.bayesian import WeighedFit, weigh_departures
 from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
 from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
@@ -158,11 +158,20 @@ class ShapeFit:
 
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
     state: FloatArray  # (s,): posterior mean
-    covariance: FloatArray  # (s, s): expected squared error
-    gain: VoltageMap  # (s, n): derivative of the state by the voltages
-    residual: FloatArray  # (n,), in V
-    noise: float  # of a point of weight one, in V, or over the stated uncertainties
+    rows: FloatArray  # (s, p): the state's departure from the fit, by the kernels and the rest
+    weighed: WeighedFit  # by departures from the fit
+    growth: float  # adopted noise over the posterior's
     log_marginal: float  # marginal likelihood up to a constant of the scan
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Expected squared error of the state, (s, s)."""
+        return self.growth**2 * (self.rows @ self.weighed.covariance @ self.rows.T)
+
+    @property
+    def gain(self) -> VoltageMap:
+        """Derivative of the state by the voltages, (s, n)."""
+        return self.rows @ self.weighed.gain
 
 
 #: Steps of the fits on a line, and the largest relative change of a width in one of them; they end
@@ -228,13 +237,11 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate, fit: GaussianFit) ->
     flat = fit.jacobian * np.r_[fit.conversion_constant, fit.sigma, np.ones(basis.flat - 2)]
     root = np.linalg.qr(model.points.standardised(flat, weights), mode="r")
     log_information = 2 * float(np.log(np.abs(np.diag(root))).sum())
-    growth = start.adopted_noise(weighed.noise) / weighed.noise
     return ShapeFit(
         state=first + rows @ weighed.mean,
-        covariance=growth**2 * (rows @ weighed.covariance @ rows.T),
-        gain=rows @ weighed.gain,
-        residual=weighed.residual,
-        noise=weighed.noise,
+        rows=rows,
+        weighed=weighed,
+        growth=start.adopted_noise(weighed.noise) / weighed.noise,
         log_marginal=weighed.log_marginal_likelihood - 0.5 * log_information,
     )
 
@@ -335,11 +342,11 @@ def posterior_of(
     fits = [fit_shape(shape, estimate, fit) for shape, fit in pairs]
     log_marginal = np.array([fit.log_marginal for fit in fits])
     weight = np.exp(log_marginal - log_marginal.max())
-    weight[weight < _NEGLIGIBLE] = 0.0
-    shares = np.asarray(weight / weight.sum())
-    mean = np.average([fit.state for fit in fits], axis=0, weights=shares)
+    kept = np.flatnonzero(weight >= _NEGLIGIBLE)
+    fits, shares = [fits[i] for i in kept], weight[kept] / weight[kept].sum()
+    mean = shares @ np.stack([fit.state for fit in fits])
     gain = reduce(add, (fit.gain * share for fit, share in zip(fits, shares, strict=True)))
-    within = np.average([fit.covariance for fit in fits], axis=0, weights=shares)
+    within = sum(share * fit.covariance for fit, share in zip(fits, shares, strict=True))
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan, model.reference.wavenumbers)
@@ -375,8 +382,8 @@ def posterior_of(
         shifts=shifts,
         changes=changes,
         film_inputs=names,
-        residual=np.average([fit.residual for fit in fits], axis=0, weights=shares),
-        found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
+        residual=shares @ np.stack([fit.weighed.residual for fit in fits]),
+        found_noise=float(np.dot(shares, [fit.weighed.noise for fit in fits])),
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
 
@@ -414,13 +421,20 @@ def changes_by_film(
     known = apparatus.film
     if film is None or known is None or not _alike(film, known):
         return {}
-    r, a = apparatus.radial_profile.r, apparatus.conversion_constant
-    changes = {name: apparatus.kernel_changes.get(name) for name in _OF_FILM}
-    return {
-        name: a * hankel_transform(r, change, k)
-        for name, change in changes.items()
-        if change is not None
-    }
+    names = [name for name in _OF_FILM if name in apparatus.kernel_changes]
+    return dict(zip(names, _kernel_changes(apparatus, k.tobytes(), tuple(names)), strict=True))
+
+
+@lru_cache(maxsize=16)
+def _kernel_changes(
+    apparatus: ApparatusFunction, nodes: bytes, names: tuple[str, ...]
+) -> FloatArray:
+    """Transforms (q, n) of changes of A G by inputs, which all profiles of one sensor share."""
+    if not names:
+        return np.empty((0, len(nodes) // 8))
+    table = np.column_stack([apparatus.kernel_changes[name] for name in names])
+    transforms = hankel_transform(apparatus.radial_profile.r, table, np.frombuffer(nodes))
+    return apparatus.conversion_constant * transforms.T
 
 
 def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from functools import cached_property
 
 import numpy as np
 
@@ -32,6 +33,17 @@ class ApparatusField(FrozenArrays):
     g: FloatArray
     g_errors: FloatArray
     g_scatter: FloatArray | None = None
+
+    @classmethod
+    def of_profile(cls, profile: ApparatusRadial) -> ApparatusField:
+        """Return a round G on the lattice of its radii, by a cubic spline; zero beyond them."""
+        from scipy.interpolate import CubicSpline
+
+        axis = np.concatenate([-profile.r[:0:-1], profile.r])
+        radius = np.hypot.outer(axis, axis)
+        g = CubicSpline(axis, np.concatenate([profile.g[:0:-1], profile.g]))(radius)
+        errors = np.interp(radius, profile.r, profile.g_errors)
+        return cls(axis, axis, np.where(radius <= profile.r[-1], g, 0.0), errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +186,9 @@ class OtherEstimate:
 class ApparatusData(Checked):
     """Everything that an apparatus-function artifact stores, in SI units.
 
-    ``film``, ``indenter`` and ``load`` are ``None`` where a scan with a reference states none.
+    ``plane`` is G over the plane, ``None`` in a compact artifact of a round G; ``field`` has it in
+    any case.  ``film``, ``indenter`` and ``load`` are ``None`` where a scan with a reference states
+    none.
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
     of the conversion constant and of both Gaussian widths by source; ``kernel_changes`` (n,), at
     the radii of ``radial_profile``, are those of A G over A by one standard uncertainty of each
@@ -182,7 +196,7 @@ class ApparatusData(Checked):
     was not chosen, where there is one.
     """
 
-    field: ApparatusField
+    plane: ApparatusField | None
     radial_profile: ApparatusRadial
     transfer: TransferFunction
     reconvolution: Reconvolution
@@ -208,6 +222,11 @@ class ApparatusData(Checked):
         )
         state = state_of_checks(self.checks)
         return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"
+
+    @cached_property
+    def field(self) -> ApparatusField:
+        """G over the plane: as stored, or of the radial profile in a compact artifact."""
+        return self.plane or ApparatusField.of_profile(self.radial_profile)
 
     @property
     def reading(self) -> Reading:

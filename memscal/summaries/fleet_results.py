@@ -52,7 +52,7 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
     reasons = {}
     for i in sorted(chosen, key=lambda i: (-farthest[i], i)):
         texts = [
-            f"{symbol} {abs(z[i]):.1f} {'above' if z[i] > 0 else 'below'} the median"
+            f"{symbol} {abs(z[i]):.1f} deviations {'above' if z[i] > 0 else 'below'} the median"
             for symbol, z in deviations.items()
             if abs(z[i]) > ROBUST_LIMIT
         ]

@@ -98,7 +98,7 @@ def build(
     reference = StressProfile(r=r, sigma_zz=stress, load=_LOAD, **contact)
     return replace(
         data,
-        field=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
+        plane=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
         radial_profile=radial_profile(error, ripple),
         transfer=transfer_function(3.7e3),
         reconvolution=reconvolution(kind, points, noise, seed),

@@ -98,7 +98,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
     scan = make_scan()
     voltage = np.nan_to_num(scan.u_zz)
     data = ApparatusData(
-        field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g, g_scatter=0.005 * g),
+        plane=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g, g_scatter=0.005 * g),
         radial_profile=ApparatusRadial(r, radial, errors, radial, np.diag(errors**2)),
         transfer=memscal.TransferFunction(k, modulus, 0.01 * modulus, window, 3.7e3),
         reconvolution=memscal.Reconvolution(
