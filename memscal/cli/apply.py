@@ -7,7 +7,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, option, output_options
+from memscal.cli.options import FILE, accept_altered_option, option, output_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -27,6 +27,7 @@ Examples:
 @option("--override", is_flag=True)(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
+@accept_altered_option
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
@@ -43,9 +44,10 @@ def command(
 
     A failed quality check is exit code 1: the result is written all the same.
     """
-    from memscal.formats.scan import read_scan
+    from memscal.formats.opened import opened_scans
 
-    data = [read_scan(path) for path in scans]
+    accepted = {name: options[name] for name in ("override", "accept_altered")}
+    data = opened_scans(scans, accept_altered=accepted["accept_altered"])
     written = options["output"] or out.beside(scans[0], ".stress.h5")
     figures = options["figures"]
     out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
@@ -54,7 +56,7 @@ def command(
     from memscal.summaries.stress import tables
 
     with out.working("Measuring"):
-        stress = measure_stress(data, artifact, override=options["override"])
+        stress = measure_stress(data, artifact, **accepted)
     with out.working("Drawing"):
         drawn = out.rendered(stress.plot, figures)
     with together():

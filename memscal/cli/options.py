@@ -93,6 +93,9 @@ def options_of(*options: _Adder) -> _Adder:
 
 json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+accept_altered_option = option("--accept-altered", is_flag=True)(
+    "Use files although their content does not fit their digest: recorded in the output."
+)
 output_options = options_of(json_option, force_option, debug_option)
 
 #: Those of memscal.model.film, which takes longer to import than help may; a test compares them.

@@ -8,7 +8,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, option, output_options
+from memscal.cli.options import FILE, accept_altered_option, option, output_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -33,6 +33,7 @@ Examples:
 @option("--override", is_flag=True)(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
+@accept_altered_option
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
@@ -51,8 +52,9 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     from memscal.formats.scan import read_scan
 
     output, expected, figures = (options[name] for name in ("output", "expected", "figures"))
-    apparatus, data = load_apparatus(artifact), read_scan(scan)
-    stress = None if expected is None else read_reference(expected)
+    accepted = {"accept_altered": options["accept_altered"]}
+    apparatus, data = load_apparatus(artifact, **accepted), read_scan(scan, **accepted)
+    stress = None if expected is None else read_reference(expected, **accepted)
     files = [path for path in (output, *figures) if path is not None]
     out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 

@@ -36,13 +36,15 @@ _SYNTHETIC = (
 )
 
 
-def read_scan(path: str | os.PathLike[str]) -> Scan:
+def read_scan(path: str | os.PathLike[str], *, accept_altered: bool = False) -> Scan:
     """Read a scan from a memscal-scan file.
 
     Parameters
     ----------
     path : path
         The file; units in it are converted to SI.
+    accept_altered : bool
+        Accept a file whose content does not fit its digest: ``source.altered`` records it.
 
     Returns
     -------
@@ -52,8 +54,8 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
     Raises
     ------
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
-        If the file does not hold a scan that this version can read; the message names the
-        file and the HDF5 path.
+        If the file does not hold a scan that this version can read, or was changed after it was
+        written; the message names the file and the HDF5 path.
 
     Examples
     --------
@@ -68,7 +70,7 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
     ...     read_scan(f"{folder}/scan.h5").u_zz
     array([0.001, 0.003, 0.001])
     """
-    with open_hdf5(path) as file:
+    with open_hdf5(path, accept_altered=accept_altered) as file:
         return scan_from(file)
 
 
@@ -78,6 +80,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     if most is not None and (size := file.claimed_number(f"{_DATA}/u_zz")) > most:
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
         raise too_large(file.name, size, most, "points", cure=cure)
+    values.require_unaltered(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))

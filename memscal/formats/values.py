@@ -114,19 +114,34 @@ def text_list(file: SafeFile, path: str) -> list[str]:
 _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 
+#: What other programs write, too, without a digest.
+_OF_OTHERS = (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA)
+
+
+def has_no_digest(file: SafeFile, schema: str | None) -> bool:
+    """Return whether a file has no digest and needs none: other programs write such, too."""
+    return schema in (*_OF_OTHERS, None) and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None
+
+
+def require_unaltered(file: SafeFile, schema: str | None) -> None:
+    """Refuse a file whose content is not what was written; or record it, where that is accepted."""
+    if not file.verified and not has_no_digest(file, schema) and (problem := altered(file)):
+        file.refuse_altered(problem)
+
+
 def altered(file: SafeFile) -> str:
     """Return how a file differs from what was written, or ``""``; then only that can be read."""
     stated = file.attribute("/", writer.DIGEST_ATTRIBUTE)
     if stated is None:
-        return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing."
+        return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing"
     contents = json_value(file, CONTENTS_PATH, dict, None)
     if contents is None:
-        return f"the list of its contents ({CONTENTS_PATH}) is missing."
+        return f"the list of its contents ({CONTENTS_PATH}) is missing"
     missing = [path for path in contents if not (_PATH.fullmatch(path) and file.has(path))]
     if missing:
-        return f"{missing[0]} is missing."
+        return f"{missing[0]} is missing"
     if writer.content_digest(stored_items(file, contents)) != stated:
-        return "its content does not fit its digest."
+        return "its content does not fit its digest"
     file.limit_to(contents)
     return ""
 

@@ -17,6 +17,7 @@ from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
+from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
 from memscal.model import checks as quality
@@ -24,6 +25,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
+from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_RESTORED
@@ -239,6 +241,7 @@ def restore(
     *,
     expected: Expected = None,
     override: bool = False,
+    accept_altered: bool = False,
 ) -> Restoration:
     r"""Restore the stress at the base of the film from a scan with a calibrated sensor.
 
@@ -256,6 +259,8 @@ def restore(
         A calculated base stress to hold against the restored one: adds a check.
     override : bool
         Accept a scan whose sensor, channel or film is not the artifact's: a message records it.
+    accept_altered : bool
+        Accept files whose content does not fit their digest; recorded like what is overridden.
 
     Returns
     -------
@@ -277,11 +282,17 @@ def restore(
     >>> abs(restored.force - 1.0) < 3 * restored.force_uncertainty
     True
     """
-    sensor, measured = opened_apparatus(apparatus), opened_scan(scan)
+    sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
+    measured = opened_scan(scan, accept_altered=accept_altered)
+    if isinstance(expected, str | PathLike):
+        expected = read_reference(expected, accept_altered=accept_altered)
     require_measurement(measured, sensor)
-    overridden = quality.override_messages(accept_mismatches(measured, sensor, override=override))
+    sources = sensor.source, measured.source, getattr(expected, "source", None)
+    overridden = accept_mismatches(measured, sensor, override=override)
+    overridden = [*accepted_alterations(*sources), *overridden]
     restored = restore_known(measured, sensor, expected)
-    return replace(restored, messages=(*overridden, *restored.messages))
+    messages = quality.override_messages(overridden)
+    return replace(restored, messages=(*messages, *restored.messages))
 
 
 def restore_known(
