@@ -1,13 +1,17 @@
 """Exit codes and messages of exceptions; a traceback is shown with --debug only."""
 
+import signal
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import current_thread, main_thread
 from typing import Any, TypeVar
 
 import click
 
+from memscal.__main__ import handle_ending
 from memscal.cli.output import error, message, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
@@ -41,13 +45,44 @@ def debug_option(command: _Command) -> _Command:
     )(command)
 
 
+class _Ended(KeyboardInterrupt):
+    """A signal came; of the class itself Python would kill the process after the clean-up."""
+
+
+@contextmanager
+def _interruptible() -> Iterator[list[int]]:
+    """Have SIGTERM and SIGHUP end the work as Ctrl-C does, cleaned up; yield what came."""
+    came: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        came.append(number)
+        # The clean-up is not interrupted, but for a second Ctrl-C.
+        handle_ending(signal.SIG_IGN)
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        raise _Ended
+
+    before = handle_ending(interrupt) if current_thread() is main_thread() else {}
+    try:
+        yield came
+    except Exception as failure:
+        if not came:
+            raise
+        # A library may have made another error of it.
+        raise _Ended from failure
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def guarded(run: Callable[[Session], int]) -> int:
     """Run a command; return its exit code, or that of its failure after saying what it was."""
     session = Session()
+    came: list[int] = []
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
-            return run(session)
+            with _interruptible() as came:
+                return run(session)
         except click.UsageError as failure:
             failure.show()
             return USAGE
@@ -56,7 +91,7 @@ def guarded(run: Callable[[Session], int]) -> int:
             if isinstance(failure.__cause__, EOFError):
                 return _internal(failure.__cause__)
             message("Interrupted. Nothing was left half-written.")
-            return INTERRUPTED
+            return 128 + came[0] if came else INTERRUPTED
         except MemscalError as failure:
             _traceback(session)
             error(failure.problem, failure.why, failure.cure)
