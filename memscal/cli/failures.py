@@ -1,5 +1,6 @@
 """Exit codes and messages of exceptions; a traceback is shown with --debug only."""
 
+import errno
 import signal
 import sys
 import warnings
@@ -12,11 +13,14 @@ from typing import Any, TypeVar
 import click
 
 from memscal.__main__ import handle_ending
-from memscal.cli.output import error, message, warn
+from memscal.cli.output import error, message, unprinted, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
 
 DONE, CHECK_FAILED, USAGE, REFUSED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+#: What standard output may answer.
+_UNPRINTED = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -96,6 +100,16 @@ def guarded(run: Callable[[Session], int]) -> int:
             _traceback(session)
             error(failure.problem, failure.why, failure.cure)
             return failure.exit_code
+        except OSError as failure:
+            _traceback(session)
+            if failure.filename is not None or failure.errno not in _UNPRINTED:
+                return _internal(failure)
+            # click printed a help text; a reader that goes away is no failure.
+            refusal = unprinted(failure)
+            if failure.errno == errno.EPIPE:
+                return DONE
+            error(refusal.problem, refusal.why, refusal.cure)
+            return refusal.exit_code
         except MemoryError:
             _traceback(session)
             cure = "Close other programs, or give a scan with fewer points."

@@ -32,10 +32,15 @@ def emit(text: str) -> None:
     except BrokenPipeError:
         _discard_stdout()
     except OSError as failure:
-        _discard_stdout()
-        problem = f"The results cannot be printed: {failure.strerror}."
-        cure = "Free some space, or send standard output elsewhere."
-        raise OutputError(problem, why="They go to standard output.", cure=cure) from failure
+        raise unprinted(failure) from failure
+
+
+def unprinted(failure: OSError) -> OutputError:
+    """Return the error for results that standard output does not take."""
+    _discard_stdout()
+    problem = f"The results cannot be printed: {failure.strerror}."
+    cure = "Free some space, or send standard output elsewhere."
+    return OutputError(problem, why="They go to standard output.", cure=cure)
 
 
 def _write_all(stream: TextIO, text: str) -> None:
@@ -208,7 +213,7 @@ class FigurePath(click.Path):
 def beside(path: Path, suffix: str) -> Path:
     """Return the name of a result beside its input."""
     stem = path.stem if path.suffix.lower() in _HDF5_SUFFIXES else path.name
-    return path.with_name(stem + suffix)
+    return path.parent / f"{stem}{suffix}"
 
 
 def prove_writable(outputs: Sequence[Path], *, force: bool, inputs: Sequence[Path] = ()) -> None:

@@ -1,5 +1,6 @@
 """``memscal summary``: the results of a batch as tables, a page and a figure."""
 
+import os
 from pathlib import Path
 
 import click
@@ -43,7 +44,7 @@ def command(
     with out.working("Drawing"):
         from memscal.figures.fleet import fleet_page
 
-        page = fleet_page(fleet, str(results.resolve().name)).encode("utf-8")
+        page = fleet_page(fleet, Path(os.path.realpath(results)).name).encode("utf-8")
         contents = {output: page, **out.rendered(fleet.plot, figures)}
     with together():
         out.write_files(contents, force=force)

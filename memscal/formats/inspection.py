@@ -162,8 +162,8 @@ def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
     if text := file.is_text(path):
         value: Any = file.text(path)
     else:
-        numbers = file.array(path)
-        value = "inf" if np.all(numbers == np.inf) else _plain(numbers)
+        number = _single(file, path)
+        value = "inf" if number == np.inf else _plain(number)
     unit = None if text else units_of(file, path) or "1"
     row = {"path": path, "name": name, "value": value}
     return row | {"standard_uncertainty": _uncertainty(file, path), "unit": unit}
@@ -174,12 +174,19 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     errors = f"{path}_errors"
     if not file.has(errors):
         return None
-    spread, unit, spread_unit = file.array(errors), units_of(file, path), units_of(file, errors)
+    spread, unit, spread_unit = _single(file, errors), units_of(file, path), units_of(file, errors)
     if spread_unit != unit:
         dimension = dimension_of(unit or "1", file.where(path))
         scale = to_si(1.0, unit, dimension, file.where(path))
-        spread = to_si(spread, spread_unit, dimension, file.where(errors)) / scale
+        spread = float(to_si(spread, spread_unit, dimension, file.where(errors)) / scale)
     return _plain(spread)
+
+
+def _single(file: SafeFile, path: str) -> float | int:
+    if (numbers := file.array(path)).size != 1:
+        problem = f"{file.where(path)} has {numbers.size} values, but one number is expected."
+        raise FormatError(problem)
+    return numbers.item()  # type: ignore[no-any-return]
 
 
 def _array_row(file: SafeFile, path: str) -> dict[str, Any]:

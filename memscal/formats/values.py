@@ -1,6 +1,7 @@
 """Single values of a safe file by kind, its schema, and its digest."""
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -90,12 +91,19 @@ def optional_text(file: SafeFile, path: str) -> str:
     return file.text(path) if file.has(path) else ""
 
 
+def _finite(text: str) -> float:
+    """Return a number of JSON, which has no others."""
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"{text} is no finite number")
+    return number
+
+
 def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     """Return JSON of a given type (``list`` or ``dict``), or the default where there is none."""
     if not file.has(path):
         return default
     try:
-        value = json.loads(file.text(path))
+        value = json.loads(file.text(path), parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         problem = f"{file.where(path)} is not JSON: {error}."
         raise InputError(problem, cure="Write the file again.") from error

@@ -117,6 +117,40 @@ def test_where_one_output_cannot_be_replaced_all_stay(
     assert names(folder) == before
 
 
+@pytest.mark.parametrize("arguments", [
+    ["simulate", "-o", ""], ["simulate", "--experiment", "sphere", "-o", ""], ["calibrate", ""],
+    ["batch", "", "-o", "results"],
+])  # fmt: skip
+def test_an_empty_name_is_a_wrong_usage(run: Run, folder: Path, arguments):
+    run(*arguments).exits(2, "The name of the file is empty")
+    assert names(folder) == []
+
+
+@pytest.mark.parametrize(("arguments", "code"), [
+    (["calibrate", "scan.h5", "-o", "loop", "--force"], 4), (["batch", "loop", "-o", "new"], 3),
+    (["calibrate", "scan.h5", "--figure", "loop.svg"], 4), (["calibrate", "loop"], 3),
+    (["simulate", "--experiment", "sphere", "-o", "loop"], 4),
+])  # fmt: skip
+def test_a_circle_of_links_is_refused(run: Run, scan: Path, folder: Path, arguments, code):
+    for ending in ("", ".svg"):
+        (folder / f"loop{ending}").symlink_to(f"circle{ending}")
+        (folder / f"circle{ending}").symlink_to(f"loop{ending}")
+    run(*arguments).exits(code, "loop")
+
+
+def test_an_input_without_permission_is_refused_and_no_usage_error(
+    run: Run, scan: Path, monkeypatch: Patch
+):
+    """The permission is taken away for root, too."""
+
+    def denied(path: object, *arguments: object, **options: object) -> int:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+
+    monkeypatch.setattr(os, "access", lambda *_, **__: False)
+    monkeypatch.setattr("memscal.formats.files.os.open", denied)
+    run("inspect", scan).exits(3, "cannot be read: Permission denied", "permissions")
+
+
 def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: Patch):
     monkeypatch.setattr(CALIBRATE, raising(RuntimeError("the flux capacitor\nis empty")))
     failed = run("calibrate", scan).exits(70)
