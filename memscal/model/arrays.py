@@ -25,11 +25,13 @@ def require_positive(name: str, value: float, unit: str = "") -> None:
     require_size(name, value, unit)
 
 
-def require_size(name: str, values: ArrayLike, unit: str = "") -> None:
+def require_size(
+    name: str, values: ArrayLike, unit: str = "", *, smallest: float = _SMALLEST
+) -> None:
     """Refuse numbers of a size that no quantity has, in whatever unit it was stated."""
     sizes = np.abs(values)
     largest = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
-    if largest and not _SMALLEST <= largest <= _LARGEST:
+    if largest and not smallest <= largest <= _LARGEST:
         raise InputError(
             f"{name} is {largest:.3g} {unit}".rstrip() + ", a size that no quantity has.",
             why=f"In SI units quantities lie from {_SMALLEST:g} to {_LARGEST:g}.",

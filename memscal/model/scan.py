@@ -385,7 +385,8 @@ class Scan:
         for name in ("x", "y"):
             if (values := getattr(self, name)) is not None:
                 values = arrays.finite_vector(f"{name} of the scan", values)
-                arrays.require_size(f"{name} of the scan (/entry/data/{name})", values, "m")
+                place = f"{name} of the scan (/entry/data/{name})"
+                arrays.require_size(place, values, "m", smallest=0.0)
                 object.__setattr__(self, name, values)
         object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
         if self.repeat is not None:

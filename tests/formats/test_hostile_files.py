@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,79 @@ def test_a_dataset_that_cannot_be_read_safely_is_refused(edited: Edit, make, wor
     path = edited(make)
     assert path.stat().st_size < 2**20
     assert_refused_cheaply(path, words)
+
+
+@pytest.mark.parametrize("filters", [
+    {"compression": "gzip"}, {"compression": "gzip", "shuffle": True, "fletcher32": True},
+], ids=["gzip", "all"])  # fmt: skip
+@pytest.mark.parametrize("number", [2**25, 1023, 0])
+def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited: Edit, filters, number):
+    """HDF5 unpacks all of it: of half a megabyte 562 MB were held, and the file passed."""
+
+    def make(group: h5py.Group) -> h5py.Dataset:
+        dataset = group.create_dataset("u_zz", (1024,), "f8", chunks=(1024,), **filters)
+        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(8 * number)))
+        return dataset
+
+    path = edited(make)
+    assert path.stat().st_size < 2**20
+    assert_refused_cheaply(path, "does not unpack to 8,192 bytes")
+
+
+@pytest.mark.parametrize("order", ["shuffle deflate fletcher32", "fletcher32 deflate"])
+def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited: Edit, order):
+    codes = {name: getattr(h5py.h5z, f"FILTER_{name.upper()}") for name in order.split()}
+
+    def make(group: h5py.Group) -> h5py.Dataset:
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_chunk((20,))
+        for name, code in codes.items():
+            options = {"deflate": (6,), "shuffle": (8,)}.get(name, ())
+            plist.set_filter(code, h5py.h5z.FLAG_MANDATORY, options)
+        space, kind = h5py.h5s.create_simple((33,)), h5py.h5t.NATIVE_DOUBLE
+        dataset = h5py.Dataset(h5py.h5d.create(group.id, b"u_zz", kind, space, plist))
+        dataset[:] = np.arange(33.0)
+        return dataset
+
+    np.testing.assert_allclose(read_scan(edited(make)).u_zz, np.arange(33.0) * 1e-3)
+
+
+def test_numbers_of_one_byte_count_as_they_are_held(edited: Edit):
+    """Of 163 kB 3.1 GB were held, in many arrays that each kept to the limit."""
+    path = edited(lambda g: g.create_dataset("u_zz", data=np.ones(10**8, "i1"), compression="gzip"))
+    assert_refused_cheaply(path, "claims 800,000,000 bytes")
+    path = edited(
+        lambda g: g.create_dataset("u_zz", data=np.ones(2 * 10**7, "i1"), compression="gzip")
+    )
+    assert_refused_cheaply(path, "over the limit", "as they are held")
+
+
+def test_chunks_that_are_larger_than_their_array_are_refused_in_sum(edited: Edit):
+    def make(group: h5py.Group) -> h5py.Dataset:
+        shape, chunks = (4096, 1), (1, 2**17)
+        return group.create_dataset("u_zz", shape, "f8", chunks=chunks, maxshape=(None, None))
+
+    assert_refused_cheaply(edited(make), "chunks of 4,294,967,296 bytes")
+
+
+def test_records_of_attributes_that_are_forged_by_the_thousand_are_not_all_followed(path: Path):
+    """Of 32 MB of them each was followed, which took 40 s."""
+    copy = path.with_name("copy.h5")
+    with h5py.File(path) as ours, h5py.File(copy, "w", libver="latest") as file:
+        ours.copy("/entry", file)
+        for name, value in ours.attrs.items():
+            file.attrs[name] = value
+        x = file["/entry/data/x"]
+        del x.attrs["units"]
+        for i in range(30):
+            x.attrs[f"further_{i}"] = "y"
+        x.attrs["units"] = "mm"
+    good = copy.read_bytes()
+    path.write_bytes(good + b"\3\0\6\0\x10\0\x10\0\0units\0" * 10_000)
+    with pytest.raises(FormatError, match="more namesakes than can be checked"):
+        read_scan(path)
+    path.write_bytes(good + b"\3\0\6\0\x10\0\x10\0\0units\0" * 9_000)
+    read_scan(path)
 
 
 def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):

@@ -183,7 +183,8 @@ def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):
     assert (tmp_path / "a.h5").stat().st_size < u.nbytes
 
 
-finite = st.floats(-1e6, 1e6, allow_subnormal=False)
+# Quantities are no smaller, in SI units.
+finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else 0.0)
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -46,6 +46,9 @@ def damage_named(
 
 
 _MAX_ATTRIBUTE_BYTES, _MAX_ATTRIBUTE_ITEMS = 2**16, 64
+#: Bytes that may be held of any file, and more for each of its bytes: packed readings of noise
+#: stand for two or three bytes each, and arrays without noise beside them for many.
+_USUAL, _MOST_PER_BYTE = 2**26, 64
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -83,7 +86,8 @@ class SafeFile:
         self._accept_altered = accept_altered
         self._data = data
         self._opened: dict[str, Any] = {"/": file["/"].id}
-        self._budget = MOST_HDF5_BYTES
+        # Of a small file no more than it may well stand for.
+        self._budget = self._most = min(MOST_HDF5_BYTES, _USUAL + _MOST_PER_BYTE * len(data))
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
         self._listed: frozenset[str] | None = None
@@ -132,8 +136,8 @@ class SafeFile:
         if path not in self._arrays:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                of = limits.check_layout(self.where(path), dataset, text=False)
-                self._spend(path, of.size)
+                of = limits.check_layout(self.where(path), dataset, self._data, text=False)
+                self._spend(path, of.held)
                 whole = of.kind.get_class() == h5py.h5t.INTEGER
                 values = np.empty(of.shape, dtype=np.int64 if whole else np.float64)
                 dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
@@ -153,7 +157,7 @@ class SafeFile:
         if path not in self._texts:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                of = limits.check_layout(self.where(path), dataset, text=True)
+                of = limits.check_layout(self.where(path), dataset, self._data, text=True)
                 self._spend(path, of.size)
                 if of.kind.is_variable_str():
                     offset = dataset.get_offset() or -1
@@ -207,7 +211,7 @@ class SafeFile:
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size
         if self._budget < 0:
-            why = f"At most {MOST_HDF5_BYTES:,} bytes are read from one file."
+            why = f"At most {self._most:,} bytes, as they are held, are read from it."
             raise refuse(self.where(path), "brings the data of this file over the limit", why)
 
     def _check_length(self, path: str, length: int) -> None:
