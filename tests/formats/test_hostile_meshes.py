@@ -86,19 +86,29 @@ def test_absurd_xml_is_refused(tmp_path: Path, text):
     refused(path)
 
 
-@pytest.mark.parametrize("number", [81, 9])
 def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Blocks of 16 MiB: of 1.4 GB the reader is ended, and 150 MB are not answered."""
+    """Eighty blocks of 16 MiB."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     block = zlib.compress(bytes(2**24), 9)
-    header = struct.pack(f"<{number + 3}I", number, 2**24, 0, *[len(block)] * number)
+    header = struct.pack("<83I", 80, 2**24, 0, *[len(block)] * 80)
     path = tmp_path / "film.vtu"
-    blocks = base64.b64encode(header) + base64.b64encode(block * number)
+    blocks = base64.b64encode(header) + base64.b64encode(block * 80)
     path.write_text(POINTS.format(blocks.decode()))
     refused(path, r"more than 6\d\d MB", UnsafeFileError)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path: Path, monkeypatch):
+    path = small(tmp_path / "film.vtu")
+    monkeypatch.setattr(mesh_files, "_ANSWER", 0)
+    size = path.stat().st_size
+    values = sum(a.nbytes for a in (SMALL.points, SMALL.cells[0].data, SMALL.point_data["S9"]))
+    for per_byte, enough in ((values // size, False), (values // size + 1, True)):
+        monkeypatch.setattr(mesh_files, "_ANSWER_PER_BYTE", per_byte)
+        with contextlib.nullcontext() if enough else pytest.raises(UnsafeFileError):
+            read_mesh(path)
 
 
 def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
