@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 
 import click
 
-from memscal.__main__ import handle_ending
 from memscal.cli.output import error, message, unprinted, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
@@ -49,6 +48,14 @@ def debug_option(command: _Command) -> _Command:
     )(command)
 
 
+def _handle_ending(handler: Any) -> dict[int, Any]:
+    """Set a handler of the signals that end a program; one that nohup has it ignore stays so."""
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    heard = [n for n in numbers if signal.getsignal(n) is not signal.SIG_IGN]
+    return {number: signal.signal(number, handler) for number in heard}
+
+
 class _Ended(KeyboardInterrupt):
     """A signal came; of the class itself Python would kill the process after the clean-up."""
 
@@ -61,11 +68,11 @@ def _interruptible() -> Iterator[list[int]]:
     def interrupt(number: int, _: object) -> None:
         came.append(number)
         # The clean-up is not interrupted, but for a second Ctrl-C.
-        handle_ending(signal.SIG_IGN)
+        _handle_ending(signal.SIG_IGN)
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise _Ended
 
-    before = handle_ending(interrupt) if current_thread() is main_thread() else {}
+    before = _handle_ending(interrupt) if current_thread() is main_thread() else {}
     try:
         yield came
     except Exception as failure:

@@ -399,8 +399,7 @@ _SHORTEST_SPAN = 0.5
 _LONGEST_STEP = 4.0
 #: ... and three times that width is no sensor's.
 _WIDEST_VOLTAGE = 20.0
-#: Signals of such sensors end at 20 h; a rod scan spans 8 h. Time and memory, a gigabyte at this
-#: span, grow with its square.
+#: Signals of such sensors end at 20 h. Memory, a gigabyte here, grows with the square of the span.
 _LONGEST_SPAN = 60.0
 #: Usual lengths in thicknesses: a scan of a 2 mm film spans 16 mm, 0.25 mm apart, by a rod of
 #: 0.25 mm, and its voltage is 2.8 mm wide.
@@ -431,54 +430,51 @@ _LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
 
 def require_span(scan: Scan) -> None:
     """Refuse positions over which no film is scanned, before anything is built on them."""
-    lengths, h = _lengths(scan), scan.set_up.film.thickness
-    span = lengths["span"]
-    _refuse(scan, span < _SHORTEST_SPAN * h, "The positions span", span, _SHORT, lengths)
-    _refuse(scan, span > _LONGEST_SPAN * h, "The positions span", span, _LONG, lengths)
+    h, lengths = scan.set_up.film.thickness, _lengths(scan)
+    row = "The positions span", (span := lengths["span"])
+    short, long = span < _SHORTEST_SPAN * h, span > _LONGEST_SPAN * h
+    _refuse(scan, lengths, (short, *row, _SHORT), (long, *row, _LONG))
 
 
 def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
-    lengths, h = _lengths(scan), scan.set_up.film.thickness
+    h, lengths = scan.set_up.film.thickness, _lengths(scan)
     span, rod = lengths["span"], 2 * scan.set_up.indenter.radius
-    friction = "Under a rod wider than the film is thick, the stress depends on friction."
     of_rod = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
-    _refuse(scan, span < _SHORTEST_SPAN * h, "The positions span", span, _SHORT, lengths)
-    _refuse(scan, rod > span, of_rod, rod, _SHORT, lengths)
-    # Grouped by place are only positions that are not all within rounding of each other.
+    short = (span < _SHORTEST_SPAN * h, "The positions span", span, _SHORT)
+    _refuse(scan, lengths, short, (rod > span, of_rod, rod, _SHORT))
     x, y = (positions.ravel() for positions in scan.positions)
     steps = places_of(x, y, scan.passes.ravel()).steps
     lengths["step"] = step = min((s for s in steps if s > 0), default=0.0)
     lengths["width"] = width = _voltage_width(x, y, scan.u_zz.ravel())
-    for wrong, name, value, why in (
+    no_sensor, of_width = (
+        f"{_WIDE}no sensor is so much wider.",
+        "The voltage's width at half height is",
+    )
+    _refuse(
+        scan, lengths,
         (step > _LONGEST_STEP * h, "The positions' step is", step, f"{_WIDE}the scan misses it."),
         (span > _LONGEST_SPAN * h, "The positions span", span, _LONG),
-        (rod > h, "The rod's width is", rod, friction),
-        (width > _WIDEST_VOLTAGE * h, "The voltage's full width at half its height is", width,
-         f"{_WIDE}no sensor that it serves is so much wider."),
-    ):  # fmt: skip
-        _refuse(scan, wrong, name, value, why, lengths)
+        (rod > h, "The rod's width is", rod, "Under such a rod the stress depends on friction."),
+        (width > _WIDEST_VOLTAGE * h, of_width, width, no_sensor),
+    )  # fmt: skip
 
 
 def _lengths(scan: Scan) -> dict[str, float]:
     """Return the span of a scan and the radius of a rod, in m."""
-    spans = [float(np.ptp(along)) for along in (scan.x, scan.y) if along is not None]
-    radius = {"radius": scan.indenter.radius} if isinstance(scan.indenter, Rod) else {}
-    return {"span": max(spans), **radius}
-
-
-def _refuse(
-    scan: Scan, wrong: bool, name: str, value: float, why: str, lengths: dict[str, float]
-) -> None:
-    if not wrong:
-        return
-    h, place = scan.set_up.film.thickness, f"{scan.source.file_name}: " if scan.source else ""
-    raise InputError(
-        f"{place}{name} {value * 1e3:.4g} mm, {value / h:.3g} times the film's thickness of "
-        f"{h * 1e3:.4g} mm.",
-        why=why,
-        cure=_cure(lengths, h),
+    span = max(float(np.ptp(along)) for along in (scan.x, scan.y) if along is not None)
+    return {"span": span} | (
+        {"radius": scan.indenter.radius} if isinstance(scan.indenter, Rod) else {}
     )
+
+
+def _refuse(scan: Scan, lengths: dict[str, float], *rows: tuple[bool, str, float, str]) -> None:
+    h, place = scan.set_up.film.thickness, f"{scan.source.file_name}: " if scan.source else ""
+    for wrong, name, value, why in rows:
+        if wrong:
+            times = f"{value / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
+            problem = f"{place}{name} {value * 1e3:.4g} mm, {times}."
+            raise InputError(problem, why=why, cure=_cure(lengths, h))
 
 
 def require_size(scans: Sequence[Scan]) -> None:
@@ -491,15 +487,6 @@ def require_size(scans: Sequence[Scan]) -> None:
         why = "Time and memory grow with their number."
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
         raise too_large(named, size, most, of, why=why, cure=cure)
-
-
-def require_contact_size(scan: Scan, most: int) -> None:
-    """Refuse a contact of more points than its stress is restored or measured from."""
-    if (size := scan.u_zz.size) > most:
-        named = scan.source.file_name if scan.source else "The scan"
-        why = "Its stress has a covariance, which takes memory."
-        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
 
 
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
-from memscal.estimation.points import require_contact_size, require_span
+from memscal.estimation.points import require_span
 from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
@@ -178,7 +178,7 @@ def measure_stress(
     origins = tuple(one_load.measured_scan(data) for data in scans)
     singles = [one_load.single_loads(data) for data in scans]
     for single in chain(*singles):
-        require_contact_size(single, MOST_OF_CONTACT)
+        restore.require_contact_size(single, MOST_OF_CONTACT)
     loads = [
         _measure(origin, single, sensor)
         for origin, of_scan in zip(origins, singles, strict=True)

@@ -28,7 +28,7 @@ from memscal.model.measured_stress import MeasuredScan
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
-from memscal.model.sizes import MOST_RESTORED
+from memscal.model.sizes import MOST_RESTORED, too_large
 from memscal.parallel import single_threaded
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
@@ -38,10 +38,19 @@ _OF_THE_FILM = (
 )
 
 
+def require_contact_size(scan: Scan, most: int) -> None:
+    """Refuse a contact of more points than its stress is restored or measured from."""
+    if (size := scan.u_zz.size) > most:
+        named = scan.source.file_name if scan.source else "The scan"
+        why = "Its stress has a covariance, which takes memory."
+        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
+        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
+
+
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     """Refuse a scan of several loads of a curved indenter, of many points, or without cov(G)."""
     require_covariance(apparatus)
-    scan_points.require_contact_size(scan, MOST_RESTORED)
+    require_contact_size(scan, MOST_RESTORED)
     scan_points.require_span(scan)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
