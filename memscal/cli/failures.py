@@ -1,13 +1,14 @@
 """Exit codes and messages of exceptions; a traceback is shown with --debug only."""
 
 import errno
+import os
 import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from threading import current_thread, main_thread
+from threading import Timer, current_thread, main_thread
 from typing import Any, TypeVar
 
 import click
@@ -67,11 +68,16 @@ def _interruptible() -> Iterator[list[int]]:
 
     def interrupt(number: int, _: object) -> None:
         came.append(number)
-        # The clean-up is not interrupted, but for a second Ctrl-C.
-        _handle_ending(signal.SIG_IGN)
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise _Ended
 
+    def again(unraisable: Any) -> None:
+        """Send a signal once more that came where Python ignores errors, as in a destructor."""
+        if isinstance(unraisable.exc_value, _Ended):
+            Timer(0.01, os.kill, (os.getpid(), came.pop())).start()
+        else:
+            usual(unraisable)
+
+    usual, sys.unraisablehook = sys.unraisablehook, again
     before = _handle_ending(interrupt) if current_thread() is main_thread() else {}
     try:
         yield came
@@ -81,6 +87,7 @@ def _interruptible() -> Iterator[list[int]]:
         # A library may have made another error of it.
         raise _Ended from failure
     finally:
+        sys.unraisablehook = usual
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -93,15 +93,20 @@ def test_a_signal_during_an_import_has_no_traceback(tmp_path: Path, number, code
 
 
 @pytest.mark.parametrize(("number", "code"), ENDING)
-def test_a_signal_within_text_that_is_run_has_its_exit_code(tmp_path: Path, number, code):
-    """Python kills itself by SIGINT after a KeyboardInterrupt there, even if it was handled."""
+@pytest.mark.parametrize("destructor", [False, True])
+def test_a_signal_ends_the_program_wherever_it_comes(tmp_path: Path, number, code, destructor):
+    """Python kills itself by SIGINT after one in text that is run; in a destructor it is lost."""
+    place = "class Late:\n    __del__ = lambda _: os.kill(os.getpid(), {n})\nLate(); time.sleep(9)"
+    text = place if destructor else "os.kill(os.getpid(), {n})"
     script = (
+        "import time\n"
         "import os, sys\n"
         "from memscal.cli import commands, main\n"
         "def stopped(*_, **__):\n"
-        f"    exec('os.kill(os.getpid(), {int(number)})')\n"
+        f"    exec({text.format(n=int(number))!r}, globals())\n"
         "commands.import_module = stopped\n"
         "sys.exit(main(['inspect', 'missing.h5']))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
     assert (done.returncode, b"Interrupted" in done.stderr) == (code, True)
+    assert b"Traceback" not in done.stderr
