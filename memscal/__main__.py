@@ -1,8 +1,20 @@
 """``python -m memscal`` is the command ``memscal``."""
 
+import os
+import signal
 import sys
 
-from memscal.cli import main
+
+def run() -> int:
+    """Run the command; a signal during its imports ends it at once, for nothing is written yet."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda number, _: os._exit(128 + number))
+    from memscal.cli import main
+
+    return main()
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run())

@@ -310,13 +310,15 @@ class ApparatusFunction(Result, ApparatusData):
         return radii, stress
 
 
-def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
+def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -> ApparatusFunction:
     """Read an apparatus function from its artifact.
 
     Parameters
     ----------
     path : path-like
         A file written by ``memscal calibrate`` or :meth:`ApparatusFunction.save`.
+    accept_altered : bool
+        Accept a file whose content does not fit its digest: ``source.altered`` records it.
 
     Returns
     -------
@@ -343,7 +345,7 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
     from memscal.formats.hdf5.reader import open_hdf5
     from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 
-    with open_hdf5(path) as file:
+    with open_hdf5(path, accept_altered=accept_altered) as file:
         data = artifact_from(file)
         digest, source = file.attribute("/", DIGEST_ATTRIBUTE), file.source
     apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
@@ -353,10 +355,12 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
     return apparatus
 
 
-def opened_apparatus(apparatus: ApparatusFunction | str | PathLike[str]) -> ApparatusFunction:
+def opened_apparatus(
+    apparatus: ApparatusFunction | str | PathLike[str], *, accept_altered: bool = False
+) -> ApparatusFunction:
     """Return the apparatus function, read from its artifact where it is a path."""
     if isinstance(apparatus, str | PathLike):
-        return load_apparatus(apparatus)
+        return load_apparatus(apparatus, accept_altered=accept_altered)
     if not isinstance(apparatus, ApparatusFunction):
         raise InputError(
             f"There is a {type(apparatus).__name__} where an apparatus function is needed.",

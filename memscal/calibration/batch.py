@@ -215,7 +215,8 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     row: dict[str, Any] = {"place": shard.first + i, **asdict(item), "passed": False}
     row |= {"calibrated_at": timestamp(), "options_sha256": batch.options_sha256}
     row |= {"version": batch.version, "error": None}
-    scan = attempted(item.path, lambda: read_scan(path))
+    accepted = batch.options.get("accept_altered", False)
+    scan = attempted(item.path, lambda: read_scan(path, accept_altered=accepted))
     if isinstance(scan, MemscalError):
         return row | _of_error(scan) | {"input_sha256": _sha256_of_file(path)}
     row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}

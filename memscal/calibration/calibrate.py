@@ -50,7 +50,7 @@ from memscal.model.apparatus import (
 from memscal.model.checks import Message, QualityCheck, override_messages
 from memscal.model.film import LINEAR
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.provenance import Process, timestamp
+from memscal.model.provenance import Process, accepted_alterations, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_LINES
@@ -266,6 +266,7 @@ def calibrate(
     free: str | Sequence[str] = (),
     seed: int = 0,
     override: bool = False,
+    accept_altered: bool = False,
     relative: bool = False,
     other: bool = True,
     **options: Any,
@@ -323,6 +324,8 @@ def calibrate(
         Seed of methods that draw random numbers.
     override : bool, default False
         Accept a reference or alternative of another film, rod or load than the scan's; recorded.
+    accept_altered : bool, default False
+        Accept files whose content does not fit their digest; recorded like what is overridden.
     relative : bool, default False
         For scans at constant depth, or of unknown load: loads count for nothing, A is the reading
         by the reference over its largest stress, and no result states pascals from it.
@@ -352,9 +355,9 @@ def calibrate(
     """
     pairs = correlations or {}
     prepared = prepare(
-        opened_scans(scan, MOST_OF_LINES), reference, alternative,
+        opened_scans(scan, MOST_OF_LINES, accept_altered=accept_altered), reference, alternative,
         (film_law, mooney_rivlin_ratio, rod_friction),
-        pixel_size=pixel_size, override=override, relative=relative,
+        pixel_size=pixel_size, override=override, accept_altered=accept_altered, relative=relative,
     )  # fmt: skip
     scans, stresses, owners = prepared.scans, list(prepared.stresses), prepared.owners
     reading, as_stated = prepared.reading, prepared.as_stated
@@ -443,12 +446,13 @@ def prepare(
     pixel_size: float | None,
     override: bool,
     relative: bool,
+    accept_altered: bool = False,
 ) -> Prepared:
     """Read and solve the references, and hold them against the scans; see :func:`calibrate`."""
     # ``law``: the film's, its ratio, and the friction of the rod, where they are asked for.
     require_size(as_stated)
     as_stated = require_one_sensor(as_stated)
-    references = _references(reference, as_stated, pixel_size)
+    references = _references(reference, as_stated, pixel_size, accept_altered=accept_altered)
     for scan, given in zip(as_stated, references, strict=True):
         require_calibration_rod(scan, given)
     scans = tuple(_of_law(s, r, law) for s, r in zip(as_stated, references, strict=True))
@@ -458,8 +462,12 @@ def prepare(
         loads: dict[str, Any] = dict.fromkeys(("load_uncertainty", *_OF_POINTS))
         kept = [None if r else s.load for s, r in zip(scans, stated, strict=True)]
         scans = tuple(replace(s, load=p, **loads) for s, p in zip(scans, kept, strict=True))
-    alternatives = None if alternative is None else _references(alternative, scans)
+    alternatives = None
+    if alternative is not None:
+        alternatives = _references(alternative, scans, accept_altered=accept_altered)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
+    files = (*as_stated, *references, *(alternatives or ()))
+    overridden[:0] = accepted_alterations(*(getattr(file, "source", None) for file in files))
     scans = tuple(with_film_of(r, s) for s, r in zip(scans, references, strict=True))
     require_one_kind(stated, alternatives or ())
     owners: Sequence[int] | None = None
@@ -507,6 +515,8 @@ def _references(
     reference: Reference | Sequence[Reference],
     scans: Sequence[Scan],
     pixel_size: float | None = None,
+    *,
+    accept_altered: bool = False,
 ) -> list[BaseStress | None]:
     """Read a reference for each scan; a single one is that of all scans."""
     loads = scans[0].normal_load
@@ -517,16 +527,18 @@ def _references(
             problem = f"{len(reference)} references were given, but there {count}."
             cure = "Give one for each scan, in their order, or one for all."
             raise InputError(problem, cure=cure)
-        return [_read(item, strength, pixel_size) for item in reference]
-    return [_read(reference, strength, pixel_size)] * len(scans)
+        return [_read(item, strength, pixel_size, accept_altered) for item in reference]
+    return [_read(reference, strength, pixel_size, accept_altered)] * len(scans)
 
 
-def _read(reference: Reference, load: float, pixel_size: float | None) -> BaseStress | None:
+def _read(
+    reference: Reference, load: float, pixel_size: float | None, accept_altered: bool
+) -> BaseStress | None:
     """Read a reference; a source has its own strength at the nominal load of the first scan."""
     if isinstance(reference, str | PathLike):
         from memscal.formats.reference import read_reference
 
-        reference = read_reference(reference, pixel_size=pixel_size)
+        reference = read_reference(reference, pixel_size=pixel_size, accept_altered=accept_altered)
     elif isinstance(reference, IdealReference | StressField):
         reference = reference.profile()
     if isinstance(reference, StressProfile) and (form := reference.form) is not None:

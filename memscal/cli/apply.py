@@ -7,7 +7,8 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, option, output_options
+from memscal.cli.options import FILE, accept_altered_option, option, output_options
+from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -26,6 +27,7 @@ Examples:
 @option("--override", is_flag=True)(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
+@accept_altered_option
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
@@ -42,9 +44,10 @@ def command(
 
     A failed quality check is exit code 1: the result is written all the same.
     """
-    from memscal.formats.scan import read_scan
+    from memscal.formats.opened import opened_scans
 
-    data = [read_scan(path) for path in scans]
+    accepted = {name: options[name] for name in ("override", "accept_altered")}
+    data = opened_scans(scans, accept_altered=accepted["accept_altered"])
     written = options["output"] or out.beside(scans[0], ".stress.h5")
     figures = options["figures"]
     out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
@@ -53,15 +56,16 @@ def command(
     from memscal.summaries.stress import tables
 
     with out.working("Measuring"):
-        stress = measure_stress(data, artifact, override=options["override"])
+        stress = measure_stress(data, artifact, **accepted)
     with out.working("Drawing"):
         drawn = out.rendered(stress.plot, figures)
-    stress.save(written, overwrite=force)
-    out.write_files(drawn, force=force)
-    if as_json:
-        out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
-    else:
-        out.emit_tables(*tables(stress))
+    with together():
+        stress.save(written, overwrite=force)
+        out.write_files(drawn, force=force)
+        if as_json:
+            out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
+        else:
+            out.emit_tables(*tables(stress))
     out.show_messages(stress.messages)
     for path in (written, *figures):
         out.message(f"Written: {path}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -84,7 +85,8 @@ def command(
     from memscal.calibration.batch import Batch
 
     chosen = calibration_settings(**settings)
-    batch = Batch(source.resolve(), results.resolve(), chosen, artifacts, shard_size)
+    source, results = (Path(os.path.realpath(path)) for path in (source, results))
+    batch = Batch(source, results, chosen, artifacts, shard_size)
     batch, start = batch.prepare(resume=resume), monotonic()
     total = batch.count
     try:

@@ -17,6 +17,7 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
 from memscal.cli.options import FILE, Quantity, force_option, json_option, option, options_of
+from memscal.formats.files import together
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -179,6 +180,7 @@ calibration_options = options_of(
     option("--override", is_flag=True)(
         "Go on although a reference is of another film, rod or load than its scan: recorded."
     ),
+    common.accept_altered_option,
     option("--relative", is_flag=True)(
         "For scans at constant depth or of unknown load: no load counts, A is relative, and states"
         " no pascals."
@@ -201,8 +203,9 @@ def calibration_settings(
     """Return the options of :func:`memscal.calibrate` that options of the command line ask for."""
     regulariser = _chosen_method(method, options, seed, others["channel"])
     pairs = dict(_correlation(text) for text in correlations)
-    stress = None if reference is None else _read_reference(reference, pixel_size)
-    other = None if alternative is None else _read_reference(alternative)
+    accepted = others["accept_altered"]
+    stress = None if reference is None else _read_reference(reference, pixel_size, accepted)
+    other = None if alternative is None else _read_reference(alternative, None, accepted)
     chosen = {"reference": stress, "alternative": other, "method": regulariser, "seed": seed or 0}
     return chosen | {"correlations": pairs, **others}
 
@@ -274,7 +277,7 @@ def command(
     output = output or out.beside(scans[0], ending)
     outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
-    data, seed = _read(scans, reference, settings["reference"]), settings["seed"]
+    data, seed = _read(scans, reference, settings), settings["seed"]
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs, force=force, inputs=inputs)
     if dry_run:
@@ -301,19 +304,26 @@ def command(
         if sweep_figure is not None:
             contents |= out.rendered(further["sweep"].plot, [sweep_figure])
     apparatus = calibration.apparatus.compact() if compact else calibration.apparatus
-    apparatus.save(output, overwrite=force)
-    out.write_files(contents, force=force)
-    return _show(calibration, further, outputs, as_json)
+    with together():
+        apparatus.save(output, overwrite=force)
+        out.write_files(contents, force=force)
+        _print(calibration, further, output, as_json)
+    out.show_messages(apparatus.process.messages)
+    for path in outputs:
+        out.message(f"Written: {path}")
+    then = f" {output.name} was written and is marked so."
+    return exit_code_of(apparatus.checks, then=then)
 
 
 def _read(
-    paths: tuple[Path, ...], reference: Path | None, profile: StressProfile | None
+    paths: tuple[Path, ...], reference: Path | None, settings: Mapping[str, Any]
 ) -> list[Scan]:
     from memscal.estimation.reference import require_calibration_rod
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
 
-    scans = list(opened_scans(paths, MOST_OF_LINES))
+    profile, accepted = settings["reference"], settings["accept_altered"]
+    scans = list(opened_scans(paths, MOST_OF_LINES, accept_altered=accepted))
     for scan, path in zip(scans, paths, strict=True):
         require_calibration_rod(scan, profile)
         if reference is not None and scan.reference is not None:
@@ -321,7 +331,7 @@ def _read(
     return scans
 
 
-def _read_reference(path: Path, pixel_size: str | None = None) -> StressProfile:
+def _read_reference(path: Path, pixel_size: str | None, accepted: bool) -> StressProfile:
     from memscal.errors import InputError
     from memscal.formats.reference import length, read_reference
 
@@ -334,7 +344,7 @@ def _read_reference(path: Path, pixel_size: str | None = None) -> StressProfile:
             f"-o {path.with_suffix('.h5')}",
         )
     size = None if pixel_size is None else length(pixel_size, "The pixel size")
-    return read_reference(path, pixel_size=size)
+    return read_reference(path, pixel_size=size, accept_altered=accepted)
 
 
 def _rehearse(
@@ -373,21 +383,16 @@ def _rehearse(
     out.message("Nothing was written (--dry-run).")
 
 
-def _show(
+def _print(
     calibration: Calibration,
     further: Mapping[str, Sweep | MonteCarlo],
-    outputs: Sequence[Path],
+    output: Path,
     as_json: bool,
-) -> int:
+) -> None:
     if as_json:
-        files = {"schema_version": "1", "artifact": str(outputs[0])}
+        files = {"schema_version": "1", "artifact": str(output)}
         values = {name: result.to_dict() for name, result in further.items()}
         out.emit_json(files | calibration.to_dict() | values)
     else:
         tables = [table for result in further.values() for table in result.tables()]
         out.emit_tables(*calibration.tables(), *tables)
-    out.show_messages(calibration.apparatus.process.messages)
-    for path in outputs:
-        out.message(f"Written: {path}")
-    checks = calibration.apparatus.checks
-    return exit_code_of(checks, then=f" {outputs[0].name} was written and is marked so.")

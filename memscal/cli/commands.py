@@ -74,9 +74,9 @@ Exit codes:
   1    done, but a quality check failed, or a scan of a batch; the results say so
   2    wrong usage of a command
   3    the input was refused
-  4    the output was not written; what was there before is untouched
+  4    the outputs were not written; what was there before is untouched
   70   a fault in memscal itself
-  130  interrupted
+  129  interrupted by SIGHUP, 130 by Ctrl-C, 143 by SIGTERM; nothing is left half-written
 """
 
 

@@ -10,7 +10,8 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, Quantity, option, output_options
+from memscal.cli.options import FILE, Quantity, accept_altered_option, option, output_options
+from memscal.formats.files import together
 
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
@@ -93,6 +94,7 @@ Examples:
 @option("--override", is_flag=True)(
     "Compare although sensor, channel or film of artifact and scan differ; recorded."
 )
+@accept_altered_option
 @option("--cache", FILE, metavar="FOLDER")(
     "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
     "the user's cache folder]"
@@ -133,8 +135,9 @@ def command(
     from memscal.friction.compare import compare, scans_of
     from memscal.summaries.comparison import failures, file_json, notes
 
-    apparatus, data = load_apparatus(artifact), opened_contacts(scans)
-    references = [read_reference(path) for path in options["references"]]
+    accepted = {"accept_altered": options["accept_altered"]}
+    apparatus, data = load_apparatus(artifact, **accepted), opened_contacts(scans, **accepted)
+    references = [read_reference(path, **accepted) for path in options["references"]]
     single, folder, interface = options["single"], options["folder"], options["interface"]
     named = {}
     if folder is not None:
@@ -170,18 +173,17 @@ def command(
 
             for stem, draw in comparison_figures(comparison).items():
                 ready |= out.rendered(draw, [named[stem]])
-    if folder is not None:
-        folder.mkdir(exist_ok=True)
-    out.write_files(ready, force=force)
-    if as_json:
-        files = {
-            "artifact": file_json(apparatus.source),
-            "references": [file_json(profile.source) for profile in references],
-            "figures": [str(path) for path in figures],
-        }
-        out.emit_json(comparison.to_dict() | files)
-    else:
-        out.emit_tables(*comparison.tables())
+    with together(folder):
+        out.write_files(ready, force=force)
+        if as_json:
+            files = {
+                "artifact": file_json(apparatus.source),
+                "references": [file_json(profile.source) for profile in references],
+                "figures": [str(path) for path in figures],
+            }
+            out.emit_json(comparison.to_dict() | files)
+        else:
+            out.emit_tables(*comparison.tables())
     out.show_messages(notes(comparison))
     for path in figures:
         out.message(f"Written: {path}")
@@ -201,7 +203,8 @@ def _of_shear(
     from memscal.friction.compare import compare_shear
     from memscal.summaries.comparison import file_json
 
-    apparatus, channel = load_apparatus(artifact), options["channel"]
+    accepted, channel = {"accept_altered": options["accept_altered"]}, options["channel"]
+    apparatus = load_apparatus(artifact, **accepted)
     if (of_artifact := apparatus.sensor.channel) != channel:
         problem = f"The artifact {artifact} is of channel {of_artifact}, not of {channel}."
         cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
@@ -212,6 +215,7 @@ def _of_shear(
             stress,
             apparatus,
             override=options["override"],
+            **accepted,
             cache=cache,
             workers=min(2, os.cpu_count() or 1),
             **{name: value for name, value in settings.items() if value},

@@ -9,6 +9,7 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
+from memscal.formats.files import together
 
 _VARIED = ("step", "half-range", "repeats")
 #: Options in other units than SI, by the power of ten.
@@ -96,12 +97,13 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     settings |= {name: options[name] for name in ("load", "repeats", "method")}
     settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
     planned = design(kernel=common.kernel_from(options), want=dict(targets), vary=vary, **settings)
-    out.write_files(out.rendered(partial(planned.plot, vary=vary or "step"), figures), force=force)
-
-    if as_json:
-        out.emit_json({"schema_version": "1", **planned.to_dict()})
-    else:
-        out.emit_tables(*planned.tables())
+    drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
+    with together():
+        out.write_files(drawn, force=force)
+        if as_json:
+            out.emit_json({"schema_version": "1", **planned.to_dict()})
+        else:
+            out.emit_tables(*planned.tables())
     beyond = "G follows from the prior" if planned.method == "bayesian" else "the window hides G"
     out.note(
         f"Beyond the resolved band {beyond}: the uncertainty there does not scatter from scan to "

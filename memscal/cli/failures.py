@@ -1,18 +1,26 @@
 """Exit codes and messages of exceptions; a traceback is shown with --debug only."""
 
+import errno
+import os
+import signal
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import Timer, current_thread, main_thread
 from typing import Any, TypeVar
 
 import click
 
-from memscal.cli.output import error, message, warn
+from memscal.cli.output import error, message, unprinted, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
 
 DONE, CHECK_FAILED, USAGE, REFUSED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+#: What standard output may answer.
+_UNPRINTED = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -41,13 +49,58 @@ def debug_option(command: _Command) -> _Command:
     )(command)
 
 
+def _handle_ending(handler: Any) -> dict[int, Any]:
+    """Set a handler of the signals that end a program; one that nohup has it ignore stays so."""
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    heard = [n for n in numbers if signal.getsignal(n) is not signal.SIG_IGN]
+    return {number: signal.signal(number, handler) for number in heard}
+
+
+class _Ended(KeyboardInterrupt):
+    """A signal came; of the class itself Python would kill the process after the clean-up."""
+
+
+@contextmanager
+def _interruptible() -> Iterator[list[int]]:
+    """Have SIGTERM and SIGHUP end the work as Ctrl-C does, cleaned up; yield what came."""
+    came: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        came.append(number)
+        raise _Ended
+
+    def again(unraisable: Any) -> None:
+        """Send a signal once more that came where Python ignores errors, as in a destructor."""
+        if isinstance(unraisable.exc_value, _Ended):
+            Timer(0.01, os.kill, (os.getpid(), came.pop())).start()
+        else:
+            usual(unraisable)
+
+    usual, sys.unraisablehook = sys.unraisablehook, again
+    before = _handle_ending(interrupt) if current_thread() is main_thread() else {}
+    try:
+        yield came
+    except Exception as failure:
+        if not came:
+            raise
+        # A library may have made another error of it.
+        raise _Ended from failure
+    finally:
+        sys.unraisablehook = usual
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def guarded(run: Callable[[Session], int]) -> int:
     """Run a command; return its exit code, or that of its failure after saying what it was."""
     session = Session()
+    came: list[int] = []
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
-            return run(session)
+            with _interruptible() as came:
+                return run(session)
         except click.UsageError as failure:
             failure.show()
             return USAGE
@@ -56,11 +109,21 @@ def guarded(run: Callable[[Session], int]) -> int:
             if isinstance(failure.__cause__, EOFError):
                 return _internal(failure.__cause__)
             message("Interrupted. Nothing was left half-written.")
-            return INTERRUPTED
+            return 128 + came[0] if came else INTERRUPTED
         except MemscalError as failure:
             _traceback(session)
             error(failure.problem, failure.why, failure.cure)
             return failure.exit_code
+        except OSError as failure:
+            _traceback(session)
+            if failure.filename is not None or failure.errno not in _UNPRINTED:
+                return _internal(failure)
+            # click printed a help text; a reader that goes away is no failure.
+            refusal = unprinted(failure)
+            if failure.errno == errno.EPIPE:
+                return DONE
+            error(refusal.problem, refusal.why, refusal.cure)
+            return refusal.exit_code
         except MemoryError:
             _traceback(session)
             cure = "Close other programs, or give a scan with fewer points."

@@ -12,6 +12,7 @@ from memscal.cli import options as common
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, option, output_options, si
 from memscal.cli.output import emit, emit_json, message, prove_writable, show_messages
+from memscal.formats.files import together
 from memscal.model.checks import marked_texts
 from memscal.summaries.table import readable
 
@@ -181,31 +182,32 @@ def command(
     they are. The numbers of readings, repeats, places and missing values are printed, and
     kept in the notes of the file.
     """
-    from memscal.formats.meshes.mesh_files import is_mesh
+    from memscal.formats.meshes.mesh_files import is_mesh, with_drawn_in
 
     mesh = is_mesh(table)
     options["repeat"] = options["repeat"] or None
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    prove_writable([output], force=force, inputs=[table])
-    if kind == "scan":
-        from memscal.formats.scan import write_scan
+    prove_writable([output], force=force, inputs=with_drawn_in(table))
+    with together():
+        if kind == "scan":
+            from memscal.formats.scan import write_scan
 
-        scan = _read_scan(table, options)
-        notes = scan.notes
-        write_scan(scan.scan, output, overwrite=force)
-    else:
-        from memscal.formats.reference import write_reference
+            scan = _read_scan(table, options)
+            notes = scan.notes
+            write_scan(scan.scan, output, overwrite=force)
+        else:
+            from memscal.formats.reference import write_reference
 
-        reference = _read_reference(table, mesh, options)
-        notes = reference.notes
-        write_reference(reference.profile, output, overwrite=force)
-    warnings = [note for note in notes if note.severity == "warning"]
-    if as_json:
-        head = {"schema_version": "1", "output": str(output), "format": kind}
-        emit_json({**head, "notes": marked_texts(notes)})
-    else:
-        emit(readable("\n".join(note.text for note in notes if note not in warnings)))
+            reference = _read_reference(table, mesh, options)
+            notes = reference.notes
+            write_reference(reference.profile, output, overwrite=force)
+        warnings = [note for note in notes if note.severity == "warning"]
+        if as_json:
+            head = {"schema_version": "1", "output": str(output), "format": kind}
+            emit_json({**head, "notes": marked_texts(notes)})
+        else:
+            emit(readable("\n".join(note.text for note in notes if note not in warnings)))
     show_messages(warnings)
     message(f"Written: {output}")
     return DONE

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from memscal.cli.failures import DONE, debug_option
-from memscal.cli.options import FILE, json_option
+from memscal.cli.options import FILE, accept_altered_option, json_option
 from memscal.cli.output import emit_json, emit_tables
 from memscal.model.notation import format_measured
 from memscal.summaries.table import Table, stated_text
@@ -21,9 +21,10 @@ Examples:
 
 @click.command("inspect", epilog=EXAMPLES)
 @click.argument("file", type=FILE)
+@accept_altered_option
 @json_option
 @debug_option
-def command(file: Path, as_json: bool) -> int:
+def command(file: Path, accept_altered: bool, as_json: bool) -> int:
     """Show what a scan, a reference, an artifact or a file of measured stress holds.
 
     Quantities with their standard uncertainties, arrays with shape and range, quality checks, and
@@ -32,7 +33,7 @@ def command(file: Path, as_json: bool) -> int:
     """
     from memscal.formats.inspection import describe
 
-    contents = describe(file)
+    contents = describe(file, accept_altered=accept_altered)
     if as_json:
         emit_json(contents)
     else:
@@ -45,6 +46,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
         ("schema", f"{contents['schema']} {contents['schema_version']}"),
         ("title", contents["title"]),
         ("sha256", contents["sha256"]),
+        ("altered", contents.get("altered", "")),
     ]
     yield Table(str(contents["file"]), ("", ""), [row for row in rows if row[1]])
 

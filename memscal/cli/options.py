@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -23,8 +24,20 @@ else:  # generic since click 8.2 only
 _Command = Callable[..., Any]
 _Adder = Callable[[_Command], _Command]
 
-FILE = click.Path(path_type=Path)
-"""A file's name; the library checks whether it can be read or written."""
+
+class _FileName(click.Path):
+    """A file's name; the library checks whether it can be read or written."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse an empty name, which would be that of the folder."""
+        if not os.fspath(value):
+            self.fail("The name of the file is empty.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+FILE = _FileName(readable=False, path_type=Path)
 
 
 class Quantity(_Number):
@@ -93,6 +106,9 @@ def options_of(*options: _Adder) -> _Adder:
 
 json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+accept_altered_option = option("--accept-altered", is_flag=True)(
+    "Use files although their content does not fit their digest: recorded in the output."
+)
 output_options = options_of(json_option, force_option, debug_option)
 
 #: Those of memscal.model.film, which takes longer to import than help may; a test compares them.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from memscal.errors import OutputError
+from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import Message
 from memscal.summaries.table import Table, readable
 
@@ -31,10 +32,15 @@ def emit(text: str) -> None:
     except BrokenPipeError:
         _discard_stdout()
     except OSError as failure:
-        _discard_stdout()
-        problem = f"The results cannot be printed: {failure.strerror}."
-        cure = "Free some space, or send standard output elsewhere."
-        raise OutputError(problem, why="They go to standard output.", cure=cure) from failure
+        raise unprinted(failure) from failure
+
+
+def unprinted(failure: OSError) -> OutputError:
+    """Return the error for results that standard output does not take."""
+    _discard_stdout()
+    problem = f"The results cannot be printed: {failure.strerror}."
+    cure = "Free some space, or send standard output elsewhere."
+    return OutputError(problem, why="They go to standard output.", cure=cure)
 
 
 def _write_all(stream: TextIO, text: str) -> None:
@@ -207,16 +213,14 @@ class FigurePath(click.Path):
 def beside(path: Path, suffix: str) -> Path:
     """Return the name of a result beside its input."""
     stem = path.stem if path.suffix.lower() in _HDF5_SUFFIXES else path.name
-    return path.with_name(stem + suffix)
+    return path.parent / f"{stem}{suffix}"
 
 
 def prove_writable(outputs: Sequence[Path], *, force: bool, inputs: Sequence[Path] = ()) -> None:
     """Refuse outputs that share a name, and prove that each can be written."""
-    from memscal.formats.files import ensure_writable
-
     seen: dict[Path, Path] = {}
     for output in outputs:
-        real = output.resolve()
+        real = Path(os.path.realpath(output))
         if real in seen:
             raise click.UsageError(
                 f"Two outputs have the same name: {seen[real]} and {output}. Give each its own."
@@ -237,8 +241,7 @@ def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, by
 
 
 def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:
-    """Write files whole, each by its name."""
-    from memscal.formats.files import atomic_write_bytes
-
-    for path, content in contents.items():
-        atomic_write_bytes(path, content, overwrite=force)
+    """Write files whole, each by its name, all of them or none."""
+    with together():
+        for path, content in contents.items():
+            atomic_write_bytes(path, content, overwrite=force)

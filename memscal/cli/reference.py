@@ -13,10 +13,12 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, PAPER_FILM, Quantity, indenter_from, option, options_of, si
+from memscal.formats.files import together
 
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.interface import Interface
+    from memscal.model.checks import Message
     from memscal.model.indenter import Indenter
 
 #: The paper's rod and sphere, in mm.
@@ -158,9 +160,10 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
     table = options["profile_table"]
     out.prove_writable(files, force=force, inputs=[table] if table else [])
     contacts = _pressed(indenter, options)
-    _write(contacts, options, force=force)
-
-    _print(contacts, options, as_json=as_json)
+    with together():
+        _write(contacts, options, force=force)
+        messages = _print(contacts, options, as_json=as_json)
+    out.show_messages(messages)
     for path in files:
         out.message(f"Written: {path}")
     return DONE
@@ -214,7 +217,7 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
 
 
 def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) -> None:
-    """Write the files: figures are drawn before, and a mesh, which may be refused, comes first."""
+    """Write the files."""
     output, mesh, figures = options["output"], options["mesh"], options["figures"]
     drawn: dict[Path, bytes] = {}
     if figures:
@@ -232,7 +235,7 @@ def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) 
     out.write_files(drawn, force=force)
 
 
-def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> None:
+def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> list[Message]:
     from memscal.summaries.contact import contacts_table, depth_messages
 
     messages, warnings = depth_messages(contacts)
@@ -244,4 +247,4 @@ def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool
         out.emit_json({**head, "solutions": solutions, "warnings": warnings})
     else:
         out.emit_tables(contacts_table(contacts))
-    out.show_messages(messages)
+    return messages

@@ -8,7 +8,8 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, option, output_options
+from memscal.cli.options import FILE, accept_altered_option, option, output_options
+from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -32,6 +33,7 @@ Examples:
 @option("--override", is_flag=True)(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
+@accept_altered_option
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
@@ -46,12 +48,13 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     A failed quality check is exit code 1: the result is written all the same.
     """
     from memscal.apparatus import load_apparatus
-    from memscal.formats.reference import read_reference
+    from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan
 
     output, expected, figures = (options[name] for name in ("output", "expected", "figures"))
-    apparatus, data = load_apparatus(artifact), read_scan(scan)
-    stress = None if expected is None else read_reference(expected)
+    accepted = {"accept_altered": options["accept_altered"]}
+    apparatus, data = load_apparatus(artifact, **accepted), read_scan(scan, **accepted)
+    stress = None if expected is None else read_reference(expected, **accepted)
     files = [path for path in (output, *figures) if path is not None]
     out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
@@ -70,16 +73,15 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
                 out.note(f"No contact is shown beside the result: {failure.problem}")
     with out.working("Drawing"):
         drawn = out.rendered(restored.plot, figures)
-    if output is not None:
-        from memscal.formats.reference import write_reference
-
-        write_reference(restored.profile(), output, overwrite=force)
-    out.write_files(drawn, force=force)
-    if as_json:
-        written = None if output is None else str(output)
-        out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
-    else:
-        out.emit_tables(*restored.tables())
+    with together():
+        if output is not None:
+            write_reference(restored.profile(), output, overwrite=force)
+        out.write_files(drawn, force=force)
+        if as_json:
+            written = None if output is None else str(output)
+            out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
+        else:
+            out.emit_tables(*restored.tables())
     out.show_messages(restored.messages)
     for path in files:
         out.message(f"Written: {path}")

@@ -15,6 +15,7 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, PAPER_FILM, Quantity, option, options_of, output_options, si
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
 from memscal.cli.reference import interface_of, interface_options
+from memscal.formats.files import together
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
@@ -230,11 +231,12 @@ def command(
         raster=options["raster"],
         **_shared_settings(options),
     )
-    write_scan(scan, output, overwrite=force)
-    if as_json:
-        emit_json({"schema_version": "1", **_described(scan, output)})
-    else:
-        _print_truth({output: scan}, "scan")
+    with together():
+        write_scan(scan, output, overwrite=force)
+        if as_json:
+            emit_json({"schema_version": "1", **_described(scan, output)})
+        else:
+            _print_truth({output: scan}, "scan")
     note("The scan is synthetic: nothing in it was measured.")
     message(f"Written: {output}")
     return DONE
@@ -283,12 +285,13 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
         **settings,
     )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
-    write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
-    if as_json:
-        described = [_described(scan, path) for path, scan in scans.items()]
-        emit_json({"schema_version": "1", "synthetic": True, "scans": described})
-    else:
-        _print_truth(scans, "experiment")
+    with together(folder):
+        write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
+        if as_json:
+            described = [_described(scan, path) for path, scan in scans.items()]
+            emit_json({"schema_version": "1", "synthetic": True, "scans": described})
+        else:
+            _print_truth(scans, "experiment")
     note("The scans are synthetic: nothing in them was measured.")
     message(f"Written: {', '.join(map(str, scans))}")
     return DONE

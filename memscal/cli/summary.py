@@ -1,5 +1,6 @@
 """``memscal summary``: the results of a batch as tables, a page and a figure."""
 
+import os
 from pathlib import Path
 
 import click
@@ -7,6 +8,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, option, output_options
+from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
@@ -42,13 +44,14 @@ def command(
     with out.working("Drawing"):
         from memscal.figures.fleet import fleet_page
 
-        page = fleet_page(fleet, str(results.resolve().name)).encode("utf-8")
+        page = fleet_page(fleet, Path(os.path.realpath(results)).name).encode("utf-8")
         contents = {output: page, **out.rendered(fleet.plot, figures)}
-    out.write_files(contents, force=force)
-    if as_json:
-        out.emit_json({"schema_version": "1", "page": str(output), **fleet.to_dict()})
-    else:
-        out.emit_tables(*fleet.tables())
+    with together():
+        out.write_files(contents, force=force)
+        if as_json:
+            out.emit_json({"schema_version": "1", "page": str(output), **fleet.to_dict()})
+        else:
+            out.emit_tables(*fleet.tables())
     for path in contents:
         out.message(f"Written: {path}")
     return DONE

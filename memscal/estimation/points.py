@@ -21,6 +21,7 @@ from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
 from memscal.model.correlation import across, of_points, root_of
+from memscal.model.indenter import Rod
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
@@ -398,8 +399,8 @@ _SHORTEST_SPAN = 0.5
 _LONGEST_STEP = 4.0
 #: ... and three times that width is no sensor's.
 _WIDEST_VOLTAGE = 20.0
-#: Signals of such sensors end at 20 h; a rod scan spans 8 h.
-_LONGEST_SPAN = 1000.0
+#: Signals of such sensors end at 20 h. Memory, a gigabyte here, grows with the square of the span.
+_LONGEST_SPAN = 60.0
 #: Usual lengths in thicknesses: a scan of a 2 mm film spans 16 mm, 0.25 mm apart, by a rod of
 #: 0.25 mm, and its voltage is 2.8 mm wide.
 _USUAL = {"radius": (0.02, 0.5), "span": (2.0, 40.0), "step": (1e-3, 0.7), "width": (0.7, 4.0)}
@@ -422,34 +423,58 @@ def mistaken_unit(factor: float) -> str:
     return next((words for m, words in _MISTAKES.items() if abs(factor / m - 1) < _NEAR), "")
 
 
+_SHORT = "So short a scan shows neither the flanks of the stress nor the baseline."
+_WIDE = "The stress at the base of a film is little wider than the film is thick: "
+_LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
+
+
+def require_span(scan: Scan) -> None:
+    """Refuse positions over which no film is scanned, before anything is built on them."""
+    h, lengths = scan.set_up.film.thickness, _lengths(scan)
+    row = "The positions span", (span := lengths["span"])
+    short, long = span < _SHORTEST_SPAN * h, span > _LONGEST_SPAN * h
+    _refuse(scan, lengths, (short, *row, _SHORT), (long, *row, _LONG))
+
+
 def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
-    film, rod, _ = scan.set_up
-    h, a = film.thickness, rod.radius
+    h, lengths = scan.set_up.film.thickness, _lengths(scan)
+    span, rod = lengths["span"], 2 * scan.set_up.indenter.radius
+    of_rod = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
+    short = (span < _SHORTEST_SPAN * h, "The positions span", span, _SHORT)
+    _refuse(scan, lengths, short, (rod > span, of_rod, rod, _SHORT))
     x, y = (positions.ravel() for positions in scan.positions)
-    span = float(max(np.ptp(x), np.ptp(y)))
-    step = min((s for s in places_of(x, y, scan.passes.ravel()).steps if s > 0), default=0.0)
-    width = _voltage_width(x, y, scan.u_zz.ravel())
-    short = "So short a scan shows neither the flanks of the stress nor the baseline."
-    wide = "The stress at the base of a film is little wider than the film is thick: "
-    friction = "Under a rod wider than the film is thick, the stress depends on friction."
-    for wrong, name, value, why in (
-        (span < _SHORTEST_SPAN * h, "The positions span", span, short),
-        (2 * a > span, f"The positions span {span * 1e3:.4g} mm; the rod's width is", 2 * a, short),
-        (step > _LONGEST_STEP * h, "The positions' step is", step, f"{wide}the scan misses it."),
-        (span > _LONGEST_SPAN * h, "The positions span", span, f"{wide}no scan is so long."),
-        (2 * a > h, "The rod's width is", 2 * a, friction),
-        (width > _WIDEST_VOLTAGE * h, "The voltage's full width at half its height is", width,
-         f"{wide}no sensor that it serves is so much wider."),
-    ):  # fmt: skip
+    steps = places_of(x, y, scan.passes.ravel()).steps
+    lengths["step"] = step = min((s for s in steps if s > 0), default=0.0)
+    lengths["width"] = width = _voltage_width(x, y, scan.u_zz.ravel())
+    no_sensor, of_width = (
+        f"{_WIDE}no sensor is so much wider.",
+        "The voltage's width at half height is",
+    )
+    _refuse(
+        scan, lengths,
+        (step > _LONGEST_STEP * h, "The positions' step is", step, f"{_WIDE}the scan misses it."),
+        (span > _LONGEST_SPAN * h, "The positions span", span, _LONG),
+        (rod > h, "The rod's width is", rod, "Under such a rod the stress depends on friction."),
+        (width > _WIDEST_VOLTAGE * h, of_width, width, no_sensor),
+    )  # fmt: skip
+
+
+def _lengths(scan: Scan) -> dict[str, float]:
+    """Return the span of a scan and the radius of a rod, in m."""
+    span = max(float(np.ptp(along)) for along in (scan.x, scan.y) if along is not None)
+    return {"span": span} | (
+        {"radius": scan.indenter.radius} if isinstance(scan.indenter, Rod) else {}
+    )
+
+
+def _refuse(scan: Scan, lengths: dict[str, float], *rows: tuple[bool, str, float, str]) -> None:
+    h, place = scan.set_up.film.thickness, f"{scan.source.file_name}: " if scan.source else ""
+    for wrong, name, value, why in rows:
         if wrong:
-            file_name = f"{scan.source.file_name}: " if scan.source else ""
-            raise InputError(
-                f"{file_name}{name} {value * 1e3:.4g} mm, {value / h:.3g} times the film's "
-                f"thickness of {h * 1e3:.4g} mm.",
-                why=why,
-                cure=_cure({"radius": a, "span": span, "step": step, "width": width}, h),
-            )
+            times = f"{value / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
+            problem = f"{place}{name} {value * 1e3:.4g} mm, {times}."
+            raise InputError(problem, why=why, cure=_cure(lengths, h))
 
 
 def require_size(scans: Sequence[Scan]) -> None:
@@ -462,15 +487,6 @@ def require_size(scans: Sequence[Scan]) -> None:
         why = "Time and memory grow with their number."
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
         raise too_large(named, size, most, of, why=why, cure=cure)
-
-
-def require_contact_size(scan: Scan, most: int) -> None:
-    """Refuse a contact of more points than its stress is restored or measured from."""
-    if (size := scan.u_zz.size) > most:
-        named = scan.source.file_name if scan.source else "The scan"
-        why = "Its stress has a covariance, which takes memory."
-        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
 
 
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
@@ -503,8 +519,10 @@ def _cure(lengths: dict[str, float], thickness: float) -> str:
     for name, path, scaled, stated in (
         ("positions", "data/x", ("span", "step", "width"), 1.0),
         ("a film thickness", "sample/film/thickness", tuple(_USUAL), thickness * 1e3),
-        ("a rod radius", "indenter/radius", ("radius",), lengths["radius"] * 1e3),
+        ("a rod radius", "indenter/radius", ("radius",), lengths.get("radius", 0.0) * 1e3),
     ):
+        if not stated:
+            continue
         low, high = 0.0, np.inf
         for key in (key for key, length in lengths.items() if length > 0):
             least, most = (limit * thickness / lengths[key] for limit in _USUAL[key])
@@ -514,7 +532,7 @@ def _cure(lengths: dict[str, float], thickness: float) -> str:
                 # Not changed by this input: any factor will do, or none.
                 least, most = (0.0, np.inf) if least <= 1 <= most else (np.inf, 0.0)
             low, high = max(low, least), min(high, most)
-        if not low < high:
+        if not 0 < low < high < np.inf:
             continue
         inside = [factor for factor in _MISTAKES if low <= factor <= high]
         middle = np.log(low * high) / 2

@@ -19,7 +19,7 @@ from memscal.formats.hdf5.writer import (
     write_tree,
 )
 from memscal.formats.units import reading_of
-from memscal.formats.values import altered, require_schema, text_list, units_of
+from memscal.formats.values import require_schema, require_unaltered, text_list, units_of
 from memscal.model import apparatus, records
 from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
 from memscal.model.arrays import FloatArray
@@ -33,12 +33,7 @@ _CHANGES = "/entry/kernel_changes"
 def artifact_from(file: SafeFile) -> ApparatusData:
     """Read the apparatus function of an open memscal-artifact file; refuse one that was changed."""
     require_schema(file, ARTIFACT_SCHEMA)
-    if problem := altered(file):
-        raise FormatError(
-            f"{file.name} was changed after it was written: {problem}",
-            why="An apparatus function is used only as its calibration left it.",
-            cure="Get the original file, or run the calibration again.",
-        )
+    require_unaltered(file, ARTIFACT_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
     film, indenter = groups.read_stated(file)
     process, u_zz = groups.read_process(file, "/entry/process"), "/entry/reconvolution/u_zz"

@@ -19,7 +19,7 @@ from memscal.errors import FormatError, MemscalError, OutputError
 from memscal.formats.files import atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_bytes
-from memscal.formats.values import altered, require_schema
+from memscal.formats.values import require_schema, require_unaltered
 from memscal.model.arrays import FloatArray
 
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"
@@ -77,7 +77,8 @@ def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] |
     try:
         with open_hdf5(path) as file:
             require_schema(file, CONTACT_TABLE_SCHEMA)
-            if altered(file) or file.text("/entry/key") != key:
+            require_unaltered(file, CONTACT_TABLE_SCHEMA)
+            if file.text("/entry/key") != key:
                 return None
             arrays = {
                 name: np.asarray(file.array(f"/entry/contacts/{name}"), dtype=np.float64)

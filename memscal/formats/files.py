@@ -3,13 +3,25 @@
 import contextlib
 import errno
 import os
+import re
 import secrets
 import stat
+import time
 from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
+from typing import Any, Self
 
 from memscal.errors import InputError, OutputError, UnsafeFileError
 from memscal.model.sizes import MOST_FILE_BYTES, too_large
+
+fcntl: Any
+try:
+    import fcntl
+except ImportError:  # on Windows, which has no locks of this kind
+    fcntl = None
 
 _UNTOUCHED = "Nothing was written; what was there before is untouched."
 _CURES = {
@@ -32,8 +44,8 @@ def ensure_writable(
     inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> None:
     """Prove that an output can be written, by writing beside it: permissions show no full disk."""
-    with _beside(_checked_target(path, overwrite=overwrite, inputs=inputs)) as temporary:
-        _write_durably(temporary, b"\0")
+    with _Transaction() as proof:
+        proof.write(_checked_target(path, overwrite=overwrite, inputs=inputs), b"\0", overwrite)
 
 
 def atomic_write_bytes(
@@ -41,13 +53,132 @@ def atomic_write_bytes(
 ) -> None:
     """Write a file whole or not at all: beside the target, flushed, then renamed in one step."""
     target = _checked_target(path, overwrite=overwrite)
-    with _beside(target) as temporary:
-        _write_durably(temporary, data)
-        if overwrite:
-            os.replace(temporary, target)
+    with together():
+        _OPEN.get().write(target, data, overwrite)
+
+
+@contextlib.contextmanager
+def together(folder: str | os.PathLike[str] | None = None) -> Iterator[None]:
+    """Have all files that are written in a block take their names at its end, or none of them.
+
+    A folder is made for them if it does not exist; it goes if they fail.
+    """
+    if _OPEN.get(None) is not None:
+        yield  # as a part of the block that is open
+        return
+    with _Transaction() as transaction:
+        if folder is not None:
+            transaction.make(Path(folder))
+        token = _OPEN.set(transaction)
+        try:
+            yield
+        finally:
+            _OPEN.reset(token)
+        transaction.commit()
+
+
+@dataclass
+class _File:
+    """A file on its way to its target, with its locks; ``before`` is a name of what it replaces."""
+
+    target: Path
+    overwrite: bool
+    temporary: Path
+    descriptors: list[int] = field(default_factory=list)
+    before: Path | None = None
+    replaces: bool = False
+    placed: bool = False
+
+
+class _Transaction:
+    """Files that are written and flushed beside their targets, and then renamed."""
+
+    def __init__(self) -> None:
+        self._files: list[_File] = []
+        self._made: Path | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for file in self._files:
+            for temporary in (file.temporary, file.before):
+                with contextlib.suppress(OSError):
+                    if temporary is not None:
+                        os.unlink(temporary)
+            for descriptor in file.descriptors:
+                os.close(descriptor)
+        if self._made is not None:
+            with contextlib.suppress(OSError):
+                self._made.rmdir()  # takes nothing from one that holds the files
+
+    def make(self, folder: Path) -> None:
+        """Make a folder for the files; one that is there stays."""
+        with _blamed(folder), contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            self._made = folder
+
+    def write(self, target: Path, data: bytes | memoryview, overwrite: bool) -> None:
+        """Write and flush a file beside its target; it keeps the permissions of the old one."""
+        _remove_orphans(target.parent)
+        file = _File(target, overwrite, _beside(target))
+        self._files.append(file)
+        with _blamed(target):
+            mode = None
+            with contextlib.suppress(FileNotFoundError):
+                mode = stat.S_IMODE(os.stat(target).st_mode)
+            file.descriptors += _write_durably(file.temporary, data, mode)
+
+    def commit(self) -> None:
+        """Rename all files; where one of them cannot be, give the others back what was there."""
+        try:
+            for file in self._files:
+                with _blamed(file.target):
+                    file.replaces = file.overwrite and file.target.exists()
+                    if file.replaces and len(self._files) > 1:
+                        self._keep(file)
+                    if file.overwrite:
+                        os.replace(file.temporary, file.target)
+                    else:
+                        _place_new(file.temporary, file.target)
+                    file.placed = True
+        except BaseException as error:
+            stay = [file.target for file in reversed(self._files) if not _given_back(file)]
+            if stay and isinstance(error, OutputError):
+                others = [file.target for file in self._files if file.target not in stay]
+                new, old = (", ".join(map(str, paths)) for paths in (stay, others))
+                why = f"New is now: {new}. As before is: {old}."
+                raise OutputError(error.problem, why=why, cure=error.cure) from error
+            raise
+        for folder in {file.target.parent for file in self._files}:
+            _sync_folder(folder)
+
+    def _keep(self, file: _File) -> None:
+        """Give what is there a second name, locked; a disk without hard links has no way back."""
+        with contextlib.suppress(OSError):
+            if fcntl is not None:
+                file.descriptors += _locked(os.open(file.target, os.O_RDONLY))
+            file.before = _beside(file.target)
+            os.link(file.target, file.before)
+
+
+_OPEN: ContextVar[_Transaction] = ContextVar("the files that are written together")
+
+
+def _given_back(file: _File) -> bool:
+    """Put back what was at a target before; return whether it is there."""
+    if not file.placed:
+        return True
+    try:
+        if not file.replaces:
+            os.unlink(file.target)
+        elif file.before is None:
+            return False
         else:
-            _place_new(temporary, target)
-        _sync_folder(target.parent)
+            os.replace(file.before, file.target)
+    except OSError:
+        return False
+    return True
 
 
 def _checked_target(
@@ -81,30 +212,77 @@ def _checked_target(
     return target
 
 
+def _beside(target: Path) -> Path:
+    return target.parent / f".memscal-{secrets.token_hex(8)}.tmp"
+
+
 @contextlib.contextmanager
-def _beside(target: Path) -> Iterator[Path]:
-    """Yield the name of a temporary file beside a target, and remove the file at the end."""
-    temporary = target.parent / f".memscal-{secrets.token_hex(8)}.tmp"
+def _blamed(target: Path) -> Iterator[None]:
+    """Say of what the system refuses which output it was."""
     try:
-        yield temporary
+        yield
     except OSError as error:
         raise _output_error(target, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
 
 
-def _write_durably(temporary: Path, data: bytes | memoryview) -> None:
-    """Write and flush to the disk; the mode 0o666 leaves the permissions to the umask."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-    for name in ("O_CLOEXEC", "O_NOFOLLOW", "O_BINARY"):
-        flags |= getattr(os, name, 0)
-    descriptor = os.open(temporary, flags, 0o666)
+def _flags(*names: str) -> int:
+    """Return those flags of a file that the system has."""
+    return sum(getattr(os, f"O_{name}", 0) for name in names)
+
+
+def _write_durably(temporary: Path, data: bytes | memoryview, mode: int | None) -> list[int]:
+    """Write and flush to the disk; return what locks the file. The umask sets a new one's mode."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _flags("CLOEXEC", "NOFOLLOW", "BINARY")
+    descriptor = os.open(temporary, flags, 0o666 if mode is None else 0o600)
     try:
+        locks = _locked(descriptor)
         remaining = memoryview(data)
         while remaining:
             remaining = remaining[os.write(descriptor, remaining) :]
+        if mode is not None:
+            os.chmod(temporary, mode)
         os.fsync(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    if not locks:
+        os.close(descriptor)
+    return locks
+
+
+def _locked(descriptor: int) -> list[int]:
+    """Lock an open file for as long as this process lives; where there are locks, return it."""
+    if fcntl is None:
+        return []
+    with contextlib.suppress(OSError):
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    return [descriptor]
+
+
+#: Seconds after which a temporary file without a lock is that of a process that was killed.
+_ORPHANED = 60.0
+_TEMPORARY = re.compile(r"\.memscal-[0-9a-f]{16}\.tmp")
+
+
+@lru_cache(maxsize=4096)
+def _remove_orphans(folder: Path) -> None:
+    """Remove from a folder, once in a process, what killed processes left of their outputs."""
+    if fcntl is None:
+        return
+    with contextlib.suppress(OSError), os.scandir(folder) as items:
+        left = [item.path for item in items if _TEMPORARY.fullmatch(item.name)]
+        for path in left:
+            with contextlib.suppress(OSError):
+                _remove_orphan(path)
+
+
+def _remove_orphan(path: str) -> None:
+    descriptor = os.open(path, os.O_RDWR | _flags("NOFOLLOW", "NONBLOCK", "CLOEXEC"))
+    try:
+        status = os.fstat(descriptor)
+        if stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _ORPHANED:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # refused while its writer lives
+            os.unlink(path)
     finally:
         os.close(descriptor)
 
@@ -144,11 +322,8 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MOST_FILE_BYTES) ->
 def read_pieces(path: str | os.PathLike[str], *, limit: int) -> Iterator[bytes]:
     """Yield the same in pieces of up to 1 MiB; a file that grows meanwhile meets the limit, too."""
     shown = os.fspath(path)
-    flags = os.O_RDONLY
-    for name in ("O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY", "O_BINARY"):
-        flags |= getattr(os, name, 0)
     try:
-        descriptor = os.open(shown, flags)
+        descriptor = os.open(shown, os.O_RDONLY | _flags("NONBLOCK", "CLOEXEC", "NOCTTY", "BINARY"))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         problem = f"{shown} cannot be read: {reason}."

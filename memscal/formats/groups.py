@@ -421,12 +421,12 @@ def read_profile(
     return StressProfile(
         film=read_film(file, film) if file.has(film) else None,
         indenter=read_indenter(file, indenter) if file.has(indenter) else None,
-        source=file.source,
         **read_record(records.PROFILE, file, data),
         **contact,
         **read_record(records.SOLVER, file, process),
         **read_record(records.NUMERICS, file, f"{process}/numerics"),
         **read_record(records.PROFILE_NOTES, file, process),
+        source=file.source,  # states what was found to be altered on the way
     )
 
 

@@ -16,7 +16,7 @@ from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
-from memscal.formats.values import altered, require_schema, units_of
+from memscal.formats.values import altered, has_no_digest, require_schema, units_of
 from memscal.model import records
 from memscal.model.checks import QualityCheck
 from memscal.model.quantities import Record, record
@@ -82,9 +82,9 @@ class Finding:
     meaning: str
 
 
-def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
+def describe(path: str | os.PathLike[str], *, accept_altered: bool = False) -> dict[str, Any]:
     """Return what a file of memscal holds, in its units and in plain values for JSON."""
-    with open_hdf5(path) as file:
+    with open_hdf5(path, accept_altered=accept_altered) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
@@ -93,6 +93,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
         return {
             "file": file.name,
             "sha256": file.source.sha256,
+            **({"altered": file.source.altered} if file.source.altered else {}),
             "schema": schema,
             "schema_version": version,
             "title": file.text("/entry/title") if file.has("/entry/title") else "",
@@ -130,11 +131,10 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 def _digest(file: SafeFile, schema: str) -> Finding:
     """Results must have a digest: scans and references may come from other programs."""
-    result = schema in (writer.ARTIFACT_SCHEMA, writer.STRESS_SCHEMA)
-    if not result and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None:
+    if has_no_digest(file, schema):
         return Finding("digest", True, "None: the file was written by another program.")
     if problem := altered(file):
-        return Finding("digest", False, f"The file was changed after it was written: {problem}")
+        return Finding("digest", False, f"The file was changed after it was written: {problem}.")
     return Finding("digest", True, "The content is what was written.")
 
 
@@ -163,8 +163,8 @@ def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
     if text := file.is_text(path):
         value: Any = file.text(path)
     else:
-        numbers = file.array(path)
-        value = "inf" if np.all(numbers == np.inf) else _plain(numbers)
+        number = _single(file, path)
+        value = "inf" if number == np.inf else _plain(number)
     unit = None if text else units_of(file, path) or "1"
     row = {"path": path, "name": name, "value": value}
     return row | {"standard_uncertainty": _uncertainty(file, path), "unit": unit}
@@ -175,12 +175,19 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     errors = f"{path}_errors"
     if not file.has(errors):
         return None
-    spread, unit, spread_unit = file.array(errors), units_of(file, path), units_of(file, errors)
+    spread, unit, spread_unit = _single(file, errors), units_of(file, path), units_of(file, errors)
     if spread_unit != unit:
         dimension = dimension_of(unit or "1", file.where(path))
         scale = to_si(1.0, unit, dimension, file.where(path))
-        spread = to_si(spread, spread_unit, dimension, file.where(errors)) / scale
+        spread = float(to_si(spread, spread_unit, dimension, file.where(errors)) / scale)
     return _plain(spread)
+
+
+def _single(file: SafeFile, path: str) -> float | int:
+    if (numbers := file.array(path)).size != 1:
+        problem = f"{file.where(path)} has {numbers.size} values, but one number is expected."
+        raise FormatError(problem)
+    return numbers.item()  # type: ignore[no-any-return]
 
 
 def _array_row(file: SafeFile, path: str) -> dict[str, Any]:

@@ -20,23 +20,30 @@ Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStr
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
-def opened_scan(scan: Scan | Path, most: int | None = None) -> Scan:
+def opened_scan(
+    scan: Scan | Path, most: int | None = None, *, accept_altered: bool = False
+) -> Scan:
     """Return a scan that is given itself or as a path, with ``most`` points in a file."""
     if not isinstance(scan, str | PathLike):
         return _required(scan)
-    with open_hdf5(scan) as file:
+    with open_hdf5(scan, accept_altered=accept_altered) as file:
         return scan_from(file, most)
 
 
-def opened_scans(scans: Scans, most: int | None = None) -> tuple[Scan, ...]:
+def opened_scans(
+    scans: Scans, most: int | None = None, *, accept_altered: bool = False
+) -> tuple[Scan, ...]:
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
-    return tuple(opened_scan(scan, most) for scan in _listed(scans))
+    listed = _listed(scans)
+    return tuple(opened_scan(scan, most, accept_altered=accept_altered) for scan in listed)
 
 
-def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
+def opened_stress(
+    measured: MeasuredStress | Path, *, accept_altered: bool = False
+) -> MeasuredStress:
     """Return measured stress that is given itself or as a path."""
     if isinstance(measured, str | PathLike):
-        return read_stress(measured)
+        return read_stress(measured, accept_altered=accept_altered)
     if not isinstance(measured, MeasuredStress):
         raise InputError(
             f"There is a {type(measured).__name__} where measured stress is needed.",
@@ -45,17 +52,19 @@ def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
     return measured
 
 
-def opened_contacts(contacts: Contacts) -> tuple[Scan | MeasuredStress, ...]:
+def opened_contacts(
+    contacts: Contacts, *, accept_altered: bool = False
+) -> tuple[Scan | MeasuredStress, ...]:
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
-    return tuple(_scan_or_stress(item) for item in _listed(contacts))
+    return tuple(_scan_or_stress(item, accept_altered) for item in _listed(contacts))
 
 
-def _scan_or_stress(item: Any) -> Scan | MeasuredStress:
+def _scan_or_stress(item: Any, accept_altered: bool) -> Scan | MeasuredStress:
     if isinstance(item, MeasuredStress):
         return item
     if not isinstance(item, str | PathLike):
         return _required(item)
-    with open_hdf5(item) as file:
+    with open_hdf5(item, accept_altered=accept_altered) as file:
         if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
             return stress_from(file)
         return scan_from(file)

@@ -16,7 +16,7 @@ from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
-from memscal.formats.values import require_schema
+from memscal.formats.values import require_schema, require_unaltered
 from memscal.model.arrays import require_positive
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_PIXELS, too_large
@@ -30,7 +30,7 @@ _LUMINANCE = (0.299, 0.587, 0.114)
 
 
 def read_reference(
-    path: str | os.PathLike[str], *, pixel_size: float | None = None
+    path: str | os.PathLike[str], *, pixel_size: float | None = None, accept_altered: bool = False
 ) -> StressProfile:
     """Read a stress profile or a field from a file, or make that of an ideal reference.
 
@@ -44,6 +44,8 @@ def read_reference(
         2-D array (.npy) or an image (PNG, TIFF), whose rows follow y and columns x.
     pixel_size : float, optional
         Size of the pixels of an array or image, in m.
+    accept_altered : bool
+        Accept a file whose content does not fit its digest: ``source.altered`` records it.
 
     Returns
     -------
@@ -53,7 +55,8 @@ def read_reference(
     Raises
     ------
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
-        If the file does not hold a reference that this version can read.
+        If the file does not hold a reference that this version can read, or was changed after it
+        was written.
     InputError
         If the size of an ideal reference is none, that of pixels is missing, or a field cannot be
         used.
@@ -74,7 +77,7 @@ def read_reference(
     if pixel_size is not None:
         problem = f"A pixel size is given, but {os.fspath(path)} is no array and no image."
         raise InputError(problem, cure="Leave it out (pixel_size, --pixel-size).")
-    with open_hdf5(path) as file:
+    with open_hdf5(path, accept_altered=accept_altered) as file:
         return profile_from(file)
 
 
@@ -136,11 +139,13 @@ def _image(data: bytes) -> NDArray[Any]:
 def profile_from(file: SafeFile) -> StressProfile:
     """Read the profile of an open memscal-reference file, or a field of another program."""
     if file.attribute("/", writer.SCHEMA_ATTRIBUTE) is None:
+        require_unaltered(file, None)
         path = ""
         while isinstance(name := file.attribute(path or "/", "default"), str) and len(path) < 99:
             path = f"{path}/{name}"
         return read_field(file, path).profile()
     require_schema(file, REFERENCE_SCHEMA)
+    require_unaltered(file, REFERENCE_SCHEMA)
     return read_profile(file, "/entry/reference", "/entry/parameters", "/entry/process")
 
 

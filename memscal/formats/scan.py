@@ -1,15 +1,13 @@
 """memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
 
-import contextlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from memscal.errors import FormatError, OutputError, placed
 from memscal.formats import groups, values
-from memscal.formats.files import ensure_writable
+from memscal.formats.files import ensure_writable, together
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -38,13 +36,15 @@ _SYNTHETIC = (
 )
 
 
-def read_scan(path: str | os.PathLike[str]) -> Scan:
+def read_scan(path: str | os.PathLike[str], *, accept_altered: bool = False) -> Scan:
     """Read a scan from a memscal-scan file.
 
     Parameters
     ----------
     path : path
         The file; units in it are converted to SI.
+    accept_altered : bool
+        Accept a file whose content does not fit its digest: ``source.altered`` records it.
 
     Returns
     -------
@@ -54,8 +54,8 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
     Raises
     ------
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
-        If the file does not hold a scan that this version can read; the message names the
-        file and the HDF5 path.
+        If the file does not hold a scan that this version can read, or was changed after it was
+        written; the message names the file and the HDF5 path.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
     ...     read_scan(f"{folder}/scan.h5").u_zz
     array([0.001, 0.003, 0.001])
     """
-    with open_hdf5(path) as file:
+    with open_hdf5(path, accept_altered=accept_altered) as file:
         return scan_from(file)
 
 
@@ -80,6 +80,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     if most is not None and (size := file.claimed_number(f"{_DATA}/u_zz")) > most:
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
         raise too_large(file.name, size, most, "points", cure=cure)
+    values.require_unaltered(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
@@ -275,19 +276,6 @@ def write_scans(
     """Write scans as memscal-scan files of one folder, all of them or none."""
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
-    made = not target.exists()
-    try:
-        target.mkdir(exist_ok=True)
-        with TemporaryDirectory("", ".memscal-", target, ignore_cleanup_errors=True) as staging:
-            for name, scan in scans.items():
-                write_scan(scan, Path(staging, name))
-            for name in scans:
-                os.replace(Path(staging, name), target / name)
-    except OSError as error:
-        problem = f"The output {target} cannot be written: {error.strerror}."
-        raise OutputError(problem, cure="Choose another folder.") from error
-    finally:
-        if made:
-            # Of a folder that holds the scans this takes nothing away.
-            with contextlib.suppress(OSError):
-                target.rmdir()
+    with together(target):
+        for name, scan in scans.items():
+            write_scan(scan, target / name, overwrite=overwrite)

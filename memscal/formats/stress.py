@@ -15,6 +15,7 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si, to_json
 from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
+from memscal.model.checks import override_messages
 from memscal.model.measured_stress import (
     MeasuredPoints,
     MeasuredProfile,
@@ -22,7 +23,7 @@ from memscal.model.measured_stress import (
     MeasuredStress,
 )
 from memscal.model.notation import Reading
-from memscal.model.provenance import SourceFile
+from memscal.model.provenance import SourceFile, accepted_alterations
 from memscal.model.quantities import Quantity, record
 from memscal.model.records import points_record
 
@@ -88,16 +89,19 @@ def _scan_group(scan: MeasuredScan) -> Group:
 _BUDGET = {"force": "force", "maximum": "stress"}
 _PREFIX = "covariance_"
 _MOST_SCANS = 10_000
+_PROCESS = "/entry/process"
 _AXES = ("r", "r_prime")
 
 
-def read_stress(path: str | os.PathLike[str]) -> MeasuredStress:
+def read_stress(path: str | os.PathLike[str], *, accept_altered: bool = False) -> MeasuredStress:
     """Read measured stress from a memscal-stress file.
 
     Parameters
     ----------
     path : path
         The file; units in it are converted to SI.
+    accept_altered : bool
+        Accept a file whose content does not fit its digest: ``overridden`` records it.
 
     Returns
     -------
@@ -110,19 +114,14 @@ def read_stress(path: str | os.PathLike[str]) -> MeasuredStress:
         If the file does not hold measured stress that this version can read, or was changed
         since it was written (its content digest no longer fits).
     """
-    with open_hdf5(path) as file:
+    with open_hdf5(path, accept_altered=accept_altered) as file:
         return stress_from(file)
 
 
 def stress_from(file: SafeFile) -> MeasuredStress:
     """Read the measured stress of an open memscal-stress file."""
     values.require_schema(file, writer.STRESS_SCHEMA)
-    if problem := values.altered(file):
-        raise FormatError(
-            f"{file.name} was changed after it was written: {problem}",
-            why="Measured stress is used only as it was measured.",
-            cure="Get the original file, or run memscal apply again.",
-        )
+    values.require_unaltered(file, writer.STRESS_SCHEMA)
     paths = profile_paths(file)
     if not paths:
         why = "It lists the groups that hold one."
@@ -132,13 +131,15 @@ def stress_from(file: SafeFile) -> MeasuredStress:
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
     of_scans = zip(paths, numbers, strict=True)
+    profiles = tuple(_read_profile(file, path, scans[i - 1]) for path, i in of_scans)
+    accepted, process = accepted_alterations(file.source), groups.read_process(file, _PROCESS)
     return MeasuredStress(
-        profiles=tuple(_read_profile(file, path, scans[i - 1]) for path, i in of_scans),
+        profiles=profiles,
         scans=scans,
         **read_record(records.CONVERSION.read_in(scans[0].reading), file, "/entry/sensor"),
         checks=groups.read_quality(file, "/entry/quality"),
-        overridden=tuple(text_list(file, "/entry/overridden")),
-        process=groups.read_process(file, "/entry/process"),
+        overridden=(*text_list(file, "/entry/overridden"), *accepted),
+        process=replace(process, messages=(*override_messages(accepted), *process.messages)),
         artifact=sources.get("artifact"),
         artifact_digest=optional_text(file, "/entry/sensor/content_sha256"),
     )

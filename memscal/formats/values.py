@@ -1,6 +1,7 @@
 """Single values of a safe file by kind, its schema, and its digest."""
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -90,12 +91,19 @@ def optional_text(file: SafeFile, path: str) -> str:
     return file.text(path) if file.has(path) else ""
 
 
+def _finite(text: str) -> float:
+    """Return a number of JSON, which has no others."""
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"{text} is no finite number")
+    return number
+
+
 def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     """Return JSON of a given type (``list`` or ``dict``), or the default where there is none."""
     if not file.has(path):
         return default
     try:
-        value = json.loads(file.text(path))
+        value = json.loads(file.text(path), parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         problem = f"{file.where(path)} is not JSON: {error}."
         raise InputError(problem, cure="Write the file again.") from error
@@ -114,19 +122,34 @@ def text_list(file: SafeFile, path: str) -> list[str]:
 _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 
+#: What other programs write, too, without a digest.
+_OF_OTHERS = (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA)
+
+
+def has_no_digest(file: SafeFile, schema: str | None) -> bool:
+    """Return whether a file has no digest and needs none: other programs write such, too."""
+    return schema in (*_OF_OTHERS, None) and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None
+
+
+def require_unaltered(file: SafeFile, schema: str | None) -> None:
+    """Refuse a file whose content is not what was written; or record it, where that is accepted."""
+    if not file.verified and not has_no_digest(file, schema) and (problem := altered(file)):
+        file.refuse_altered(problem)
+
+
 def altered(file: SafeFile) -> str:
     """Return how a file differs from what was written, or ``""``; then only that can be read."""
     stated = file.attribute("/", writer.DIGEST_ATTRIBUTE)
     if stated is None:
-        return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing."
+        return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing"
     contents = json_value(file, CONTENTS_PATH, dict, None)
     if contents is None:
-        return f"the list of its contents ({CONTENTS_PATH}) is missing."
+        return f"the list of its contents ({CONTENTS_PATH}) is missing"
     missing = [path for path in contents if not (_PATH.fullmatch(path) and file.has(path))]
     if missing:
-        return f"{missing[0]} is missing."
+        return f"{missing[0]} is missing"
     if writer.content_digest(stored_items(file, contents)) != stated:
-        return "its content does not fit its digest."
+        return "its content does not fit its digest"
     file.limit_to(contents)
     return ""
 

@@ -38,6 +38,7 @@ from memscal.model.arrays import require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
+from memscal.model.provenance import accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
@@ -73,18 +74,24 @@ def same_apparatus(
     measured: MeasuredStress, apparatus: ApparatusFunction, *, override: bool
 ) -> MeasuredStress:
     """Refuse another apparatus function than that of a measured stress; or record it."""
-    if measured.artifact_digest == apparatus.content_digest:
+    altered, other = accepted_alterations(apparatus.source), []
+    if measured.artifact_digest != apparatus.content_digest:
+        name = f" ({measured.artifact.file_name})" if measured.artifact else ""
+        given = f" ({apparatus.source.file_name})" if apparatus.source else ""
+        other = [
+            f"the stress was measured with another apparatus function{name} than the given{given}"
+        ]
+    if not altered and not other:
         return measured
-    name = f" ({measured.artifact.file_name})" if measured.artifact else ""
-    other = f" ({apparatus.source.file_name})" if apparatus.source else ""
     differences = accepted_differences(
-        [f"the stress was measured with another apparatus function{name} than the given{other}"],
+        other,
         override=override,
         problem="Measured stress and artifact do not belong together",
         why="The stress on the axis, centres and noise are those of the calibration by which "
         "they were measured.",
         cure="Give its artifact, or measure again with memscal apply.",
     )
+    differences = [*altered, *differences]
     messages = (*measured.messages, *override_messages(differences))
     return replace(
         measured,
@@ -130,6 +137,7 @@ def compare(
     macroscopic_uncertainty: float | None = None,
     interface: bool = False,
     override: bool = False,
+    accept_altered: bool = False,
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> FrictionComparison:
@@ -167,6 +175,8 @@ def compare(
         coefficient.
     override : bool
         Whether to accept an artifact of another sensor or film; that is recorded.
+    accept_altered : bool
+        Accept files whose content does not fit their digest; recorded like what is overridden.
     cache : path, optional
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
@@ -196,7 +206,8 @@ def compare(
     >>> comparison.joint["dry"]["total"].interval.low < 0.1
     True
     """
-    opened, sensor = opened_contacts(contacts), opened_apparatus(apparatus)
+    opened = opened_contacts(contacts, accept_altered=accept_altered)
+    sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
     if lubricated not in (None, FRICTIONLESS, APART):
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
@@ -212,6 +223,9 @@ def compare(
     comparison = compare_measured(
         measured, sensor, families, lubricated=lubricated, macroscopic=sliding
     )
+    altered = accepted_alterations(*(profile.source for profile in references or ()))
+    messages = (*override_messages(altered), *comparison.messages)
+    comparison = replace(comparison, messages=messages)
     if not interface:
         return comparison
     assert macroscopic is not None
@@ -395,6 +409,7 @@ def compare_shear(
     friction: Sequence[float] = FRICTIONS,
     loading: str | Sequence[str] = ("incremental", "total"),
     override: bool = False,
+    accept_altered: bool = False,
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ShearComparison:
@@ -417,6 +432,8 @@ def compare_shear(
         ``"incremental"``, ``"total"``, or both.
     override : bool
         Accept an artifact of another sensor or film: a message records it.
+    accept_altered : bool
+        Accept files whose content does not fit their digest; recorded like what is overridden.
     cache : path, optional
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
@@ -449,7 +466,8 @@ def compare_shear(
     >>> comparison.joint["dry"]["total"].interval.low < 0.15
     True
     """
-    sensor, measured = opened_apparatus(apparatus), opened_stress(measured)
+    sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
+    measured = opened_stress(measured, accept_altered=accept_altered)
     require_contacts(measured.scans)
     channel = sensor.sensor.channel
     if channel not in TANGENTIAL:
@@ -459,6 +477,7 @@ def compare_shear(
             "compare the normal channel with memscal.compare().",
         )
     overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
+    overridden = [*accepted_alterations(sensor.source), *measured.overridden, *overridden]
     families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, sensor, families, channel)
     note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."

@@ -13,7 +13,7 @@ from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
-from memscal.estimation.points import require_contact_size
+from memscal.estimation.points import require_span
 from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
@@ -22,7 +22,7 @@ from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
-from memscal.model.provenance import Process, timestamp
+from memscal.model.provenance import Process, accepted_alterations, timestamp
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT
 from memscal.parallel import single_threaded
@@ -117,7 +117,11 @@ _OF_ALL_PROFILES = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NO
 
 @single_threaded()
 def measure_stress(
-    scan: Scans, apparatus: ApparatusFunction | str | PathLike[str], *, override: bool = False
+    scan: Scans,
+    apparatus: ApparatusFunction | str | PathLike[str],
+    *,
+    override: bool = False,
+    accept_altered: bool = False,
 ) -> MeasuredStress:
     r"""Turn contact scans into measured stress, load by load.
 
@@ -136,6 +140,8 @@ def measure_stress(
     override : bool
         Accept a scan whose sensor, channel or film is not the artifact's: it is recorded in
         ``overridden``.
+    accept_altered : bool
+        Accept files whose content does not fit their digest; recorded like what is overridden.
 
     Returns
     -------
@@ -161,14 +167,18 @@ def measure_stress(
     >>> abs(profile.force - profile.load) < 3 * profile.force_uncertainty
     True
     """
-    sensor, scans = opened_apparatus(apparatus), opened_scans(scan)
+    sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
+    scans = opened_scans(scan, accept_altered=accept_altered)
     restore.require_covariance(sensor)
     mismatches = (restore.accept_mismatches(data, sensor, override=override) for data in scans)
-    overridden = tuple(text for of_scan in mismatches for text in of_scan)
+    altered = accepted_alterations(sensor.source, *(data.source for data in scans))
+    overridden = (*altered, *chain(*mismatches))
+    for data in scans:
+        require_span(data)
     origins = tuple(one_load.measured_scan(data) for data in scans)
     singles = [one_load.single_loads(data) for data in scans]
     for single in chain(*singles):
-        require_contact_size(single, MOST_OF_CONTACT)
+        restore.require_contact_size(single, MOST_OF_CONTACT)
     loads = [
         _measure(origin, single, sensor)
         for origin, of_scan in zip(origins, singles, strict=True)

@@ -17,6 +17,7 @@ from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
+from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
 from memscal.model import checks as quality
@@ -24,9 +25,10 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
+from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
-from memscal.model.sizes import MOST_RESTORED
+from memscal.model.sizes import MOST_RESTORED, too_large
 from memscal.parallel import single_threaded
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
@@ -36,10 +38,20 @@ _OF_THE_FILM = (
 )
 
 
+def require_contact_size(scan: Scan, most: int) -> None:
+    """Refuse a contact of more points than its stress is restored or measured from."""
+    if (size := scan.u_zz.size) > most:
+        named = scan.source.file_name if scan.source else "The scan"
+        why = "Its stress has a covariance, which takes memory."
+        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
+        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
+
+
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     """Refuse a scan of several loads of a curved indenter, of many points, or without cov(G)."""
     require_covariance(apparatus)
-    scan_points.require_contact_size(scan, MOST_RESTORED)
+    require_contact_size(scan, MOST_RESTORED)
+    scan_points.require_span(scan)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
         return
@@ -238,6 +250,7 @@ def restore(
     *,
     expected: Expected = None,
     override: bool = False,
+    accept_altered: bool = False,
 ) -> Restoration:
     r"""Restore the stress at the base of the film from a scan with a calibrated sensor.
 
@@ -255,6 +268,8 @@ def restore(
         A calculated base stress to hold against the restored one: adds a check.
     override : bool
         Accept a scan whose sensor, channel or film is not the artifact's: a message records it.
+    accept_altered : bool
+        Accept files whose content does not fit their digest; recorded like what is overridden.
 
     Returns
     -------
@@ -276,11 +291,17 @@ def restore(
     >>> abs(restored.force - 1.0) < 3 * restored.force_uncertainty
     True
     """
-    sensor, measured = opened_apparatus(apparatus), opened_scan(scan)
+    sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
+    measured = opened_scan(scan, accept_altered=accept_altered)
+    if isinstance(expected, str | PathLike):
+        expected = read_reference(expected, accept_altered=accept_altered)
     require_measurement(measured, sensor)
-    overridden = quality.override_messages(accept_mismatches(measured, sensor, override=override))
+    sources = sensor.source, measured.source, getattr(expected, "source", None)
+    overridden = accept_mismatches(measured, sensor, override=override)
+    overridden = [*accepted_alterations(*sources), *overridden]
     restored = restore_known(measured, sensor, expected)
-    return replace(restored, messages=(*overridden, *restored.messages))
+    messages = quality.override_messages(overridden)
+    return replace(restored, messages=(*messages, *restored.messages))
 
 
 def restore_known(

@@ -13,11 +13,30 @@ from memscal.errors import InputError
 FloatArray = NDArray[np.float64]
 
 
+#: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.
+_SMALLEST, _LARGEST = 1e-30, 1e30
+
+
 def require_positive(name: str, value: float, unit: str = "") -> None:
-    """Refuse a value that is not a finite number above zero."""
+    """Refuse a value that is not a finite number above zero, or no quantity at all."""
     if not (math.isfinite(value) and value > 0):
         problem = f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero."
         raise InputError(problem, cure="Check the value and its unit.")
+    require_size(name, value, unit)
+
+
+def require_size(
+    name: str, values: ArrayLike, unit: str = "", *, smallest: float = _SMALLEST
+) -> None:
+    """Refuse numbers of a size that no quantity has, in whatever unit it was stated."""
+    sizes = np.abs(values)
+    largest = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
+    if largest and not smallest <= largest <= _LARGEST:
+        raise InputError(
+            f"{name} is {largest:.3g} {unit}".rstrip() + ", a size that no quantity has.",
+            why=f"In SI units quantities lie from {_SMALLEST:g} to {_LARGEST:g}.",
+            cure="Check the values and their unit.",
+        )
 
 
 def require_non_negative(name: str, value: float | None) -> None:

@@ -117,4 +117,7 @@ def format_bound(bound: float, *, upper: bool) -> str:
 def printable(value: object, limit: int) -> str:
     """Return text, or bytes as UTF-8, without the characters that could steer a terminal."""
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-    return "".join(c for c in text[:limit] if c.isprintable() or c in "\n\t")
+    text = text[:limit]
+    if text.isprintable():
+        return text
+    return "".join(c for c in text if c.isprintable() or c in "\n\t")

@@ -12,10 +12,20 @@ from memscal.model.checks import Message
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file that was read: its base name (a folder may be private) and SHA-256 of its bytes."""
+    """A file that was read: its base name (a folder may be private) and SHA-256 of its bytes.
+
+    ``altered`` says how it differs from what was written, where that was accepted.
+    """
 
     file_name: str
     sha256: str
+    altered: str = ""
+
+
+def accepted_alterations(*sources: SourceFile | None) -> list[str]:
+    """Return in words how each of several files differs from what was written."""
+    altered = dict.fromkeys(source for source in sources if source and source.altered)
+    return [f"{s.file_name} was changed after it was written: {s.altered}" for s in altered]
 
 
 @dataclass(frozen=True, kw_only=True)

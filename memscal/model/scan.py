@@ -384,7 +384,10 @@ class Scan:
     def __post_init__(self) -> None:
         for name in ("x", "y"):
             if (values := getattr(self, name)) is not None:
-                object.__setattr__(self, name, arrays.finite_vector(f"{name} of the scan", values))
+                values = arrays.finite_vector(f"{name} of the scan", values)
+                place = f"{name} of the scan (/entry/data/{name})"
+                arrays.require_size(place, values, "m", smallest=0.0)
+                object.__setattr__(self, name, values)
         object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
         if self.repeat is not None:
             repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
@@ -402,6 +405,10 @@ class Scan:
         object.__setattr__(self, "channels", MappingProxyType(channels))
         self._check_values()
         self._check_positions()
+        sized = {name: getattr(self, name) for name in ("u_zz", *LIKE_SIGNAL)} | channels
+        for name, values in sized.items():
+            if values is not None:
+                arrays.require_size(f"{name} of the scan", values)
         require_contacts(self)
         if self.u_zz_correlation is not None:
             points = self.u_zz.size if self.planar else self.x.size

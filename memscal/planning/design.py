@@ -26,7 +26,7 @@ from memscal.estimation.bayesian import supported, weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
-from memscal.estimation.points import measured_points
+from memscal.estimation.points import measured_points, require_plausible
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
@@ -125,6 +125,9 @@ class Plan:
         count = self.positions
         shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
         shared |= {"half_range": self.step * (count - 1) / 2, "centre": (self.centre, 0.0)}
+        x = np.linspace(-1.0, 1.0, count) * shared["half_range"]
+        flat, load = np.zeros(count), self.load
+        require_plausible(Scan(x=x, u_zz=flat, film=self.film, indenter=self.rod, load=load))
         scan = simulate(points=count, noise=0.0, baseline=0.0, drift=0.0, **shared)
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
@@ -133,7 +136,6 @@ class Plan:
 def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
     """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
-    reference.require_calibration_rod(scan, None)
     stress = reference.reference_profile(scan, None)
     points = measured_points(scan)
     model = ForwardModel(points, reference.reference_spectra([stress], [points]))

@@ -9,14 +9,16 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from helpers.scans import LINEAR_FILM, RING, TAILS, simulated
+from helpers.scans import LINEAR_FILM, RING, TAILS, known_apparatus, simulated
 
 import memscal
 from memscal import Scan
+from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.cli import main
 from memscal.deconvolution.division import regulariser_names
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.checks import QualityCheck
+from memscal.simulation import rod_scan
 
 SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
 SCAN = memscal.simulate(film=LINEAR_FILM, seed=65)
@@ -93,6 +95,43 @@ def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
 ])  # fmt: skip
 def test_what_cannot_be_is_refused_with_its_reason(scan: Scan, words: str) -> None:
     assert re.search(words, refused(scan))
+
+
+@pytest.mark.parametrize(("x", "words"), [
+    (1e3, r"data/x\).*mm stated as m,"), (201.168e3, r"1.2e-06 to 2.5e-05 times"),
+    (1e-3, "too short|So short"),
+    (1e200, r"8e\+197 m(.|\n)*Check the values and their unit"),
+], ids=["m", "furlongs", "um", "1e200"])  # fmt: skip
+@pytest.mark.parametrize("measured", [memscal.measure_stress, memscal.restore])
+def test_no_stress_is_measured_over_lengths_that_no_film_is_scanned_over(
+    measured: Any, x: float, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In m it took minutes and gigabytes: nothing may be built before it is refused."""
+    apparatus = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01)
+    monkeypatch.setattr(Wavenumbers, "covering", lambda *_: pytest.fail("it went on"))
+    with pytest.raises(memscal.MemscalError) as caught:
+        measured(altered(x=x), apparatus, override=True)
+    assert re.search(words, str(caught.value))
+
+
+@pytest.mark.parametrize(("plan", "words"), [
+    ({"rod": memscal.Rod(radius=0.25)}, "rod's width is 500 mm"),
+    ({"film": replace(SCAN.film, thickness=1e-9)}, "step is 0.25 mm"),
+    ({"half_range": 3.0, "step": 2e-3}, "span 6000 mm"), ({"step": 1.0}, "span 0 mm"),
+])  # fmt: skip
+def test_a_plan_of_such_lengths_is_refused_before_its_rod_is_solved(plan, words, monkeypatch):
+    monkeypatch.setattr(rod_scan, "press_rod", lambda *_: pytest.fail("it went on"))
+    with pytest.raises(memscal.MemscalError, match=words):
+        memscal.design(**plan)
+
+
+@pytest.mark.parametrize("factor", [1e303, 1e-297, 1e-40])
+def test_readings_of_a_size_that_no_quantity_has_are_refused(factor: float) -> None:
+    with pytest.raises(memscal.MemscalError, match="u_zz of the scan is"):
+        replace(SCAN, u_zz=SCAN.u_zz * factor)
+    errors = np.full(SCAN.u_zz.size, 1e-3 * factor)
+    with pytest.raises(memscal.MemscalError, match="u_zz_errors of the scan is"):
+        replace(SCAN, u_zz_errors=errors)
 
 
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), RING, TAILS])

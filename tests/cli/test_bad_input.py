@@ -42,8 +42,64 @@ def refused(run: Run, folder: Path) -> Refused:
 ], ids=["no unit", "no number"])  # fmt: skip
 def test_a_file_that_was_spoilt_is_refused(refused: Refused, scan: Path, change, words):
     with h5py.File(scan, "r+") as file:
+        del file.attrs["memscal_content_sha256"]
         change(file[SIGNAL])
     refused(scan, words=words)
+
+
+def altered(path: Path) -> Path:
+    """Change a number in a file without its digest."""
+    with h5py.File(path, "r+") as file:
+        file["/entry/sample/film/thickness"][()] *= 1.001
+    return path
+
+
+@pytest.mark.parametrize("arguments", [
+    ["calibrate", "scan.h5", "-o", "out.h5"], ["calibrate", "scan.h5", "--dry-run"],
+    ["apply", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
+    ["restore", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
+    ["inspect", "scan.h5"],
+    ["batch", "manifest", "-o", "results", "--artifacts", "all", "--workers", "1"],
+], ids=lambda arguments: " ".join(arguments[::len(arguments) - 1]))  # fmt: skip
+@pytest.mark.usefixtures("artifact")
+def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
+    run: Run, scan: Path, folder: Path, arguments
+):
+    altered(scan)
+    (folder / "manifest").write_text("scan.h5\n")
+    refused = run(*arguments)
+    batch = arguments[0] == "batch"
+    words = "was changed after it was written: its content does not fit its digest"
+    if batch:
+        refused.exits(1)
+        run("summary", "results", "--json").exits(0)
+        arguments = ["batch", "manifest", "-o", "again", *arguments[4:]]
+    else:
+        refused.exits(3, words, "--accept-altered")
+    done = run(*arguments, "--accept-altered")
+    assert done.code in (0, 1), done.err
+    if arguments[0] == "inspect":
+        assert "does not fit its digest" in done.out
+        return
+    assert batch or words in done.err
+    for path in [Path("out.h5")] if not batch else [*Path("again").rglob("*.apparatus.h5")]:
+        if path.exists():
+            assert words in run("inspect", path, "--json").out.replace("\\n", " ")
+
+
+@pytest.mark.parametrize("expected", [False, True])
+def test_an_altered_artifact_or_reference_is_recorded_in_what_is_written(
+    run: Run, scan: Path, artifact: Path, expected: bool
+):
+    run("reference", "rod", "-o", "rod.h5")
+    with h5py.File("rod.h5" if expected else artifact, "r+") as file:
+        film = "parameters" if expected else "sample"
+        file[f"/entry/{film}/film/young_modulus"][()] *= 1.0001
+    reference = ["--expected", "rod.h5"] if expected else []
+    command = ["restore", artifact, scan, "--override", "-o", "out.h5", *reference]
+    run(*command).exits(3, "was changed after it was written")
+    assert run(*command, "--accept-altered").code in (0, 1)
+    assert "was changed after it was written" in run("inspect", "out.h5", "--json").out
 
 
 @pytest.mark.parametrize("command", ["apply", "restore", "compare"])

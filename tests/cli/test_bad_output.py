@@ -1,5 +1,7 @@
 """Outputs that cannot be written: known before anything is computed, and nothing is lost."""
 
+import errno
+import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -88,6 +90,65 @@ def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, 
     monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
+
+
+@pytest.mark.parametrize(("arguments", "old", "failing"), [
+    (["calibrate", "scan.h5", "-o", "a.h5", "--figure", "b.svg"], ["a.h5", "b.svg"], "b.svg"),
+    (["simulate", "--experiment", "sphere", "-o", "."],
+     ["rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5"], "sphere_lubricated.h5"),
+])  # fmt: skip
+@pytest.mark.usefixtures("scan")
+def test_where_one_output_cannot_be_replaced_all_stay(
+    run: Run, folder: Path, monkeypatch: Patch, arguments, old, failing
+):
+    rename = os.replace
+
+    def replace(source: Path, target: Path) -> None:
+        if Path(target).name == failing:
+            raise OSError(errno.EIO, "broken")
+        rename(source, target)
+
+    for name in old:
+        (folder / name).write_bytes(OLD)
+    before = names(folder)
+    monkeypatch.setattr(os, "replace", replace)
+    run(*arguments, "--force").exits(4, failing, "what was there before is untouched")
+    assert {(folder / name).read_bytes() for name in old} == {OLD}
+    assert names(folder) == before
+
+
+@pytest.mark.parametrize("arguments", [
+    ["simulate", "-o", ""], ["simulate", "--experiment", "sphere", "-o", ""], ["calibrate", ""],
+    ["batch", "", "-o", "results"],
+])  # fmt: skip
+def test_an_empty_name_is_a_wrong_usage(run: Run, folder: Path, arguments):
+    run(*arguments).exits(2, "The name of the file is empty")
+    assert names(folder) == []
+
+
+@pytest.mark.parametrize(("arguments", "code"), [
+    (["calibrate", "scan.h5", "-o", "loop", "--force"], 4), (["batch", "loop", "-o", "new"], 3),
+    (["calibrate", "scan.h5", "--figure", "loop.svg"], 4), (["calibrate", "loop"], 3),
+    (["simulate", "--experiment", "sphere", "-o", "loop"], 4),
+])  # fmt: skip
+def test_a_circle_of_links_is_refused(run: Run, scan: Path, folder: Path, arguments, code):
+    for ending in ("", ".svg"):
+        (folder / f"loop{ending}").symlink_to(f"circle{ending}")
+        (folder / f"circle{ending}").symlink_to(f"loop{ending}")
+    run(*arguments).exits(code, "loop")
+
+
+def test_an_input_without_permission_is_refused_and_no_usage_error(
+    run: Run, scan: Path, monkeypatch: Patch
+):
+    """The permission is taken away for root, too."""
+
+    def denied(path: object, *arguments: object, **options: object) -> int:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+
+    monkeypatch.setattr(os, "access", lambda *_, **__: False)
+    monkeypatch.setattr("memscal.formats.files.os.open", denied)
+    run("inspect", scan).exits(3, "cannot be read: Permission denied", "permissions")
 
 
 def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: Patch):

@@ -52,6 +52,19 @@ def test_lengths_on_the_command_line_are_in_mm(run: Run, folder: Path):
     assert memscal.read_reference("solid.h5").force == pytest.approx(1.0, abs=0.03)
 
 
+def test_the_file_that_holds_the_numbers_of_a_mesh_is_an_input_too(run: Run, folder: Path):
+    film = section()
+    film.point_data, film.cell_data = {"S33": film.point_data["S33"]}, {}
+    meshio.xdmf.write("film.xdmf", film)
+    before = Path("film.h5").read_bytes()
+    (folder / "link.h5").symlink_to("film.h5")
+    for output in ("film.h5", "link.h5"):
+        options = [*MESH, "--sigma", "S33", "--force"]
+        run("import", "film.xdmf", "-o", output, *options).exits(4, "also an input")
+    assert Path("film.h5").read_bytes() == before
+    assert names(folder) == ["film.h5", "film.xdmf", "link.h5"]
+
+
 @pytest.mark.parametrize(("options", "code", "words"), [
     ([*MESH, "--sigma", "Stress"], 3, ["at the nodes: S (6)", "in the cells: S33 (1)"]),
     ([*MESH, "--sigma", "S", "--base", 0.1], 3, ["--base", "0.1 mm"]),

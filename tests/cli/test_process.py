@@ -27,6 +27,25 @@ def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path
     assert "Exception ignored" not in done.stderr
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="The system has no /dev/full.")
+@pytest.mark.parametrize("arguments", [["--help"], ["calibrate", "--help"], ["--version"]])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_help_that_cannot_be_printed_is_exit_code_4(folder: Path, arguments, unbuffered):
+    with Path("/dev/full").open("w") as full:
+        stream = {"cwd": folder, "stdout": full.fileno(), "PYTHONUNBUFFERED": unbuffered}
+        done = run_program(*arguments, **stream)
+    assert (done.returncode, "cannot be printed: No space" in done.stderr) == (4, True)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="The system has no /dev/full.")
+def test_a_result_that_cannot_be_printed_is_not_written_either(scan: Path, folder: Path):
+    with Path("/dev/full").open("w") as full:
+        done = run_program("calibrate", "scan.h5", cwd=folder, stdout=full.fileno())
+    assert done.returncode == 4
+    assert "cannot be printed: No space left" in done.stderr
+    assert os.listdir(folder) == ["scan.h5"]
+
+
 def test_a_terminal_without_the_characters_still_shows_the_right_number(scan: Path, folder: Path):
     done = run_program("calibrate", "scan.h5", cwd=folder, PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import signal
 import stat
 import subprocess
@@ -12,7 +13,8 @@ from typing import Any
 import pytest
 
 from memscal.errors import OutputError
-from memscal.formats.files import atomic_write_bytes, ensure_writable
+from memscal.formats import files
+from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 
 OLD = b"the old output"
 
@@ -173,3 +175,101 @@ def test_a_proof_that_succeeds_leaves_no_trace(target: Path):
     ensure_writable(target, overwrite=True)
     ensure_writable(target.parent / "new.h5")
     assert_untouched(target)
+
+
+def three(tmp_path: Path) -> list[Path]:
+    """Two old outputs and a new one."""
+    paths = [tmp_path / name for name in ("a", "b", "c")]
+    for path in paths[:2]:
+        path.write_bytes(OLD)
+    return paths
+
+
+def write_together(paths: list[Path], stop: BaseException | None = None) -> None:
+    """Write files into a folder that is made for them; then stop."""
+    with together(paths[-1].parent):
+        for path in paths:
+            atomic_write_bytes(path, b"new", overwrite=True)
+        assert paths[0].read_bytes() == OLD
+        if stop is not None:
+            raise stop
+
+
+@pytest.mark.parametrize("hard_links", [True, False])
+@pytest.mark.parametrize("failing", ["a", "b", "c"])
+def test_files_that_are_written_together_are_all_new_or_all_as_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hard_links, failing
+):
+    """Every rename in turn fails; without hard links the message says which file is new."""
+    paths, rename = three(tmp_path), os.replace
+
+    def replace(source: Path, target: Path) -> None:
+        if Path(target).name == failing:
+            raise OSError(errno.EIO, "broken")
+        rename(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", replace)
+        if not hard_links:
+            patch.setattr(os, "link", fail_with(errno.EPERM))
+        with pytest.raises(OutputError, match=f"{failing} cannot be written") as caught:
+            write_together(paths)
+    new = [path.name for path in paths if path.exists() and path.read_bytes() != OLD]
+    assert new == ([] if hard_links else ["a", "b", "c"][: "abc".index(failing)])
+    stated = re.search(r"New is now: (.+?)\. As before is: ", caught.value.why)
+    assert [Path(name).name for name in stated[1].split(", ")][::-1] == new if new else not stated
+    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, ZeroDivisionError])
+def test_no_file_of_several_is_placed_before_all_are_written(tmp_path: Path, stop):
+    paths = three(tmp_path)
+    with pytest.raises(stop):
+        write_together([*paths, tmp_path / "made" / "d"], stop())
+    assert [path.read_bytes() for path in paths[:2]] == [OLD, OLD]
+    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+
+
+def test_files_that_are_written_together_are_there_in_the_end(tmp_path: Path):
+    paths = three(tmp_path)
+    write_together([*paths, tmp_path / "made" / "d"])
+    assert {path.read_bytes() for path in paths} == {b"new"}
+    assert os.listdir(tmp_path / "made") == ["d"]
+    assert sorted(os.listdir(tmp_path)) == ["a", "b", "c", "made"]
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o755])
+def test_a_file_that_is_replaced_keeps_its_permissions(target: Path, mode):
+    target.chmod(mode)
+    atomic_write_bytes(target, b"new", overwrite=True)
+    assert stat.S_IMODE(target.stat().st_mode) == mode
+
+
+KILLED = """
+import os, signal, sys
+from memscal.formats.files import atomic_write_bytes
+os.link = lambda *names: (print(flush=True), signal.pause())
+atomic_write_bytes(sys.argv[1], b"new")
+"""
+
+
+def test_a_later_run_removes_what_a_killed_process_left_and_nothing_of_a_living_one(tmp_path: Path):
+    """However old it is, a file whose process lives stays; so does what is no file of ours."""
+    command = [sys.executable, "-c", KILLED, str(tmp_path / "out")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline()
+        (left,) = tmp_path.iterdir()
+        (tmp_path / ".memscal-mine.tmp").write_bytes(OLD)
+        for path in tmp_path.iterdir():
+            os.utime(path, (0, 0))
+        atomic_write_bytes(tmp_path / "a", b"")
+        assert left.exists()
+        process.kill()
+    files._remove_orphans.cache_clear()
+    os.utime(left)  # just now: another process may not have come to its lock
+    atomic_write_bytes(tmp_path / "b", b"")
+    assert left.exists()
+    files._remove_orphans.cache_clear()
+    os.utime(left, (0, 0))
+    ensure_writable(tmp_path / "c")
+    assert sorted(os.listdir(tmp_path)) == [".memscal-mine.tmp", "a", "b"]

@@ -7,7 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from helpers.builders import make_artifact, make_profile, make_scan
+from helpers.builders import make_artifact, make_film, make_profile, make_scan
 
 from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, SchemaVersionError
@@ -83,9 +83,55 @@ def test_what_was_added_at_a_path_that_is_read_is_refused(artifact: Path):
     assert load_apparatus(artifact).load == 1.0
     with h5py.File(artifact, "r+") as file:
         file["/entry/sample/film/name"] = "another film"
-    with pytest.raises(FormatError, match="film/name was added after the file was written"):
+    with pytest.raises(FormatError, match="after it was written: /entry/sample/film/name was add"):
         load_apparatus(artifact)
     assert not all(finding.passed for finding in check(artifact))
+
+
+ADDITIONS = {
+    "scan": ["sample/film/roughness_rms", "sample/lubrication", "indenter/load_errors"],
+    "reference": ["parameters/depth", "parameters/film/name", "reference/sigma_zz_errors"],
+    "artifact": ["sample/film/roughness_rms", "instrument/stress_sensor/serial_number"],
+}
+READERS: dict[str, Any] = {
+    "scan": read_scan, "reference": read_reference, "artifact": load_apparatus,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "path"), [(k, p) for k, of in ADDITIONS.items() for p in of])
+def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(
+    tmp_path: Path, kind: str, path: str
+):
+    """A path that the reader knows and the list lacks, and a number that does not fit."""
+    file_path = tmp_path / f"{kind}.h5"
+    if kind == "scan":
+        write_scan(make_scan(film=make_film(roughness_rms=None), load_uncertainty=None), file_path)
+    elif kind == "reference":
+        write_reference(make_profile(depth=None), file_path)
+    else:
+        write_artifact(make_artifact(film=make_film(roughness_rms=None)), file_path)
+    text = path.endswith(("name", "lubrication", "serial_number"))
+    with h5py.File(file_path, "r+") as file:
+        size = file["/entry/reference/r"].shape if path.endswith("sigma_zz_errors") else ()
+        file[f"/entry/{path}"] = "dry" if text else np.full(size, 1.0)
+        if not text:
+            unit = "N" if "load" in path else "Pa" if "sigma" in path else "mm"
+            file[f"/entry/{path}"].attrs["units"] = unit
+    assert not check(file_path)[-1].passed
+    with pytest.raises(FormatError, match=f"/entry/{path} was added"):
+        READERS[kind](file_path)
+    source = READERS[kind](file_path, accept_altered=True).source
+    assert source.altered == f"/entry/{path} was added"
+    with h5py.File(file_path, "r+") as file:
+        del file[f"/entry/{path}"]
+    assert not READERS[kind](file_path).source.altered
+    with h5py.File(file_path, "r+") as file:
+        film = file["/entry/parameters" if kind == "reference" else "/entry/sample"]["film"]
+        film["thickness"][()] *= 1.01
+    with pytest.raises(FormatError, match="does not fit its digest"):
+        READERS[kind](file_path)
+    source = READERS[kind](file_path, accept_altered=True).source
+    assert source.altered == "its content does not fit its digest"
 
 
 @pytest.fixture(params=["scan", "reference", "artifact"])
@@ -104,7 +150,7 @@ def versioned(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
         with h5py.File(path, "r+") as file:
             file.attrs["memscal_schema_version"] = version
             file["/entry/of_the_future"] = h5py.Empty("f8")
-            if version != SCHEMA_VERSION and request.param == "artifact":
+            if version != SCHEMA_VERSION:
                 rewrite_digest(file)
         return read(path)
 

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.hdf5 import reader as hdf5_reader
+from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 from memscal.formats.scan import read_scan, write_scan
 
 SIGNAL = "/entry/data/u_zz"
@@ -46,8 +48,10 @@ Edit = Callable[[Callable[[h5py.Group], Any]], Path]
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A good scan."""
+    """A good scan without a digest, as another program writes it."""
     write_scan(make_scan(), tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+        del file.attrs[DIGEST_ATTRIBUTE]
     return tmp_path / "scan.h5"
 
 
@@ -135,6 +139,76 @@ def test_a_dataset_that_cannot_be_read_safely_is_refused(edited: Edit, make, wor
     path = edited(make)
     assert path.stat().st_size < 2**20
     assert_refused_cheaply(path, words)
+
+
+@pytest.mark.parametrize("filters", [
+    {"compression": "gzip"}, {"compression": "gzip", "shuffle": True, "fletcher32": True},
+], ids=["gzip", "all"])  # fmt: skip
+@pytest.mark.parametrize("number", [2**25, 1023, 0])
+def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited: Edit, filters, number):
+    """HDF5 unpacks all of it: of half a megabyte 562 MB were held, and the file passed."""
+
+    def make(group: h5py.Group) -> h5py.Dataset:
+        dataset = group.create_dataset("u_zz", (1024,), "f8", chunks=(1024,), **filters)
+        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(8 * number)))
+        return dataset
+
+    path = edited(make)
+    assert path.stat().st_size < 2**20
+    assert_refused_cheaply(path, "does not unpack to 8,192 bytes")
+
+
+@pytest.mark.parametrize("order", ["shuffle deflate fletcher32", "fletcher32 deflate"])
+def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited: Edit, order):
+    codes = {name: getattr(h5py.h5z, f"FILTER_{name.upper()}") for name in order.split()}
+
+    def make(group: h5py.Group) -> h5py.Dataset:
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_chunk((20,))
+        for name, code in codes.items():
+            options = {"deflate": (6,), "shuffle": (8,)}.get(name, ())
+            plist.set_filter(code, h5py.h5z.FLAG_MANDATORY, options)
+        space, kind = h5py.h5s.create_simple((33,)), h5py.h5t.NATIVE_DOUBLE
+        dataset = h5py.Dataset(h5py.h5d.create(group.id, b"u_zz", kind, space, plist))
+        dataset[:] = np.arange(33.0)
+        return dataset
+
+    np.testing.assert_allclose(read_scan(edited(make)).u_zz, np.arange(33.0) * 1e-3)
+
+
+def test_numbers_of_one_byte_count_as_they_are_held(edited: Edit):
+    """Of 163 kB 3.1 GB were held, in many arrays that each kept to the limit."""
+    path = edited(lambda g: g.create_dataset("u_zz", data=np.ones(10**8, "i1"), compression="gzip"))
+    assert_refused_cheaply(path, "claims 800,000,000 bytes")
+    path = edited(
+        lambda g: g.create_dataset("u_zz", data=np.ones(2 * 10**7, "i1"), compression="gzip")
+    )
+    assert_refused_cheaply(path, "over the limit", "as they are held")
+
+
+def test_chunks_that_are_larger_than_their_array_are_refused_in_sum(edited: Edit):
+    def make(group: h5py.Group) -> h5py.Dataset:
+        shape, chunks = (4096, 1), (1, 2**17)
+        return group.create_dataset("u_zz", shape, "f8", chunks=chunks, maxshape=(None, None))
+
+    assert_refused_cheaply(edited(make), "chunks of 4,294,967,296 bytes")
+
+
+def test_records_of_attributes_that_are_forged_by_the_thousand_are_not_all_followed(path: Path):
+    """Of 32 MB of them each was followed, which took 40 s."""
+    copy = path.with_name("copy.h5")
+    with h5py.File(path) as ours, h5py.File(copy, "w", libver="latest") as file:
+        ours.copy("/entry", file)
+        for i in range(30):
+            file.attrs[f"further_{i}"] = "y"
+        for name, value in ours.attrs.items():
+            file.attrs[name] = value
+    good, forged = copy.read_bytes(), b"\3\0\17\0\x10\0\x10\0\0memscal_schema\0"
+    path.write_bytes(good + forged * 10_000)
+    with pytest.raises(FormatError, match="more namesakes than can be checked"):
+        read_scan(path)
+    path.write_bytes(good + forged * 9_000)
+    read_scan(path)
 
 
 def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):
@@ -236,8 +310,8 @@ def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, li
             for i in range(further):
                 item.attrs[f"further_{i}"] = "y" * i
         x.attrs["units"] = "um"
-        for name, value in ours.attrs.items():
-            file.attrs[name] = value
+        for name in ours.attrs.keys() - {DIGEST_ATTRIBUTE}:
+            file.attrs[name] = ours.attrs[name]
     scan = read_scan(path)
     assert (scan.title, scan.indenter.shape) == ("variable", "sphere")
     assert scan.x[0] == pytest.approx(-8e-6)

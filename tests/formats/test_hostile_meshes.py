@@ -2,9 +2,12 @@
 
 import base64
 import contextlib
+import errno
 import os
 import re
 import struct
+import subprocess
+import tempfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -83,14 +86,52 @@ def test_absurd_xml_is_refused(tmp_path: Path, text):
     refused(path)
 
 
-def test_compressed_blocks_of_gigabytes_meet_the_limit_of_memory(tmp_path: Path):
+def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """Eighty blocks of 16 MiB."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     block = zlib.compress(bytes(2**24), 9)
     header = struct.pack("<83I", 80, 2**24, 0, *[len(block)] * 80)
     path = tmp_path / "film.vtu"
     blocks = base64.b64encode(header) + base64.b64encode(block * 80)
     path.write_text(POINTS.format(blocks.decode()))
-    refused(path, "more than 1,", UnsafeFileError)
+    refused(path, r"more than 6\d\d MB", UnsafeFileError)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path: Path, monkeypatch):
+    path = small(tmp_path / "film.vtu")
+    monkeypatch.setattr(mesh_files, "_ANSWER", 0)
+    size = path.stat().st_size
+    values = sum(a.nbytes for a in (SMALL.points, SMALL.cells[0].data, SMALL.point_data["S9"]))
+    for per_byte, enough in ((values // size, False), (values // size + 1, True)):
+        monkeypatch.setattr(mesh_files, "_ANSWER_PER_BYTE", per_byte)
+        with contextlib.nullcontext() if enough else pytest.raises(UnsafeFileError):
+            read_mesh(path)
+
+
+def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path, folder = small(tmp_path / "film.vtk"), tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    run = subprocess.run
+
+    def watched(*arguments: Any, **options: Any) -> Any:
+        assert os.listdir(folder) == []  # nor would a kill leave anything
+        return run(*arguments, **options)
+
+    monkeypatch.setattr(subprocess, "run", watched)
+    assert list(read_mesh(path).point_data) == ["S9"]
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    with pytest.raises(InputError, match=r"No space left(.|\n)*temporary folder"):
+        read_mesh(path)
 
 
 @pytest.mark.parametrize(("section_name", "options"), [
@@ -114,7 +155,7 @@ def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path)
         "# vtk DataFile Version 3.0\na title\nASCII\nDATASET STRUCTURED_POINTS\n"
         "DIMENSIONS 2000 2000 2000\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 8000000000\n"
     )
-    refused(path, "more than 1,", UnsafeFileError)
+    refused(path, "more than 64", UnsafeFileError)
 
 
 @pytest.mark.parametrize("kind", ["polygon", "VTK_LAGRANGE_TRIANGLE"])
@@ -334,7 +375,7 @@ def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
 
 
 @pytest.mark.parametrize(("code", "words"), [
-    ("bytearray(2**34)", "more than 1,0"),
+    ("bytearray(2**34)", "more than 64"),
     ("raise SystemExit('the end')", "cannot be read as a mesh"), ("os._exit(0)", "cannot be read"),
     ("os.abort()", "ended by an error"),
     ("return types.SimpleNamespace(cells=[],points=np.zeros((2**27,1)),**NONE)", "cannot be read"),

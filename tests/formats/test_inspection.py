@@ -4,9 +4,12 @@ import json
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 from helpers.builders import make_artifact, make_profile, make_scan
 
+from memscal.apparatus import load_apparatus
+from memscal.errors import FormatError, InputError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.reference import write_reference
@@ -55,6 +58,26 @@ def test_a_scan_of_another_program_fails_at_what_it_lacks(folder: Path):
     last = check(folder / "scan.h5")[-1]
     assert (last.name, last.passed) == ("content", False)
     assert "/entry/indenter/radius" in last.meaning
+
+
+def test_an_uncertainty_without_a_value_is_refused_by_its_path(folder: Path):
+    with h5py.File(folder / "reference.h5", "r+") as file:
+        del file.attrs["memscal_content_sha256"]
+        file["/entry/parameters/depth_errors"] = np.zeros(0)
+        file["/entry/parameters/depth_errors"].attrs["units"] = "mm"
+    with pytest.raises(FormatError, match="depth_errors has 0 values"):
+        describe(folder / "reference.h5")
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_stored_json_with_a_number_that_is_none_is_refused(folder: Path, number: str):
+    with h5py.File(folder / "artifact.h5", "r+") as file:
+        text = file["/entry/process/configuration/data"][()].decode()
+        del file["/entry/process/configuration/data"]
+        file["/entry/process/configuration/data"] = text.replace("0.1", number)
+    for read in (describe, load_apparatus):
+        with pytest.raises(InputError, match=f"configuration/data is not JSON: {number}"):
+            read(folder / "artifact.h5", accept_altered=True)
 
 
 def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path: Path):

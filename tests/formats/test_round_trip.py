@@ -78,6 +78,7 @@ def test_a_reference_in_a_scan_without_parameters_takes_its_load_but_no_film(tmp
     write_scan(make_scan(load=2.5), path)
     with h5py.File(path, "r+") as file:
         del file["/entry/reference_parameters"], file["/entry/reference_process"]
+        del file.attrs["memscal_content_sha256"]
     found = read_scan(path).reference
     assert (found.load, found.film, found.indenter is not None) == (2.5, None, False)
 
@@ -182,7 +183,8 @@ def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):
     assert (tmp_path / "a.h5").stat().st_size < u.nbytes
 
 
-finite = st.floats(-1e6, 1e6, allow_subnormal=False)
+# Quantities are no smaller, in SI units.
+finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else 0.0)
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -280,6 +282,7 @@ def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path: Path
         path = tmp_path / f"{name}.h5"
         write_scan(make_scan("raster"), path)
         with h5py.File(path, "r+") as file:
+            del file.attrs["memscal_content_sha256"]
             if name == "swapped":
                 file["/entry/data"].attrs["axes"] = ["x", "y"]
             else:

@@ -131,6 +131,24 @@ def test_places_along_a_line_are_those_along_the_same_line_in_the_plane(monkeypa
     np.testing.assert_array_equal(line.index, plane.index)
 
 
+@pytest.mark.parametrize(("line", "words"), [
+    (";,\t|" * 900_000, "900,001 columns"), ("# a comment", "holds no table"),
+], ids=["endless lines", "comments"])  # fmt: skip
+def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line, words):
+    """Of 40 MB of endless lines 838 MB were held: all of them were cut into cells at once."""
+    path = tmp_path / "t.csv"
+    path.write_text(f"{line}\n" * (40_000_000 // len(line)))
+    lines = Table._lines
+
+    def watched(table: Table, block: bytes) -> list[str]:
+        assert len(block) <= 3 * text_table._BLOCK
+        return lines(table, block)
+
+    monkeypatch.setattr(Table, "_lines", watched)
+    with pytest.raises(InputError, match=words):
+        Table(path)
+
+
 def test_what_is_too_large_is_refused_with_size_limit_and_cure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

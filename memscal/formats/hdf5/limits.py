@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -22,6 +23,8 @@ _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
 _SHARED = 0x02
 _VARIABLE_LENGTH = 9  # class of the datatype
 _MAX_BLOCKS = 1000
+#: Records of one name among the bytes of a file that are looked at.
+_MAX_RECORDS = 10_000
 
 
 def text_length(data: bytes, address: int, heaps: set[int]) -> int:
@@ -32,7 +35,7 @@ def text_length(data: bytes, address: int, heaps: set[int]) -> int:
     return _claim(data, data, address, heaps)
 
 
-def _claim(file: bytes, data: bytes, position: int, heaps: set[int]) -> int:
+def _claim(file: bytes, data: bytes | memoryview, position: int, heaps: set[int]) -> int:
     """Return the length in a descriptor, after a look at the heap that it leads to."""
     length, heap = struct.unpack_from("<IQ", data, position)
     if length and heap not in heaps:
@@ -80,14 +83,16 @@ def attribute_text_lengths(
 def _dense_lengths(data: bytes, name: bytes, number: int, heaps: set[int]) -> Iterator[int]:
     """Yield the claims of every attribute of this name and of variable length, in any object."""
     # In a heap of many attributes a message stands as it would in the header.
-    terminated = name + b"\0"
+    terminated, whole = name + b"\0", memoryview(data)
     position = data.find(terminated)
-    while position >= 0:
+    for _ in range(_MAX_RECORDS):
+        if position < 0:
+            return
         for size, versions in ((8, (1, 2)), (9, (3,))):
             start = position - size
             if start < 0 or data[start] not in versions:
                 continue
-            message = data[start : start + 2**16]
+            message = whole[start : start + 2**16]
             attribute, values = _attribute(message)
             dtype = size + (-(-len(terminated) // 8) * 8 if data[start] == 1 else len(terminated))
             variable = dtype < len(message) and message[dtype] & 0x0F == _VARIABLE_LENGTH
@@ -95,15 +100,16 @@ def _dense_lengths(data: bytes, name: bytes, number: int, heaps: set[int]) -> It
                 for i in range(number):
                     yield _claim(data, message, values + i * _DESCRIPTOR, heaps)
         position = data.find(terminated, position + 1)
+    raise ValueError("an attribute has more namesakes than can be checked")
 
 
-def _attribute(message: bytes) -> tuple[bytes, int]:
+def _attribute(message: bytes | memoryview) -> tuple[bytes, int]:
     """Return the name of an attribute message and where its data begin."""
     version, _, name, dtype, space = struct.unpack_from("<BBHHH", message)
     start = 9 if version == 3 else 8
     # Version 1 pads each part to a multiple of eight bytes.
     sizes = [-(-size // 8) * 8 if version == 1 else size for size in (name, dtype, space)]
-    return message[start : start + name].rstrip(b"\0"), start + sum(sizes)
+    return bytes(message[start : start + name]).rstrip(b"\0"), start + sum(sizes)
 
 
 def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
@@ -137,6 +143,8 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
 MAX_TEXT_BYTES = 4 * 2**20
 _MAX_RANK, _MAX_NUMBER_BYTES = 4, 16
 _MAX_CHUNKS, _MIN_CHUNK_LIMIT = 2**16, 2**20
+#: Chunks at the edges of an array of four axes may make it this many times as large.
+_MAX_MARGIN = 16
 _UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
 
 
@@ -167,6 +175,11 @@ class Layout(NamedTuple):
     shape: tuple[int, ...]
     size: int
 
+    @property
+    def held(self) -> int:
+        """What its numbers take when they are read, each as eight bytes."""
+        return 8 * math.prod(self.shape)
+
     @classmethod
     def of(cls, where: str, item: Any) -> Layout:
         """Look at a dataset or an attribute."""
@@ -177,32 +190,34 @@ class Layout(NamedTuple):
         return cls(kind, space.shape, math.prod(space.shape) * kind.get_size())
 
 
-def check_layout(where: str, dataset: Any, *, text: bool) -> Layout:
+def check_layout(where: str, dataset: Any, data: bytes, *, text: bool) -> Layout:
     """Refuse a dataset whose storage could read other files, run code or exhaust memory."""
     kind, shape, claimed = of = Layout.of(where, dataset)
     check_type(where, kind, text=text)
     if len(shape) > (0 if text else _MAX_RANK):
         expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
         raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
-    limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
-    if claimed > limit:
+    limit, held = (MAX_TEXT_BYTES, claimed) if text else (MOST_ARRAY_BYTES, of.held)
+    if max(claimed, held) > limit:
         why = f"More than {limit:,} bytes are not read, however small the file is."
-        raise refuse(where, f"claims {claimed:,} bytes", why)
+        raise refuse(where, f"claims {max(claimed, held):,} bytes", why)
     plist = dataset.get_create_plist()
     layout = plist.get_layout()
     if layout == h5py.h5d.VIRTUAL:
         raise refuse(where, "is a virtual dataset", "Its values would come from other files.")
     if plist.get_external_count() > 0:
         raise refuse(where, "is stored in external files", "Any file could be read through it.")
-    _check_filters(where, plist)
+    codes = _check_filters(where, plist)
     if layout == h5py.h5d.CHUNKED:
-        _check_chunks(where, dataset, plist.get_chunk(), of)
+        size = _check_chunks(where, dataset, plist.get_chunk(), of)
+        if h5py.h5z.FILTER_DEFLATE in codes:
+            _check_inflation(where, dataset, codes, size, data)
     elif claimed and dataset.get_storage_size() < claimed:
         raise refuse(where, *_UNWRITTEN)
     return of
 
 
-def _check_filters(where: str, plist: Any) -> None:
+def _check_filters(where: str, plist: Any) -> list[int]:
     filters = {
         h5py.h5z.FILTER_DEFLATE: "gzip",
         h5py.h5z.FILTER_SHUFFLE: "shuffle",
@@ -216,15 +231,38 @@ def _check_filters(where: str, plist: Any) -> None:
         if codes.count(code) > 1:
             why = "Filters on filters can blow a small file up without limit."
             raise refuse(where, f"uses the filter {filters[code]} more than once", why)
+    return codes
 
 
-def _check_chunks(where: str, dataset: Any, chunk: tuple[int, ...], of: Layout) -> None:
-    size = math.prod(chunk) * of.kind.get_size()
+def _check_chunks(where: str, dataset: Any, chunk: tuple[int, ...], of: Layout) -> int:
+    """Refuse chunks much larger than the data, too many or unwritten ones; return their size."""
+    size = math.prod(chunk) * int(of.kind.get_size())
     if size > max(_MIN_CHUNK_LIMIT, 2 * of.size) or size > MOST_ARRAY_BYTES:
         problem = f"has chunks of {size:,} bytes for {of.size:,} bytes of data"
         raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
     number = math.prod(-(-n // c) for n, c in zip(of.shape, chunk, strict=True))
+    if number * size > max(_MIN_CHUNK_LIMIT, _MAX_MARGIN * of.size):
+        problem = f"is cut into chunks of {number * size:,} bytes for {of.size:,} bytes of data"
+        raise refuse(where, problem, "Each is unpacked as a whole.")
     if number > _MAX_CHUNKS:
         raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")
     if number and dataset.get_num_chunks() < number:
         raise refuse(where, *_UNWRITTEN)
+    return size
+
+
+def _check_inflation(where: str, dataset: Any, codes: list[int], size: int, data: bytes) -> None:
+    """Refuse a packed chunk that does not unpack to its size: HDF5 would, without a limit."""
+    place = codes.index(h5py.h5z.FILTER_DEFLATE)
+    # A checksum that was taken before packing is packed, too.
+    size += 4 * (h5py.h5z.FILTER_FLETCHER32 in codes[:place])
+    whole = memoryview(data)
+
+    def check(chunk: Any) -> None:
+        if not chunk.filter_mask & 1 << place:
+            packed = whole[chunk.byte_offset :][: chunk.size]
+            if len(zlib.decompressobj().decompress(packed, size + 1)) != size:
+                problem = f"has a chunk that does not unpack to {size:,} bytes"
+                raise refuse(where, problem, "A few bytes can stand for any number of them.")
+
+    dataset.chunk_iter(check)

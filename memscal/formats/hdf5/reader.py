@@ -11,6 +11,7 @@ import hashlib
 import math
 import os
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import h5py
@@ -45,11 +46,14 @@ def damage_named(
 
 
 _MAX_ATTRIBUTE_BYTES, _MAX_ATTRIBUTE_ITEMS = 2**16, 64
+#: Bytes that may be held of any file, and more for each of its bytes: packed readings of noise
+#: stand for two or three bytes each, and arrays without noise beside them for many.
+_USUAL, _MOST_PER_BYTE = 2**26, 64
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 @contextlib.contextmanager
-def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
+def open_hdf5(path: str | os.PathLike[str], *, accept_altered: bool = False) -> Iterator[SafeFile]:
     """Open an HDF5 file safely, for the time of a ``with`` block."""
     data = read_bytes(path, limit=MOST_HDF5_BYTES)
     name = os.path.basename(os.fspath(path))
@@ -61,7 +65,7 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     with damage_named(f"{name} cannot be opened as HDF5"):
         # The library's own copy of the bytes: no call of Python for each piece that it looks at.
         file = h5py.File(h5py.h5f.open_file_image(data))
-        opened = SafeFile(file, name, source, data)
+        opened = SafeFile(file, name, source, data, accept_altered=accept_altered)
     try:
         # The dataclasses check values without knowing where they come from.
         with placed(name):
@@ -74,12 +78,16 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
 class SafeFile:
     """An open file whose content is reached by known paths only."""
 
-    def __init__(self, file: Any, name: str, source: SourceFile, data: bytes) -> None:
+    def __init__(
+        self, file: Any, name: str, source: SourceFile, data: bytes, *, accept_altered: bool = False
+    ) -> None:
         self.name = name
         self.source = source
+        self._accept_altered = accept_altered
         self._data = data
         self._opened: dict[str, Any] = {"/": file["/"].id}
-        self._budget = MOST_HDF5_BYTES
+        # Of a small file no more than it may well stand for.
+        self._budget = self._most = min(MOST_HDF5_BYTES, _USUAL + _MOST_PER_BYTE * len(data))
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
         self._listed: frozenset[str] | None = None
@@ -90,10 +98,26 @@ class SafeFile:
         """Return file and path as messages name them."""
         return f"{self.name}: {path}"
 
+    @property
+    def verified(self) -> bool:
+        """Whether the content was found to be what was written, or accepted as it is."""
+        return self._listed is not None or bool(self.source.altered)
+
     def limit_to(self, paths: Iterable[str]) -> None:
         """From now on refuse what stands at any other path: no digest covers it."""
         self._listed = frozenset(paths)
-        self._attributes.clear()
+
+    def refuse_altered(self, problem: str) -> None:
+        """Refuse a file that is not as it was written; where that is accepted, record it."""
+        if not self._accept_altered:
+            raise FormatError(
+                f"{self.name} was changed after it was written: {problem}.",
+                why="Its numbers may not be those that were measured or calculated.",
+                cure="Get the original file, or make it again (repeat the calibration). To use it "
+                "as it is, accept it (accept_altered=True; --accept-altered): that is recorded.",
+            )
+        if not self.source.altered:
+            self.source = replace(self.source, altered=problem)
 
     def has(self, path: str) -> bool:
         """Return whether a path exists; a link that is not a hard link is refused."""
@@ -112,8 +136,8 @@ class SafeFile:
         if path not in self._arrays:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                of = limits.check_layout(self.where(path), dataset, text=False)
-                self._spend(path, of.size)
+                of = limits.check_layout(self.where(path), dataset, self._data, text=False)
+                self._spend(path, of.held)
                 whole = of.kind.get_class() == h5py.h5t.INTEGER
                 values = np.empty(of.shape, dtype=np.int64 if whole else np.float64)
                 dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
@@ -133,7 +157,7 @@ class SafeFile:
         if path not in self._texts:
             with damage_named(f"{self.where(path)} cannot be read"):
                 dataset = self._dataset(path)
-                of = limits.check_layout(self.where(path), dataset, text=True)
+                of = limits.check_layout(self.where(path), dataset, self._data, text=True)
                 self._spend(path, of.size)
                 if of.kind.is_variable_str():
                     offset = dataset.get_offset() or -1
@@ -162,9 +186,7 @@ class SafeFile:
             self._opened[path] = self._follow(self._open(folder or "/"), path, name)
         item = self._opened[path]
         if item is not None and self._listed is not None and path not in self._listed:
-            problem = f"{self.where(path)} was added after the file was written."
-            why = "The list of its contents lacks it, so that no digest covers it."
-            raise FormatError(problem, why=why, cure="Remove it, or make the file again.")
+            self.refuse_altered(f"{path} was added")
         return item
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
@@ -189,7 +211,7 @@ class SafeFile:
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size
         if self._budget < 0:
-            why = f"At most {MOST_HDF5_BYTES:,} bytes are read from one file."
+            why = f"At most {self._most:,} bytes, as they are held, are read from it."
             raise refuse(self.where(path), "brings the data of this file over the limit", why)
 
     def _check_length(self, path: str, length: int) -> None:

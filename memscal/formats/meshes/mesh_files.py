@@ -1,7 +1,7 @@
 """Files of meshes with fields: VTU, legacy VTK and XDMF read, VTU written, all by meshio.
 
 meshio does not check what a file claims.  It reads in a child process with limits of time and
-memory, on a copy in a folder of its own, and returns plain arrays, never pickles.
+memory, a copy without a name, and returns plain arrays, never pickles.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from memscal.errors import FormatError, InputError, UnsafeFileError
+from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import atomic_write_bytes, read_bytes
 from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
 from memscal.formats.units import from_si
@@ -35,8 +35,10 @@ from memscal.version import __version__
 
 _WORKER = Path(__file__).with_name("worker.py")
 _MAX_ANSWER_BYTES = 512 * 2**20
-# Of the child: for the libraries and a small mesh, and more for each byte of the file.
-_MEMORY, _MEMORY_PER_BYTE = 2**30, 20
+# Of the child, and of its answer: for the libraries and a small mesh, and more for each byte of the
+# file.
+_MEMORY, _MEMORY_PER_BYTE = 640 * 2**20, 20
+_ANSWER, _ANSWER_PER_BYTE = 2**25, 20
 _SECONDS, _BYTES_PER_SECOND = 60.0, 2**20
 # Whatever else is in the environment is not for a process that reads files of others.
 _ENVIRONMENT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PATH", "SYSTEMROOT")
@@ -50,6 +52,21 @@ _AS_VTU = (
 )
 
 
+def _addresses(data: bytes) -> Iterator[tuple[str, str]]:
+    """Yield the name of the file and the path inside it of every array kept in another file."""
+    for address in _ADDRESS.finditer(data):
+        file_name, inside = (text.decode("utf-8", "replace").strip() for text in address.groups())
+        yield file_name, "/" + inside.strip("/")
+
+
+def with_drawn_in(path: Path) -> list[Path]:
+    """Return a file that is imported and those that it draws in: none of them may be replaced."""
+    if _KINDS.get(path.suffix.lower()) != "xdmf":
+        return [path]
+    names = {name for name, _ in _addresses(read_bytes(path)) if "\0" not in name}
+    return [path, *(path.parent / name for name in sorted(names))]
+
+
 def heavy_arrays(
     data: bytes, path: str
 ) -> tuple[dict[str, np.ndarray[Any, Any]], list[SourceFile]]:
@@ -59,9 +76,7 @@ def heavy_arrays(
     arrays = {}
     files: dict[str, SafeFile] = {}
     with contextlib.ExitStack() as opened:
-        for address in _ADDRESS.finditer(data):
-            words = [text.decode("utf-8", "replace").strip() for text in address.groups()]
-            file_name, inside = words[0], "/" + words[1].strip("/")
+        for file_name, inside in _addresses(data):
             file_stem, ending = os.path.splitext(file_name)
             if file_stem != stem or ending.lower() not in _HDF5_ENDINGS:
                 raise UnsafeFileError(
@@ -84,21 +99,19 @@ def run_meshio(
     """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
     seconds = _SECONDS + size / _BYTES_PER_SECOND
+    packed = io.BytesIO()
+    np.savez(packed, *heavy.values())
     request = {
         "kind": kind,
         "heavy": list(heavy),
+        "packed": packed.tell(),
         "path": [os.path.abspath(folder) for folder in sys.path],
         "memory": _MEMORY + _MEMORY_PER_BYTE * size,
         "seconds": int(seconds) + 1,
-        "output": _MAX_ANSWER_BYTES,
+        "output": min(_MAX_ANSWER_BYTES, _ANSWER + _ANSWER_PER_BYTE * size),
     }
-    with tempfile.TemporaryDirectory(prefix="memscal-") as folder:
-        place = Path(folder)
-        (place / f"mesh.{kind}").write_bytes(data)
-        if heavy:
-            np.savez(place / "heavy.npz", *heavy.values())
-        _run(json.dumps(request), folder, seconds, name)
-        answer = io.BytesIO(read_bytes(place / "answer", limit=_MAX_ANSWER_BYTES + 2**20))
+    parts = (json.dumps(request).encode() + b"\n", packed.getbuffer(), data)
+    answer = io.BytesIO(_run(parts, seconds, name))
     header = json.loads(np.load(answer, allow_pickle=False).tobytes())
     if "error" in header:
         kind_of_error = UnsafeFileError if header["unsafe"] else FormatError
@@ -110,28 +123,32 @@ def run_meshio(
     return header, numbers
 
 
-def _run(request: str, folder: str, seconds: float, name: str) -> None:
+def _run(parts: Iterable[bytes | memoryview], seconds: float, name: str) -> bytes:
+    """Run the worker on parts, in a file without a name, of which a kill leaves nothing."""
     environment = {key: os.environ[key] for key in _ENVIRONMENT if key in os.environ}
     try:
-        done = subprocess.run(
-            # Isolated: the environment and the folder add no modules; the path is in the request.
-            [sys.executable, "-I", "-B", str(_WORKER)],
-            input=request.encode(),
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            cwd=folder,
-            # Each thread of numpy's library would take its share of the limited memory.
-            env={**environment, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-            timeout=seconds,
-            check=False,
-        )
+        with tempfile.TemporaryFile() as given:
+            given.writelines(parts)
+            given.seek(0)
+            done = subprocess.run(
+                # Isolated: environment and folder add no modules; the path is in the request.
+                [sys.executable, "-I", "-B", str(_WORKER)],
+                stdin=given,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                # Each thread of numpy's library would take its share of the limited memory.
+                env={**environment, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+                timeout=seconds,
+                check=False,
+            )
         late = -done.returncode == getattr(signal, "SIGXCPU", None)
     except subprocess.TimeoutExpired:
         late = True
     except OSError as error:
         problem = "A mesh is read by a process of its own, which cannot be started."
         why = f"The system says: {error.strerror or error}."
-        cure = "Run memscal where Python may start itself."
+        cure = "Run memscal where Python may start itself, with space in the temporary folder "
+        cure += "(TMPDIR) for a copy of the mesh."
         raise InputError(problem, why=why, cure=cure) from error
     if late:
         problem = f"Reading {name} takes longer than {seconds:.3g} s."
@@ -140,6 +157,7 @@ def _run(request: str, folder: str, seconds: float, name: str) -> None:
         problem = f"The process that read {name} was ended by an error ({done.returncode})."
         why = "The mesh is damaged, or larger than the memory that its file's size allows."
         raise UnsafeFileError(problem, why=why, cure=_AS_VTU)
+    return done.stdout
 
 
 _KINDS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".xmf": "xdmf"}
@@ -303,11 +321,15 @@ def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool
     cells = [(_CELLS[mesh.triangles.shape[1]], mesh.triangles)]
     fields = {f"displacement_{unit}": moved, "stress_Pa": stress}
     written = meshio.Mesh(points, cells, point_data=fields)
-    with tempfile.TemporaryDirectory(prefix="memscal-") as folder:
-        plain = Path(folder, "mesh.vtu")
-        # Not Mesh.write, which finds the format by the name, in any of forty.
-        meshio.vtu.write(str(plain), written)
-        data = plain.read_bytes()
+    try:
+        with tempfile.TemporaryDirectory(prefix="memscal-") as folder:
+            plain = Path(folder, "mesh.vtu")
+            # Not Mesh.write, which finds the format by the name, in any of forty.
+            meshio.vtu.write(str(plain), written)
+            data = plain.read_bytes()
+    except OSError as error:
+        problem = f"The mesh cannot be written to the temporary folder: {error.strerror}."
+        raise OutputError(problem, cure="Free some space there, or set TMPDIR.") from error
     head, grid, body = data.partition(b"<UnstructuredGrid>")
     atomic_write_bytes(path, head + _comment(mesh) + grid + body, overwrite=overwrite)
 

@@ -1,10 +1,11 @@
 """The child process that reads a mesh with meshio, within limits, and sees no other file.
 
-It imports nothing of memscal.  The request comes on standard input; the answer is a file of arrays
-in numpy's format, the first of which is text in JSON.
+It imports nothing of memscal.  Request and mesh come on standard input; the answer is a sequence of
+arrays in numpy's format, the first of which is text in JSON.
 """
 
 import base64
+import builtins
 import contextlib
 import io
 import json
@@ -30,32 +31,32 @@ _ALLOWED_OF_OS = {"os.listdir", "os.scandir"}
 
 def main() -> None:
     """Read the mesh of a request and write the answer."""
-    request = json.load(sys.stdin)
-    limited = _limit(request["memory"], request["seconds"], request["output"])
+    given = sys.stdin.buffer
+    request = json.loads(given.readline())
+    limited = _limit(request["memory"], request["seconds"])
     sys.path[:] = request["path"]
     import numpy as np
 
-    heavy: dict[str, Any] = {}
-    if request["heavy"]:
-        with np.load("heavy.npz", allow_pickle=False) as stored:
-            heavy = {address: stored[f"arr_{i}"] for i, address in enumerate(request["heavy"])}
+    packed = io.BytesIO(given.read(request["packed"]))
+    with np.load(packed, allow_pickle=False) as stored:
+        heavy = {address: stored[f"arr_{i}"] for i, address in enumerate(request["heavy"])}
     _stand_in_for_h5py(heavy)
     import meshio
 
-    with open("answer", "wb") as answer:
-        arrays: list[Any] = []
-        path = f"mesh.{request['kind']}"
-        _forbid_other_files(path)
-        try:
-            printed, mesh = _read(meshio, request["kind"], path)
-            header = {**_described(mesh, arrays), "printed": printed, "limited": limited}
-            if sum(values.nbytes for values in arrays) > request["output"]:
-                raise MemoryError
-        except BaseException as error:  # noqa: BLE001 - meshio ends the program on some files
-            arrays, header = [], _failure(error, request["memory"])
-        np.save(answer, np.frombuffer(json.dumps(header).encode(), np.uint8))
-        for values in arrays:
-            np.save(answer, values, allow_pickle=False)
+    # numpy takes what has a file's methods for a file, in which it would have to seek.
+    answer = types.SimpleNamespace(write=open(os.dup(1), "wb").write)  # noqa: SIM115
+    arrays: list[Any] = []
+    _forbid_files()
+    try:
+        printed, mesh = _read(meshio, request["kind"], given)
+        header = {**_described(mesh, arrays), "printed": printed, "limited": limited}
+        if sum(values.nbytes for values in arrays) > request["output"]:
+            raise MemoryError
+    except BaseException as error:  # noqa: BLE001 - meshio ends the program on some files
+        arrays, header = [], _failure(error, request["memory"])
+    np.save(answer, np.frombuffer(json.dumps(header).encode(), np.uint8))
+    for values in arrays:
+        np.save(answer, values, allow_pickle=False)
 
 
 def _failure(error: BaseException, memory: int) -> dict[str, Any]:
@@ -68,7 +69,7 @@ def _failure(error: BaseException, memory: int) -> dict[str, Any]:
     return {"error": f"{type(error).__name__}: {words}", "unsafe": False}
 
 
-def _limit(memory: int, seconds: int, output: int) -> bool:
+def _limit(memory: int, seconds: int) -> bool:
     """Limit what this process may take; return whether the system limits memory at all."""
     try:
         import resource
@@ -78,7 +79,7 @@ def _limit(memory: int, seconds: int, output: int) -> bool:
     for name, value in (
         ("RLIMIT_CORE", 0),
         ("RLIMIT_CPU", seconds),
-        ("RLIMIT_FSIZE", output + 2**20),
+        ("RLIMIT_FSIZE", 0),
         ("RLIMIT_NOFILE", _MOST_FILES),
         ("RLIMIT_AS", memory),
     ):
@@ -93,8 +94,8 @@ def _limit(memory: int, seconds: int, output: int) -> bool:
     return limited
 
 
-def _forbid_other_files(mesh: str) -> None:
-    """Refuse from now on whatever is not the mesh or a Python module: files, network, programs."""
+def _forbid_files() -> None:
+    """Refuse from now on whatever is not a Python module: files, network, programs."""
     folders = tuple(os.path.join(os.path.abspath(folder), "") for folder in sys.path)
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
@@ -105,7 +106,7 @@ def _forbid_other_files(mesh: str) -> None:
             name = os.fsdecode(path)
             reading = not flags & (os.O_WRONLY | os.O_RDWR) and not set(mode or "r") & set("wax+")
             module = name.endswith((".py", ".pyc")) and name.startswith(folders)
-            if not (reading and (name == mesh or module)):
+            if not (reading and module):
                 raise PermissionError(f"it asks for the file {name}, which no mesh needs")
         elif event.partition(".")[0] in _FORBIDDEN or (
             event.startswith("os.") and event not in _ALLOWED_OF_OS
@@ -134,7 +135,7 @@ def _stand_in_for_h5py(heavy: Mapping[str, Any]) -> None:
     sys.modules["h5py"] = module
 
 
-def _read(meshio: Any, kind: str, path: str) -> tuple[str, Any]:
+def _read(meshio: Any, kind: str, given: Any) -> tuple[str, Any]:
     """Return what meshio prints about a mesh, and the mesh."""
     printed = io.StringIO()
     with (
@@ -146,10 +147,14 @@ def _read(meshio: Any, kind: str, path: str) -> tuple[str, Any]:
         # numpy only warns of text that is not a number, and cuts the array short.
         warnings.filterwarnings("error", message="string or file could not be read")
         if kind != "vtk":
-            with open(path, "rb") as file:
-                root = {"vtu": _tidy_vtu, "xdmf": _tidy_xdmf}[kind](file.read())
+            root = {"vtu": _tidy_vtu, "xdmf": _tidy_xdmf}[kind](given.read())
             # meshio parses with this function: it is given the tidy tree.
             ET.parse = lambda *_: ET.ElementTree(root)
+        path, opener = f"mesh.{kind}", builtins.open
+        # The mesh has no name: it is what stands in the standard input.
+        vars(builtins)["open"] = lambda file, *a, **k: (
+            given if file == path else opener(file, *a, **k)
+        )
         try:
             mesh = getattr(meshio, kind).read(path)
         except SystemExit as error:

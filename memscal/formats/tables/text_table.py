@@ -71,7 +71,8 @@ class Table:
         self._digest, self._latin, self._width = hashlib.sha256(), False, 0
         self._blocks = self._whole_lines()
         head, lines = b"", list[str]()
-        while len(lines) < _SAMPLE and (block := next(self._blocks, b"")):
+        # A head of a few endless lines, or of comments alone, is looked at no further than this.
+        while len(lines) < _SAMPLE and len(head) <= _BLOCK and (block := next(self._blocks, b"")):
             head += block
             written = self._lines(head)
             lines = [line for line in written if not _is_comment(line)]
