@@ -314,7 +314,7 @@ def _confronted(
     return {
         name: effective.confront(
             family,
-            sensor_of(apparatus, family, reach, measured.scans[0].film),
+            sensor_of(apparatus, family, reach, measured.scans),
             points,
             [int(np.abs(family.loads - profile.load).argmin()) for profile in measured.profiles],
         )

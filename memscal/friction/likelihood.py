@@ -24,10 +24,10 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Tables, log_likelihood
-from memscal.measurement.posterior import apparatus_changes, changes_by_film, sensor_transfer
+from memscal.measurement.posterior import apparatus_changes, sensor_transfer, shared_changes
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
+from memscal.model.scan import Scan
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,14 +154,14 @@ class Sensor:
     changes: FloatArray  # (K, q): its independent changes by one standard uncertainty
     conversion_constant: float  # A, in V/Pa
     order: int = 0  # one of a tangential channel
-    # (K,): its changes by one uncertainty of what the contacts' film shares, by source.
-    by_film: Mapping[str, FloatArray] = field(default_factory=dict)
+    # (K,): its changes by one uncertainty of what the contacts share, film and load, by source.
+    shared: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def of_shape(self) -> Sensor:
         """The sensor with the changes of A G that those of G alone bring: its integral stays."""
-        by_film = {source: self._shaped(c[:, None])[:, 0] for source, c in self.by_film.items()}
-        return replace(self, changes=self._shaped(self.changes), by_film=by_film)
+        shared = {source: self._shaped(c[:, None])[:, 0] for source, c in self.shared.items()}
+        return replace(self, changes=self._shaped(self.changes), shared=shared)
 
     def _shaped(self, changes: FloatArray) -> FloatArray:
         of_conversion = self.wavenumbers.integrals(changes)
@@ -185,14 +185,14 @@ def sensor_of(
     apparatus: ApparatusFunction,
     family: ProfileFamily,
     reach: float,
-    film: ElasticFilm | None = None,
+    scans: Sequence[MeasuredScan | Scan],
 ) -> Sensor:
     """Return a sensor at a family's nodes, with the changes of A G that change the signal."""
-    # With the contacts' ``film``: what it shares with the sensor's counts as one error.
+    # What the contacts' ``scans`` share with the calibration, film and load cell, counts once.
     nodes = family.wavenumbers
     middle = family.spectra[family.values.size // 2]
-    shared = changes_by_film(apparatus, film, nodes.k)
-    shared = {source: change for source, change in shared.items() if source in family.changes}
+    shared = shared_changes(apparatus, scans, nodes.k)
+    shared = {name: change for name, change in shared.items() if name in (*family.changes, "load")}
     changes = apparatus_changes(apparatus, nodes.k, shared)
     bessel = j1 if family.order else j0
     kernel = bessel(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
@@ -216,12 +216,10 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     slope = bessel.slopes(transfer * spectra)
     changed = [bessel.values(change * spectra) for change in sensor.changes.T]
     columns = {"apparatus": np.stack(changed, axis=-1)} if changed else {}
-    for source, change in members.changes.items():
-        both = transfer * change[:, load]
-        if source in sensor.by_film:
-            both = both + sensor.by_film[source] * spectra
-        columns[source] = bessel.values(both)[..., None]
-    columns["load"] = (points.load_share * by_load)[..., None]
+    of_load = points.load_share * members.by_load
+    for source, change in {**members.changes, "load": of_load}.items():
+        of_sensor = sensor.shared.get(source, 0.0)
+        columns[source] = bessel.values(transfer * change[:, load] + of_sensor * spectra)[..., None]
     columns["position_scale"] = (points.position_share * points.radius * slope)[..., None]
     return Predicted(
         signal=bessel.values(transfer * spectra) + by_load * points.log_load,

@@ -51,6 +51,7 @@ from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
+from memscal.model.measured_stress import MeasuredScan
 from memscal.model.scan import Scan
 
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
@@ -345,8 +346,9 @@ def posterior_of(
     film = film_transfer(scan, model.reference.wavenumbers)
     scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
     by_film = _film_changes(scan, model.reference.wavenumbers)
-    shared = changes_by_film(apparatus, scan.film, model.k)
+    shared = shared_changes(apparatus, [scan], model.k)
     of_sensor = apparatus_changes(apparatus, model.k, shared)
+    of_load = shared.pop("load", None)
     names, nothing = tuple(dict.fromkeys([*by_film, *shared])), np.zeros(nodes)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
     of_film, of_kernel = (
@@ -360,6 +362,8 @@ def posterior_of(
         "film": _signals(estimate, mean, of_film * transfer[:, None] + of_kernel * film[:, None]),
         "position_scale": scaled[:, None],
     }
+    if of_load is not None:
+        shifts["load"] = _signals(estimate, mean, (of_load * film)[:, None])
     covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
     changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
     changes["film"][:nodes] += scan.stated_load * of_film * mean[:nodes, None]
@@ -395,7 +399,7 @@ def apparatus_changes(
 ) -> FloatArray:
     """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa.
 
-    Those ``without`` which they are asked for are left to :func:`changes_by_film`.
+    Those ``without`` which they are asked for are left to :func:`shared_changes`.
     """
     return _of_sensor(apparatus, k.tobytes(), tuple(without))[1]
 
@@ -404,23 +408,21 @@ def apparatus_changes(
 _OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
 
 
-def changes_by_film(
-    apparatus: ApparatusFunction, film: ElasticFilm | None, k: FloatArray
+def shared_changes(
+    apparatus: ApparatusFunction, scans: Sequence[Scan | MeasuredScan], k: FloatArray
 ) -> dict[str, FloatArray]:
-    """Return changes (n,) of the transform of A G, in V/Pa, by the film that a contact shares.
+    """Return changes (n,) of the transform of A G, in V/Pa, by what contacts share with the sensor.
 
-    By one standard uncertainty of each property; empty of another film than the sensor's.
+    By one standard uncertainty of each property of its film, and of the load on its load cell.
     """
-    known = apparatus.film
-    if film is None or known is None or not _alike(film, known):
-        return {}
-    r, a = apparatus.radial_profile.r, apparatus.conversion_constant
-    changes = {name: apparatus.kernel_changes.get(name) for name in _OF_FILM}
-    return {
-        name: a * hankel_transform(r, change, k)
-        for name, change in changes.items()
-        if change is not None
-    }
+    known, r, a = apparatus.film, apparatus.radial_profile.r, apparatus.conversion_constant
+    names: list[str] = []
+    if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
+        names += _OF_FILM
+    if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
+        names.append("load")
+    changes = apparatus.kernel_changes
+    return {name: a * hankel_transform(r, changes[name], k) for name in names if name in changes}
 
 
 def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:

@@ -87,7 +87,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
     _, shear = measured_with(made)
     film, sphere = made.dry.film, made.dry.indenter
     family = amontons_family(film, sphere, LOADS, reach=24e-3, cache=cache, order=1)
-    sensor = sensor_of(shear, family, 8e-3)
+    sensor = sensor_of(shear, family, 8e-3, [made.dry])
     members = family.at(0.1)
 
     def at(offset: FloatArray) -> LoadPoints:
