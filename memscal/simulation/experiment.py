@@ -86,6 +86,7 @@ def simulate_contacts(
 ) -> Scan:
     """Simulate a line scan of contacts of a sphere, each pressed anew with a load of its own."""
     # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
+    # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
     loads = checked_loads(load)
     if np.unique(loads).size != loads.size:
         problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
@@ -112,7 +113,7 @@ def simulate_contacts(
     shear = rod_scan.shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     states, spread = _pressed(
-        lambda at: indent(film, sphere, load=at, strain="linear", **law),
+        lambda at: indent(film.expected, sphere, load=at, strain="linear", **law),
         load_scale * loads,
         load_scatter,
     )
@@ -186,9 +187,9 @@ def simulate_contacts(
 
 
 def _described_film(film: ElasticFilm) -> dict[str, float]:
-    """Return what of a film decides over its base stress, by the names of a truth."""
+    """Return what of a true film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
-    return {name: float(getattr(film, name)) for name in names}
+    return {name: float(getattr(film.expected, name)) for name in names}
 
 
 def _described(interface: Interface) -> dict[str, float | str]:
@@ -384,8 +385,7 @@ def simulate_experiment(
     inputs_seed, rod_seed, dry_seed, lubricated_seed = (
         int(stream.generate_state(1)[0]) for stream in np.random.SeedSequence(seed).spawn(4)
     )
-    expected = replace(film.expected, poisson_ratio_uncertainty=None)
-    reality = Reality(film=film if draw_inputs else expected, rod=rod, sphere=sphere)
+    reality = Reality(film=film, rod=rod, sphere=sphere)
     if draw_inputs:
         reality = drawn(reality, load_uncertainty or 0.0, inputs_seed, one_load_cell=one_load_cell)
     thickness = thickness_factor * reality.film.thickness

@@ -80,10 +80,10 @@ def force_of(rod_scale: float, sphere_scale: float, seed: int) -> tuple[float, f
     rod = memscal.simulate(film=FILM, load=rod_scale, load_uncertainty=SHARE, seed=seed)
     sensor = memscal.calibrate(replace(rod, load=1.0, **cell), method="evidence").apparatus
     contact = simulate_contacts(
-        film=FILM.expected, load=LOADS[1], load_scale=sphere_scale, load_uncertainty=SHARE,
+        film=FILM, load=LOADS[1], load_scale=sphere_scale, load_uncertainty=SHARE,
         seed=seed,
     )  # fmt: skip
-    measured = memscal.measure_stress(replace(contact, film=FILM, **cell), sensor)
+    measured = memscal.measure_stress(replace(contact, **cell), sensor)
     off = measured.profiles[0].force - LOADS[1]
     return off, abs(off) / measured.checks[0].value
 
