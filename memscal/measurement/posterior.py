@@ -415,14 +415,31 @@ def shared_changes(
 
     By one standard uncertainty of each property of its film, and of the load on its load cell.
     """
-    known, r, a = apparatus.film, apparatus.radial_profile.r, apparatus.conversion_constant
-    names: list[str] = []
+    known, names = apparatus.film, list[str]()
     if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
         names += _OF_FILM
     if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
         names.append("load")
+    return input_changes(apparatus, names, k)
+
+
+def input_changes(
+    apparatus: ApparatusFunction, names: Iterable[str], k: FloatArray
+) -> dict[str, FloatArray]:
+    """Return changes (n,) of the transform of A G, in V/Pa, by inputs of the calibration."""
+    r, a = apparatus.radial_profile.r, apparatus.conversion_constant
     changes = apparatus.kernel_changes
     return {name: a * hankel_transform(r, changes[name], k) for name in names if name in changes}
+
+
+def common_inputs(apparatus: ApparatusFunction, other: ApparatusFunction) -> list[str]:
+    """Return the inputs that the calibrations of two channels by one rod scan have in common."""
+    scans = (
+        (one.film, one.indenter, one.load, one.load_cell, one.process.input_scan)
+        for one in (apparatus, other)
+    )
+    same = len(set(scans)) == 1
+    return [name for name in apparatus.kernel_changes if same and name in other.kernel_changes]
 
 
 def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
