@@ -79,6 +79,7 @@ from .model.measured_stress import MeasuredScan as MeasuredScan
 from .model.measured_stress import MeasuredStress as MeasuredStress
 from .model.provenance import Process as Process
 from .model.provenance import SourceFile as SourceFile
+from .model.scan import LoadCell as LoadCell
 from .model.scan import Places as Places
 from .model.scan import Scan as Scan
 from .model.scan import StressSensor as StressSensor

@@ -53,6 +53,7 @@ Examples:
   memscal compare sensor.apparatus.h5 dry.h5 --loading incremental --interface --macroscopic 1.6
   memscal compare sensor.apparatus.h5 dry.h5 --reference fem0.h5 --reference fem03.h5
   memscal compare shear.apparatus.h5 dry.stress.h5 --channel xz
+  memscal compare sensor.apparatus.h5 dry.stress.h5 --shear shear.apparatus.h5
 """
 
 
@@ -76,6 +77,10 @@ Examples:
     "Fit lubricated loads with no friction together with the dry ones, which cancels most of what "
     "A, G and film leave uncertain; or each kind by itself.  [default: together unless the check "
     "lubricated_frictionless fails]"
+)
+@option("--shear", FILE, metavar="ARTIFACT")(
+    "Artifact of the tangential channel of the sensor: coefficients of all loads together are by "
+    "normal stress and shear together (experimental)."
 )
 @option("--macroscopic", _COEFFICIENT, metavar="MU")(
     "Friction coefficient measured in sliding, to compare with."
@@ -143,7 +148,8 @@ def command(
     if folder is not None:
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
-    inputs = [artifact, *scans, *options["references"]]
+    shear = None if options["shear"] is None else load_apparatus(options["shear"])
+    inputs = [artifact, *scans, *options["references"], *filter(None, [options["shear"]])]
     outputs = figures = [*single, *named.values()]
     if folder is not None and not folder.is_dir():
         if folder.exists():
@@ -159,6 +165,7 @@ def command(
             loading=options["loadings"] or ("incremental", "total"),
             references=references or None,
             lubricated=options["lubricated"],
+            shear=shear,
             macroscopic=options["macroscopic"],
             macroscopic_uncertainty=options["macroscopic_uncertainty"],
             interface=interface,
@@ -234,7 +241,9 @@ def _frictions(options: Mapping[str, Any]) -> list[float] | None:
 
 
 #: Options that the comparison of a shear does not have.
-_NOT_OF_SHEAR = ("references", "lubricated", "macroscopic", "interface", "single", "folder")
+_NOT_OF_SHEAR = (
+    *("references", "lubricated", "shear", "macroscopic", "interface", "single", "folder"),
+)
 
 
 def _check_usage(options: Mapping[str, Any], scans: Sequence[Path]) -> None:

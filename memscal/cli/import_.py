@@ -74,12 +74,16 @@ _SCAN_NAMES = [
     *("u_yz", "load_column", "load_unit", "load_uncertainty", "title"),
     *("lubrication", "lubricant", "rod_friction"),
 ]
+_CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
 _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
-    "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
+    "scan": [
+        *(*_SCAN_NAMES, "load_scatter", "position_error"),
+        *(*_SENSOR_NAMES.values(), *_CELL_NAMES.values()),
+    ],
     "reference": _REFERENCE_NAMES,
 }
 _NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "load")}
@@ -134,6 +138,11 @@ _NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "l
 @option("--sensor-name", metavar="TEXT")("Scan: name of the sensor.")
 @option("--sensor-model", metavar="TEXT")("Scan: model of the sensor.")
 @option("--channel", metavar="TEXT")("Scan: name of the channel.  [default: zz]")
+@option("--load-cell", metavar="TEXT")(
+    "Scan: name of the load cell or balance; its common error counts once where calibration and "
+    "contacts name the same one."
+)
+@option("--load-cell-serial", metavar="TEXT")("Scan: serial number of the load cell.")
 @option("--title", metavar="TEXT")("Scan: title.")
 @option("--r", metavar="COLUMN")("Reference: column of the radius.")
 @option("--r-unit", metavar="UNIT")(
@@ -251,14 +260,18 @@ def _set_up(options: dict[str, Any]) -> dict[str, Any]:
 
 def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     from memscal.formats.tables.scan import read_scan_table
-    from memscal.model.scan import StressSensor
+    from memscal.model.scan import LoadCell, StressSensor
 
-    labels = _stated({key: options[name] for key, name in _SENSOR_NAMES.items()}, [*_SENSOR_NAMES])
+    sensor, load_cell = (
+        _stated({key: options[name] for key, name in names.items()}, [*names])
+        for names in (_SENSOR_NAMES, _CELL_NAMES)
+    )
     return read_scan_table(
         path,
         **_stated(options, [*_SCAN_NAMES, *_TABLE_NAMES]),
         load_scatter=si(options["load_scatter"], -2),
         x_error=si(options["position_error"], -6),
         **_set_up(options),
-        sensor=StressSensor(**labels),
+        sensor=StressSensor(**sensor),
+        load_cell=LoadCell(**load_cell),
     )

@@ -25,7 +25,10 @@ FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with the names of its scans."""
 
 #: Options of a sphere whose values are given on as they are.
-_OF_SPHERE = ("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "gain")
+_OF_SPHERE = (
+    *("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "one_load_cell"),
+    "gain",
+)
 _SPHERE_NAMES = (
     *_OF_SPHERE,
     *("sphere_radius", "sphere_radius_uncertainty", "slip_length", "greenwood_tripp"),
@@ -66,6 +69,9 @@ _sphere_options = options_of(
     option("--draw-inputs", is_flag=True)(
         "Sphere: draw the true film, radii and loads from their uncertainties; the files "
         "state the nominal ones, and the truth beside."
+    ),
+    option("--one-load-cell", is_flag=True)(
+        "Sphere: its loads and the rod's have one common error, and the scans name one load cell."
     ),
     option("--gain", Quantity("ratio"), 1.0)(
         "Sphere: a deliberate error, a factor on the voltages of the sphere's scans only."

@@ -31,7 +31,7 @@ from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, 
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
-from memscal.model.scan import StressSensor
+from memscal.model.scan import LoadCell, StressSensor
 from memscal.model.stress import IdealReference, StressField, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -339,16 +339,21 @@ def _shape(file: SafeFile, path: str) -> str:
     return require_text(file, f"{path}/shape").strip().lower()
 
 
-def instrument_group(sensor: StressSensor) -> Group:
-    """Return the NXinstrument that holds the sensor."""
+def instrument_group(sensor: StressSensor, load_cell: LoadCell) -> Group:
+    """Return the NXinstrument that holds the sensor, and the load cell where it is stated."""
     group = write_record(records.SENSOR, sensor)
     group = replace(group, children={**group.children, **_NOWHERE})
-    return Group("NXinstrument", {"stress_sensor": group})
+    children: dict[str, Node] = {"stress_sensor": group}
+    if load_cell != LoadCell():
+        children["load_cell"] = write_record(records.LOAD_CELL, load_cell)
+    return Group("NXinstrument", children)
 
 
-def read_sensor(file: SafeFile, path: str) -> StressSensor:
-    """Read the sensor; what is not stated stays empty."""
-    return StressSensor(**read_record(records.SENSOR, file, path))
+def read_instrument(file: SafeFile, path: str) -> dict[str, Any]:
+    """Read sensor and load cell, by these names; what is not stated stays empty."""
+    sensor = read_record(records.SENSOR, file, f"{path}/stress_sensor")
+    load_cell = read_record(records.LOAD_CELL, file, f"{path}/load_cell")
+    return {"sensor": StressSensor(**sensor), "load_cell": LoadCell(**load_cell)}
 
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:

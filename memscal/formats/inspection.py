@@ -32,6 +32,7 @@ _MEASURED_ON = {
     "/entry/sample/film": records.FILM,
     "/entry/sample": records.SAMPLE,
     "/entry/instrument/stress_sensor": records.SENSOR,
+    "/entry/instrument/load_cell": records.LOAD_CELL,
 }
 # The records of each kind of file by their paths, in the order in which they are listed.
 _LAYOUTS: dict[str, dict[str, Record]] = {

@@ -112,7 +112,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         film=film,
         unit=reading.si,
         **contact,
-        sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
+        **groups.read_instrument(file, "/entry/instrument"),
         title=optional_text(file, "/entry/title"),
         **read_record(records.EXPERIMENT, file, "/entry"),
         reference=reference,
@@ -166,7 +166,7 @@ def _entry(scan: Scan) -> Group:
         "data": _data_group(scan),
         "indenter": groups.indenter_group(scan.indenter, *of_load),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
-        "instrument": groups.instrument_group(scan.sensor),
+        "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
         **notes,
     }
     if scan.reference is not None:

@@ -67,7 +67,7 @@ def _read_scans(
             MeasuredScan(
                 film=groups.read_film(file, f"{path}/sample/film"),
                 indenter=groups.read_round_indenter(file, f"{path}/indenter"),
-                sensor=groups.read_sensor(file, f"{path}/instrument/stress_sensor"),
+                **groups.read_instrument(file, f"{path}/instrument"),
                 lubrication=lubrication,
                 source=source,
                 **numbers,
@@ -80,7 +80,7 @@ def _scan_group(scan: MeasuredScan) -> Group:
     children: dict[str, Node] = {
         "sample": groups.sample_group(scan.film, scan.lubrication),
         "indenter": groups.indenter_group(scan.indenter),
-        "instrument": groups.instrument_group(scan.sensor),
+        "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
         **write_record(records.MEASURED_SCAN, scan).children,
     }
     return Group("NXcollection", children)
@@ -179,7 +179,7 @@ def _entry(measured: MeasuredStress) -> Group:
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.
         "sample": groups.sample_group(first.film),
-        "instrument": groups.instrument_group(first.sensor),
+        "instrument": groups.instrument_group(first.sensor, first.load_cell),
         "indenter": groups.indenter_group(first.indenter),
         "scans": Group("NXcollection", {"names": to_json("scans", list(scans)), **scans}),
         "inputs": Group("NXcollection", {"names": to_json("inputs", list(inputs)), **inputs}),

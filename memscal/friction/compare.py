@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 from os import PathLike
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from memscal.friction.checks import (
     synthetic_messages,
 )
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import load_points, sensor_of
+from memscal.friction.likelihood import Channel, load_points, sensor_of
 from memscal.friction.model_comparison import compare_interface
 from memscal.friction.results import (
     BoundedEstimate,
@@ -33,6 +33,7 @@ from memscal.friction.results import (
     ShearComparison,
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
+from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor
 from memscal.model.arrays import require_non_negative
 from memscal.model.checks import Message, override_messages
@@ -119,6 +120,9 @@ def require_macroscopic(value: float | None, uncertainty: float | None, *, inter
 FRICTIONLESS, APART = "frictionless", "apart"
 """How lubricated loads are fitted: with no friction beside the others, or by themselves."""
 
+Tangential: TypeAlias = tuple[ApparatusFunction, Mapping[str, ProfileFamily], Sequence[Message]]
+"""A tangential channel, families of the shear by loading, and what to say of it."""
+
 #: Calculated stresses reach this multiple of a scan's width.
 _REACH = 1.5
 _MM = 1e-3
@@ -133,6 +137,7 @@ def compare(
     loading: str | Sequence[str] = ("incremental", "total"),
     references: Sequence[StressProfile] | None = None,
     lubricated: str | None = None,
+    shear: ApparatusFunction | str | PathLike[str] | None = None,
     macroscopic: float | None = None,
     macroscopic_uncertainty: float | None = None,
     interface: bool = False,
@@ -168,6 +173,10 @@ def compare(
         ``"frictionless"``: lubricated loads have no friction, and are fitted together with the dry
         ones, which cancels most of what A, G and film leave uncertain; ``"apart"``: each kind by
         itself.  By default together unless the check ``lubricated_frictionless`` fails.
+    shear : ApparatusFunction or path, optional
+        The tangential channel of the same sensor (experimental, see :func:`compare_shear`): the
+        coefficients of all loads together are then those of both channels together, which share
+        the errors of film, contacts and calibration.  All scans hold its voltage.
     macroscopic, macroscopic_uncertainty : float, optional
         A friction coefficient that was measured otherwise, and its standard uncertainty.
     interface : bool
@@ -214,6 +223,15 @@ def compare(
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
+    tangential = None
+    if shear is not None:
+        if references is not None:
+            problem = "Profiles of another program and the shear are asked for."
+            raise InputError(problem, cure="Leave one of them out: those profiles have no shear.")
+        of_shear = opened_apparatus(shear)
+        notes = _accept_tangential(measured, of_shear, override=override)
+        sheared = _families(setting, friction, loading, order=1)
+        tangential = of_shear, sheared, notes
     if references is None:
         families = _families(setting, friction, loading)
     else:
@@ -221,7 +239,7 @@ def compare(
         families = {family.loading: family}
     sliding = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
     comparison = compare_measured(
-        measured, sensor, families, lubricated=lubricated, macroscopic=sliding
+        measured, sensor, families, lubricated=lubricated, shear=tangential, macroscopic=sliding
     )
     altered = accepted_alterations(*(profile.source for profile in references or ()))
     messages = (*override_messages(altered), *comparison.messages)
@@ -265,17 +283,23 @@ def compare_measured(
     families: Mapping[str, ProfileFamily],
     *,
     lubricated: str | None = None,
+    shear: Tangential | None = None,
     macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
     """Compare measured stress with families by loading, which hold every measured load."""
-    confronted = _confronted(measured, apparatus, families)
+    confronted = _confronted(measured, _channels(measured, apparatus, families))
+    together = confronted
+    if shear is not None:
+        common = common_inputs(apparatus, shear[0])
+        both = (apparatus, families), shear[:2]
+        together = _confronted(measured, *(_channels(measured, *one, common) for one in both))
     loads = {
         name: tuple(
             effective.load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles)
         )
         for name, of_family in confronted.items()
     }
-    loads, joint = _loading_counted(loads, _joint(measured, confronted, lubricated))
+    loads, joint = _loading_counted(loads, _joint(measured, together, lubricated))
     stated = measured.noise_stated
     checks = (*measured.checks, *comparison_checks(loads, joint, noise_stated=stated))
     return FrictionComparison(
@@ -286,7 +310,11 @@ def compare_measured(
         dry_against_lubricated=_pairs(measured, next(iter(confronted.values()))),
         macroscopic=macroscopic,
         checks=checks,
-        messages=comparison_messages(measured, families, joint, checks, macroscopic),
+        messages=(
+            *comparison_messages(measured, families, joint, checks, macroscopic),
+            *(() if shear is None else shear[2]),
+        ),
+        shear=None if shear is None else shear[0],
     )
 
 
@@ -317,22 +345,36 @@ def _families(
     }
 
 
-def _confronted(
+def _channels(
     measured: MeasuredStress,
     apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
-    channel: str = "zz",
-) -> dict[str, effective.Confrontation]:
-    points = [load_points(profile, channel) for profile in measured.profiles]
+    common: Sequence[str] = (),
+) -> dict[str, Channel]:
+    points = [load_points(profile, apparatus.sensor.channel) for profile in measured.profiles]
     reach = float(max(of_load.radius.max() for of_load in points))
     return {
-        name: effective.confront(
-            family,
-            sensor_of(apparatus, family, reach, measured.scans[0].film),
-            points,
-            [int(np.abs(family.loads - profile.load).argmin()) for profile in measured.profiles],
-        )
+        name: Channel(points, sensor_of(apparatus, family, reach, measured.scans, common), family)
         for name, family in families.items()
+    }
+
+
+def _confronted(
+    measured: MeasuredStress,
+    channels: Mapping[str, Channel],
+    shear: Mapping[str, Channel] | None = None,
+) -> dict[str, effective.Confrontation]:
+    """Hold the loads against each family, by one channel or by two."""
+    loads = [profile.load for profile in measured.profiles]
+    return {
+        name: effective.confront(
+            one.family,
+            one.sensor,
+            one.points,
+            [int(np.abs(one.family.loads - load).argmin()) for load in loads],
+            None if shear is None else shear[name],
+        )
+        for name, one in channels.items()
     }
 
 
@@ -469,18 +511,9 @@ def compare_shear(
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     measured = opened_stress(measured, accept_altered=accept_altered)
     require_contacts(measured.scans)
-    channel = sensor.sensor.channel
-    if channel not in TANGENTIAL:
-        raise InputError(
-            f"The artifact is of channel {channel}, not of a tangential one.",
-            cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
-            "compare the normal channel with memscal.compare().",
-        )
-    overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
-    overridden = [*accepted_alterations(sensor.source), *measured.overridden, *overridden]
+    notes = _accept_tangential(measured, sensor, override=override)
     families = _families(_setting(measured, cache, workers), friction, loading, order=1)
-    confronted = _confronted(measured, sensor, families, channel)
-    note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
+    confronted = _confronted(measured, _channels(measured, sensor, families))
     return ShearComparison(
         measured=measured,
         apparatus=sensor,
@@ -491,8 +524,29 @@ def compare_shear(
         },
         joint=_joint(measured, confronted),
         messages=(
-            *override_messages(overridden),
-            Message("experimental", note),
+            *override_messages(measured.overridden),
+            *notes,
             *synthetic_messages(measured),
         ),
     )
+
+
+def _accept_tangential(
+    measured: MeasuredStress, sensor: ApparatusFunction, *, override: bool
+) -> list[Message]:
+    """Refuse what is no tangential channel of the sensor of a measured stress; say what it is."""
+    channel = sensor.sensor.channel
+    if channel not in TANGENTIAL:
+        raise InputError(
+            f"The artifact is of channel {channel}, not of a tangential one.",
+            cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
+            "compare the normal channel with memscal.compare().",
+        )
+    for profile in measured.profiles:
+        load_points(profile, channel)  # refuses a scan without it before anything is calculated
+    overridden = [
+        *accepted_alterations(sensor.source),
+        *accept_other_sensor(measured.scans[0], sensor, ("name",), override=override),
+    ]
+    note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
+    return [*override_messages(overridden), Message("experimental", note)]

@@ -12,6 +12,7 @@ from scipy.special import chdtrc, chdtri
 
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import (
+    Channel,
     Likelihood,
     LoadPoints,
     Predicted,
@@ -136,6 +137,7 @@ class Confrontation:
     points: tuple[LoadPoints, ...]
     loads: tuple[int, ...]  # the family's load of each of the points
     whole: Likelihood  # of all loads, along the fine values
+    shear: Channel | None = None  # what a tangential channel tells beside
 
     def effective(self, chosen: Sequence[int], held: Sequence[int] = ()) -> BoundedEstimate:
         """Return the coefficient that explains some of the loads together, by their profiles.
@@ -145,18 +147,29 @@ class Confrontation:
         along = self.whole.only(chosen)
         if held:
             along = along.beside(self.whole.only(held))
-        return self._effective(along, *self._of(chosen), held)
 
-    def _of(self, chosen: Sequence[int]) -> tuple[list[LoadPoints], list[int]]:
-        return [self.points[i] for i in chosen], [self.loads[i] for i in chosen]
+        def at(value: float) -> Likelihood:
+            of_chosen = self._at(value, chosen)
+            return of_chosen.beside(self._at(self.family.values[0], held)) if held else of_chosen
+
+        return self._effective(along, at)
+
+    def _at(self, value: float, chosen: Sequence[int]) -> Likelihood:
+        """Likelihood of some of the loads at one value."""
+        points, loads = [self.points[i] for i in chosen], [self.loads[i] for i in chosen]
+        shear = None if self.shear is None else self.shear.only(chosen)
+        return likelihood(points, self.sensor, self.family.at(value), loads, shear)
 
     def effective_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
         a = self.sensor.conversion_constant
         noise = a * random_uncertainty(profile.maximum_budget)
         points = [points_at(np.zeros(1), self.points[index], a * profile.maximum, noise)]
-        along = likelihood(points, self.sensor, self.members, [self.loads[index]])
-        return self._effective(along, points, [self.loads[index]])
+
+        def at(members: ProfileFamily) -> Likelihood:
+            return likelihood(points, self.sensor, members, [self.loads[index]])
+
+        return self._effective(at(self.members), lambda value: at(self.family.at(value)))
 
     def at(self, values: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
         """Return chi-square and -2 ln p of one load at values that are among the fine ones."""
@@ -165,13 +178,7 @@ class Confrontation:
         along = self.whole.only([index])
         return along.chi_square[where], along.deviance[where]
 
-    def _effective(
-        self,
-        along: Likelihood,
-        points: Sequence[LoadPoints],
-        loads: Sequence[int],
-        held: Sequence[int] = (),
-    ) -> BoundedEstimate:
+    def _effective(self, along: Likelihood, at: Callable[[float], Likelihood]) -> BoundedEstimate:
         estimate = profile_estimate(
             along.values,
             along.coordinates,
@@ -185,40 +192,31 @@ class Confrontation:
         return replace(
             estimate,
             least=least,
-            budget={}
-            if estimate.value is None
-            else self._budget(estimate.value, points, loads, held),
+            budget={} if estimate.value is None else self._budget(estimate.value, at),
             degrees=degrees,
             p_value=float(chdtrc(max(degrees, 1), least)),
         )
 
-    def _budget(
-        self,
-        value: float,
-        points: Sequence[LoadPoints],
-        loads: Sequence[int],
-        held: Sequence[int],
-    ) -> dict[str, float]:
+    def _budget(self, value: float, at: Callable[[float], Likelihood]) -> dict[str, float]:
         """Contribution of each source to the coefficient, by the slope at its best value."""
         t = self.family.coordinate(value)
         if t >= 1:
             return {}
-        along = likelihood(points, self.sensor, self.family.at(value), loads)
-        if held:
-            frictionless = self.family.at(self.family.values[0])
-            points, loads = self._of(held)
-            along = along.beside(likelihood(points, self.sensor, frictionless, loads))
         stretch = self.family.scale / (1 - t) ** 2
-        return {source: stretch * share for source, share in along.budget(0).items()}
+        return {source: stretch * share for source, share in at(value).budget(0).items()}
 
 
 def confront(
-    family: ProfileFamily, sensor: Sensor, points: Sequence[LoadPoints], loads: Sequence[int]
+    family: ProfileFamily,
+    sensor: Sensor,
+    points: Sequence[LoadPoints],
+    loads: Sequence[int],
+    shear: Channel | None = None,
 ) -> Confrontation:
     """Hold measured loads against a family."""
     members = family.at(fine_values(family))
-    whole = likelihood(points, sensor, members, loads)
-    return Confrontation(family, sensor, members, tuple(points), tuple(loads), whole)
+    whole = likelihood(points, sensor, members, loads, shear)
+    return Confrontation(family, sensor, members, tuple(points), tuple(loads), whole, shear)
 
 
 def fine_values(family: ProfileFamily) -> FloatArray:

@@ -11,12 +11,15 @@ and changes its sign with the side of the centre.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.special import j0, j1
 
 from memscal.apparatus import ApparatusFunction
@@ -24,10 +27,15 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Tables, log_likelihood
-from memscal.measurement.posterior import apparatus_changes, changes_by_film, sensor_transfer
+from memscal.measurement.posterior import (
+    apparatus_changes,
+    input_changes,
+    sensor_transfer,
+    shared_changes,
+)
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
+from memscal.model.scan import Scan
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +53,8 @@ class LoadPoints:
     load_share: float = 0.0  # relative standard uncertainty of all loads
     position_share: float = 0.0  # likewise of the stage's scale
     correlation: FloatArray | None = None  # (n, n): of the electronic noise
+    # (n, m): one where a reading is of the contact; without it each is of its own.
+    contacts: FloatArray | None = None
 
     @property
     def radius(self) -> FloatArray:
@@ -154,14 +164,14 @@ class Sensor:
     changes: FloatArray  # (K, q): its independent changes by one standard uncertainty
     conversion_constant: float  # A, in V/Pa
     order: int = 0  # one of a tangential channel
-    # (K,): its changes by one uncertainty of what the contacts' film shares, by source.
-    by_film: Mapping[str, FloatArray] = field(default_factory=dict)
+    # (K,): its changes by one uncertainty of what the contacts share, film and load, by source.
+    shared: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def of_shape(self) -> Sensor:
         """The sensor with the changes of A G that those of G alone bring: its integral stays."""
-        by_film = {source: self._shaped(c[:, None])[:, 0] for source, c in self.by_film.items()}
-        return replace(self, changes=self._shaped(self.changes), by_film=by_film)
+        shared = {source: self._shaped(c[:, None])[:, 0] for source, c in self.shared.items()}
+        return replace(self, changes=self._shaped(self.changes), shared=shared)
 
     def _shaped(self, changes: FloatArray) -> FloatArray:
         of_conversion = self.wavenumbers.integrals(changes)
@@ -185,15 +195,19 @@ def sensor_of(
     apparatus: ApparatusFunction,
     family: ProfileFamily,
     reach: float,
-    film: ElasticFilm | None = None,
+    scans: Sequence[MeasuredScan | Scan],
+    common: Sequence[str] = (),
 ) -> Sensor:
     """Return a sensor at a family's nodes, with the changes of A G that change the signal."""
-    # With the contacts' ``film``: what it shares with the sensor's counts as one error.
+    # What the contacts' ``scans`` share with the calibration, film and load cell, counts once, as
+    # do ``common`` inputs of the calibrations of two channels.
     nodes = family.wavenumbers
     middle = family.spectra[family.values.size // 2]
-    shared = changes_by_film(apparatus, film, nodes.k)
-    shared = {source: change for source, change in shared.items() if source in family.changes}
-    changes = apparatus_changes(apparatus, nodes.k, shared)
+    shared = shared_changes(apparatus, scans, nodes.k)
+    shared = {name: change for name, change in shared.items() if name in (*family.changes, "load")}
+    of_rod = input_changes(apparatus, [name for name in common if name not in shared], nodes.k)
+    changes = apparatus_changes(apparatus, nodes.k, [*shared, *of_rod])
+    shared |= {f"calibration_{name}": change for name, change in of_rod.items()}
     bessel = j1 if family.order else j0
     kernel = bessel(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
     largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
@@ -216,12 +230,12 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     slope = bessel.slopes(transfer * spectra)
     changed = [bessel.values(change * spectra) for change in sensor.changes.T]
     columns = {"apparatus": np.stack(changed, axis=-1)} if changed else {}
-    for source, change in members.changes.items():
-        both = transfer * change[:, load]
-        if source in sensor.by_film:
-            both = both + sensor.by_film[source] * spectra
-        columns[source] = bessel.values(both)[..., None]
-    columns["load"] = (points.load_share * by_load)[..., None]
+    of_contact = {**members.changes, "load": points.load_share * members.by_load}
+    for source in dict.fromkeys([*of_contact, *sensor.shared]):
+        change = sensor.shared.get(source, 0.0) * spectra
+        if source in of_contact:
+            change = change + transfer * of_contact[source][:, load]
+        columns[source] = bessel.values(change)[..., None]
     columns["position_scale"] = (points.position_share * points.radius * slope)[..., None]
     return Predicted(
         signal=bessel.values(transfer * spectra) + by_load * points.log_load,
@@ -289,12 +303,58 @@ class Standardised:
         )
 
 
+def stacked(
+    normal: tuple[LoadPoints, Predicted], shear: tuple[LoadPoints, Predicted]
+) -> tuple[LoadPoints, Predicted]:
+    """Return what two channels read of the same contacts as the readings of one load."""
+    # Common are the centre, the scatter of each contact's load and position, and all systematic
+    # sources but what is left of each sensor; noise, baseline and drift are each channel's own.
+    points, predicted = (normal[0], shear[0]), (normal[1], shear[1])
+    names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
+    both: dict[str, Any] = {
+        name: np.concatenate([getattr(side, name) for side in points]) for name in names
+    }
+    own = [np.eye(p.u.size) if p.correlation is None else p.correlation for p in points]
+    numbers: dict[tuple[float, int], int] = {}
+    which = [numbers.setdefault(key, len(numbers)) for side in points for key in _contacts(side)]
+    readings = replace(
+        points[0],
+        **both,
+        flat=block_diag(*(side.flat for side in points)),
+        correlation=block_diag(*own),
+        contacts=np.eye(len(numbers))[which],
+    )
+    columns = [dict(side.columns) for side in predicted]
+    if "apparatus" in columns[1]:
+        columns[1]["apparatus_shear"] = columns[1].pop("apparatus")
+    sources = {name: c.shape[-1] for side in columns for name, c in side.items()}
+
+    def padded(name: str) -> FloatArray:
+        empty = [np.zeros((*side.signal.shape, sources[name])) for side in predicted]
+        pairs = zip(columns, empty, strict=True)
+        return np.concatenate([side.get(name, nothing) for side, nothing in pairs], axis=1)
+
+    arrays = ("signal", "by_load", "by_coordinate", "slope")
+    return readings, Predicted(
+        **{name: np.concatenate([getattr(p, name) for p in predicted], axis=1) for name in arrays},
+        columns={name: padded(name) for name in sources},
+    )
+
+
+def _contacts(points: LoadPoints) -> Iterator[tuple[float, int]]:
+    """Name the contact of each reading: its place, and which of those there it is."""
+    count: Counter[float] = Counter()
+    for place in np.round(points.offset, 12).tolist():
+        yield place, count[place]
+        count[place] += 1
+
+
 def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     """Divide by the noise, and project out what is flat."""
     kinds = {
         "noise": np.broadcast_to(points.noise, predicted.signal.shape),
-        "load_scatter": np.abs(predicted.by_load) * points.load_errors,
-        "position": np.abs(predicted.slope) * points.x_errors,
+        "load_scatter": predicted.by_load * points.load_errors,
+        "position": predicted.slope * points.side * points.x_errors,
     }
     kinds = {name: kind for name, kind in kinds.items() if kind.any()}
     whitener = _whitener(points, kinds)
@@ -325,9 +385,10 @@ def _whitener(points: LoadPoints, kinds: Mapping[str, FloatArray]) -> FloatArray
     if points.correlation is None:
         return np.asarray(1 / np.sqrt(np.sum([kind**2 for kind in kinds.values()], axis=0)))
     covariance = np.outer(points.noise, points.noise) * points.correlation
-    extra = np.sum([kind**2 for name, kind in kinds.items() if name != "noise"], axis=0)
-    rows = np.broadcast_to(extra, kinds["noise"].shape)
-    return np.linalg.inv(np.linalg.cholesky(covariance + rows[..., None] * np.eye(rows.shape[-1])))
+    rows = np.stack([np.zeros_like(kinds["noise"]), *(kinds[k] for k in kinds if k != "noise")])
+    same = np.eye(points.u.size) if points.contacts is None else points.contacts @ points.contacts.T
+    extra = np.einsum("svn,svm->vnm", rows, rows) * same
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance + extra)))
 
 
 def _times(whitener: FloatArray, values: FloatArray) -> FloatArray:
@@ -339,7 +400,8 @@ def _scaled(whitener: FloatArray, points: LoadPoints, name: str, kind: FloatArra
     if whitener.ndim == 2:
         return whitener * kind
     if name != "noise" or points.correlation is None:
-        return whitener * kind[:, None, :]
+        root = whitener * kind[:, None, :]
+        return root if points.contacts is None else root @ points.contacts
     return whitener @ (points.noise[:, None] * np.linalg.cholesky(points.correlation))
 
 
@@ -451,12 +513,36 @@ def _tables(loads: Sequence[Standardised]) -> Tables:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """What one channel of a sensor reads of several loads."""
+
+    points: Sequence[LoadPoints]
+    sensor: Sensor
+    family: ProfileFamily
+
+    def only(self, chosen: Sequence[int]) -> Channel:
+        """Return some of the loads."""
+        return replace(self, points=[self.points[i] for i in chosen])
+
+
 def likelihood(
-    points: Sequence[LoadPoints], sensor: Sensor, members: ProfileFamily, loads: Sequence[int]
+    points: Sequence[LoadPoints],
+    sensor: Sensor,
+    members: ProfileFamily,
+    loads: Sequence[int],
+    shear: Channel | None = None,
 ) -> Likelihood:
     """Return the likelihood of loads, each with the index of its load in the family."""
-    standardised = tuple(
-        standardise(of_load, predict(of_load, sensor, members, load))
+    readings = [
+        (of_load, predict(of_load, sensor, members, load))
         for of_load, load in zip(points, loads, strict=True)
-    )
+    ]
+    if shear is not None:
+        sheared = shear.family.at(members.values)
+        readings = [
+            stacked(reading, (of_load, predict(of_load, shear.sensor, sheared, load)))
+            for reading, of_load, load in zip(readings, shear.points, loads, strict=True)
+        ]
+    standardised = tuple(standardise(*reading) for reading in readings)
     return Likelihood(members.values, members.coordinates, standardised, _tables(standardised))

@@ -229,8 +229,8 @@ def _measured(
         of_load = load_points(profile)
         # Loads count from that of the calculated contact.
         points.append(replace(of_load, log_load=of_load.log_load + math.log(profile.load / load)))
-    film = profiles[0].scan.film
-    return Measured(points, sensor_of(apparatus, family, reach, film), family)
+    scans = [profile.scan for profile in profiles]
+    return Measured(points, sensor_of(apparatus, family, reach, scans), family)
 
 
 def _messages(

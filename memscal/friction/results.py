@@ -207,6 +207,8 @@ def _joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
 class FrictionComparison(Result, Checked):
     """Measured stress against calculated contacts, with the friction that explains it.
 
+    ``joint``, of all loads together, is by normal stress and shear together where ``shear``, the
+    apparatus function of a tangential channel, was given; all else is by the normal stress.
     Printed, it is the tables of ``memscal compare``.
     """
 
@@ -219,6 +221,7 @@ class FrictionComparison(Result, Checked):
     macroscopic: tuple[float, float | None] | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = field(default=())
+    shear: ApparatusFunction | None = None
 
     _summary: ClassVar[str] = "comparison"
     _figure: ClassVar[str] = "friction.comparison_figure"

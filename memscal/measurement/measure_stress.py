@@ -29,7 +29,7 @@ from memscal.parallel import single_threaded
 from memscal.version import __version__
 
 #: Sources of a force's uncertainty that all profiles have in common.
-SHARED_SOURCES = ("apparatus", "film", "position_scale")
+SHARED_SOURCES = ("apparatus", "film", "position_scale", "load")
 
 #: What the shapes of pressure leave open of the mean force of several, whose shapes differ.
 _NEGLIGIBLE_MEAN = 0.005
@@ -70,15 +70,15 @@ def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
     weight = scan**-2 / np.sum(scan**-2)
     ratio = np.array([profile.force / profile.load for profile in profiles])
     variance = float(np.sum((weight * scan) ** 2))
-    for source in (*SHARED_SOURCES, "load"):
+    for source in SHARED_SOURCES:
         variance += float(weight @ [budget[source] for budget in budgets]) ** 2
     return float(weight @ ratio), math.sqrt(variance)
 
 
 def _relative(profile: MeasuredProfile) -> dict[str, float]:
     """Standard uncertainties of force over load, by source."""
-    budget = {source: u / profile.load for source, u in profile.force_budget.items()}
-    return {**budget, "load": (profile.load_uncertainty or 0.0) / profile.load}
+    budget = restore.force_less_load(profile.force_budget, profile.load_uncertainty)
+    return {source: u / profile.load for source, u in budget.items()}
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:

@@ -22,9 +22,9 @@ from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, mea
 from memscal.estimation.profile import NUMERICAL_FLOOR
 from memscal.measurement.posterior import (
     apparatus_changes,
-    changes_by_film,
     film_transfer,
     sensor_transfer,
+    shared_changes,
 )
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, plain_pressure
@@ -296,6 +296,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         film=scan.set_up.film,
         indenter=scan.set_up.indenter,
         sensor=scan.sensor,
+        load_cell=scan.load_cell,
         width=float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y))),
         lubrication=scan.lubrication,
         position_scale_uncertainty=scan.position_scale_uncertainty,
@@ -432,11 +433,12 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     row, state = on_axis * transfer, posterior.state[:nodes]
     maximum, a = float(row @ state), apparatus.conversion_constant
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
-    shared = changes_by_film(apparatus, restored.scan.film, np.append(k, 0.0))
+    shared = shared_changes(apparatus, [restored.scan], np.append(k, 0.0))
     of_film = [shared.get(name, np.zeros(k.size + 1)) for name in posterior.film_inputs]
     of_kernel = {
         "apparatus": apparatus_changes(apparatus, np.append(k, 0.0), shared),
         "film": np.reshape(of_film, (-1, k.size + 1)).T,
+        **({"load": shared["load"][:, None]} if "load" in shared else {}),
     }
     for source, change in of_kernel.items():
         # G = (A G)/A: its own change beside that of what was restored with it.

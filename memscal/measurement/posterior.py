@@ -51,6 +51,7 @@ from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
+from memscal.model.measured_stress import MeasuredScan
 from memscal.model.scan import Scan
 
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
@@ -352,8 +353,9 @@ def posterior_of(
     film = film_transfer(scan, model.reference.wavenumbers)
     scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
     by_film = _film_changes(scan, model.reference.wavenumbers)
-    shared = changes_by_film(apparatus, scan.film, model.k)
+    shared = shared_changes(apparatus, [scan], model.k)
     of_sensor = apparatus_changes(apparatus, model.k, shared)
+    of_load = shared.pop("load", None)
     names, nothing = tuple(dict.fromkeys([*by_film, *shared])), np.zeros(nodes)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
     of_film, of_kernel = (
@@ -367,6 +369,8 @@ def posterior_of(
         "film": _signals(estimate, mean, of_film * transfer[:, None] + of_kernel * film[:, None]),
         "position_scale": scaled[:, None],
     }
+    if of_load is not None:
+        shifts["load"] = _signals(estimate, mean, (of_load * film)[:, None])
     covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
     changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
     changes["film"][:nodes] += scan.stated_load * of_film * mean[:nodes, None]
@@ -402,7 +406,7 @@ def apparatus_changes(
 ) -> FloatArray:
     """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa.
 
-    Those ``without`` which they are asked for are left to :func:`changes_by_film`.
+    Those ``without`` which they are asked for are left to :func:`shared_changes`.
     """
     return _of_sensor(apparatus, k.tobytes(), tuple(without))[1]
 
@@ -411,18 +415,27 @@ def apparatus_changes(
 _OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
 
 
-def changes_by_film(
-    apparatus: ApparatusFunction, film: ElasticFilm | None, k: FloatArray
+def shared_changes(
+    apparatus: ApparatusFunction, scans: Sequence[Scan | MeasuredScan], k: FloatArray
 ) -> dict[str, FloatArray]:
-    """Return changes (n,) of the transform of A G, in V/Pa, by the film that a contact shares.
+    """Return changes (n,) of the transform of A G, in V/Pa, by what contacts share with the sensor.
 
-    By one standard uncertainty of each property; empty of another film than the sensor's.
+    By one standard uncertainty of each property of its film, and of the load on its load cell.
     """
-    known = apparatus.film
-    if film is None or known is None or not _alike(film, known):
-        return {}
-    names = [name for name in _OF_FILM if name in apparatus.kernel_changes]
-    return dict(zip(names, _kernel_changes(apparatus, k.tobytes(), tuple(names)), strict=True))
+    known, names = apparatus.film, list[str]()
+    if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
+        names += _OF_FILM
+    if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
+        names.append("load")
+    return input_changes(apparatus, names, k)
+
+
+def input_changes(
+    apparatus: ApparatusFunction, names: Iterable[str], k: FloatArray
+) -> dict[str, FloatArray]:
+    """Return changes (n,) of the transform of A G, in V/Pa, by inputs of the calibration."""
+    known = [name for name in names if name in apparatus.kernel_changes]
+    return dict(zip(known, _kernel_changes(apparatus, k.tobytes(), tuple(known)), strict=True))
 
 
 @lru_cache(maxsize=16)
@@ -435,6 +448,16 @@ def _kernel_changes(
     table = np.column_stack([apparatus.kernel_changes[name] for name in names])
     transforms = hankel_transform(apparatus.radial_profile.r, table, np.frombuffer(nodes))
     return apparatus.conversion_constant * transforms.T
+
+
+def common_inputs(apparatus: ApparatusFunction, other: ApparatusFunction) -> list[str]:
+    """Return the inputs that the calibrations of two channels by one rod scan have in common."""
+    scans = (
+        (one.film, one.indenter, one.load, one.load_cell, one.process.input_scan)
+        for one in (apparatus, other)
+    )
+    same = len(set(scans)) == 1
+    return [name for name in apparatus.kernel_changes if same and name in other.kernel_changes]
 
 
 def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:

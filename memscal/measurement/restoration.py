@@ -99,8 +99,9 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     # The film is not part of the direct way: the calculated stress is at its base already.
     added = np.hstack([posterior.shifts["apparatus"], posterior.shifts["position_scale"]])
-    if scan.load_uncertainty is not None:
-        added = np.column_stack([added, (scan.load_uncertainty / scan.stated_load) * signal])
+    # One load cell errs alike under the rod, which changes A, and under the contact.
+    of_load = (scan.load_uncertainty or 0.0) / scan.stated_load * signal[:, None]
+    added = np.hstack([added, of_load + posterior.shifts.get("load", 0.0)])
     # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
     ratio = 1 / estimate.noise_scale if stated else posterior.noise_ratio

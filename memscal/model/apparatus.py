@@ -16,7 +16,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process
-from memscal.model.scan import StressSensor
+from memscal.model.scan import LoadCell, StressSensor
 from memscal.model.stress import StressProfile
 
 
@@ -211,6 +211,7 @@ class ApparatusData(Checked):
     budget: Mapping[str, Mapping[str, float]]
     kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
     other: OtherEstimate | None = None
+    load_cell: LoadCell = dataclass_field(default_factory=LoadCell)
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

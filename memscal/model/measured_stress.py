@@ -32,7 +32,7 @@ from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
-from memscal.model.scan import StressSensor
+from memscal.model.scan import LoadCell, StressSensor
 
 #: Millimetres in a metre, millivolts in a volt.
 _FILE_SCALE = 1e3
@@ -53,6 +53,7 @@ class MeasuredScan:
     indenter: RoundIndenter
     sensor: StressSensor
     width: float
+    load_cell: LoadCell = field(default_factory=LoadCell)
     lubrication: str = ""
     position_scale_uncertainty: float | None = None
     synthetic: bool = False

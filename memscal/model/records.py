@@ -49,6 +49,12 @@ SENSOR = record(
     Quantity("serial_number", "text", "serial number of the sensor"),
     Quantity("channel", "text", "channel of the sensor", origin="channel"),
 )
+LOAD_CELL = record(
+    "NXsensor",
+    Quantity("name", "text", "name of the load cell", origin="load_cell"),
+    Quantity("serial_number", "text", "serial number of the load cell"),
+    Quantity("certificate", "text", "certificate of the load cell"),
+)
 _CONSTANT = Quantity("conversion_constant", _A, "conversion constant", "A", required=True)
 CONVERSION = record("NXcollection", *measured(_CONSTANT, required=True))
 

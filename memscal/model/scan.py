@@ -263,6 +263,25 @@ class StressSensor:
     serial_number: str = ""
 
 
+@dataclass(frozen=True, kw_only=True)
+class LoadCell:
+    """The load cell or balance by which loads were set or read; empty where it is not stated.
+
+    >>> LoadCell(name="balance", serial_number="7").same_as(LoadCell(serial_number="7"))
+    True
+    """
+
+    name: str = ""
+    serial_number: str = ""
+    certificate: str = ""
+
+    def same_as(self, other: LoadCell) -> bool:
+        """Whether both name one load cell: by its serial number, or by name if neither has one."""
+        if self.serial_number or other.serial_number:
+            return self.serial_number == other.serial_number
+        return self.name == other.name != ""
+
+
 class SetUp(NamedTuple):
     """What a scan was made with, all of it stated; the load in N."""
 
@@ -297,9 +316,9 @@ class Scan:
         SI unit of the readings: ``"V"``, ``"A"``, ``"T"``, ``"Pa"`` ..., ``"1"`` of counts.
     load, load_uncertainty : float, optional
         Nominal load of the indenter and its standard uncertainty, common to all points, in N.
-    indenter, film, sensor
-        What was pressed, on what, measured by what.  A calibration with a reference of its own
-        needs no load, indenter or film; all else does.
+    indenter, film, sensor, load_cell
+        What was pressed, on what, measured by what, and what gave the load.  A calibration with a
+        reference of its own needs no load, indenter or film; all else does.
     rod_friction : float, optional
         0 where a rod slides freely under the film, ``inf`` where it sticks.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
@@ -358,6 +377,7 @@ class Scan:
     film: ElasticFilm | None = None
     unit: str = "V"
     sensor: StressSensor = field(default_factory=StressSensor)
+    load_cell: LoadCell = field(default_factory=LoadCell)
     y: FloatArray | None = None
     repeat: NDArray[np.int64] | None = None
     branch: NDArray[np.int64] | None = None

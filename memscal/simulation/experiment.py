@@ -14,7 +14,7 @@ from memscal.mechanics.interface import Interface
 from memscal.model.arrays import FloatArray, require_non_negative, require_positive, require_range
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
-from memscal.model.scan import Scan, StressSensor
+from memscal.model.scan import LoadCell, Scan, StressSensor
 from memscal.parallel import single_threaded
 from memscal.simulation import rod_scan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, simulate, without_law
@@ -86,6 +86,7 @@ def simulate_contacts(
 ) -> Scan:
     """Simulate a line scan of contacts of a sphere, each pressed anew with a load of its own."""
     # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
+    # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
     loads = checked_loads(load)
     if np.unique(loads).size != loads.size:
         problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
@@ -112,7 +113,7 @@ def simulate_contacts(
     shear = rod_scan.shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     states, spread = _pressed(
-        lambda at: indent(film, sphere, load=at, strain="linear", **law),
+        lambda at: indent(film.expected, sphere, load=at, strain="linear", **law),
         load_scale * loads,
         load_scatter,
     )
@@ -186,9 +187,9 @@ def simulate_contacts(
 
 
 def _described_film(film: ElasticFilm) -> dict[str, float]:
-    """Return what of a film decides over its base stress, by the names of a truth."""
+    """Return what of a true film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
-    return {name: float(getattr(film, name)) for name in names}
+    return {name: float(getattr(film.expected, name)) for name in names}
 
 
 def _described(interface: Interface) -> dict[str, float | str]:
@@ -212,7 +213,9 @@ class Reality:
     load_scale: float = 1.0
 
 
-def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
+def drawn(
+    stated: Reality, load_uncertainty: float, seed: int, *, one_load_cell: bool = False
+) -> Reality:
     """Draw the true values from the stated ones, normal and independent, by their uncertainties."""
     rng = np.random.default_rng(seed)
 
@@ -235,8 +238,8 @@ def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
         ),
         rod=replace(rod, radius=around(rod.radius, rod.radius_uncertainty)),
         sphere=replace(sphere, radius=around(sphere.radius, sphere.radius_uncertainty)),
-        rod_load_scale=around(1.0, load_uncertainty),
-        load_scale=around(1.0, load_uncertainty),
+        rod_load_scale=(of_rod := around(1.0, load_uncertainty)),
+        load_scale=of_rod if one_load_cell else around(1.0, load_uncertainty),
     )
 
 
@@ -295,6 +298,7 @@ def simulate_experiment(
     state_noise: bool = True,
     state_law: bool = True,
     draw_inputs: bool = False,
+    one_load_cell: bool = False,
     gain: float = 1.0,
     thickness_factor: float = 1.0,
     seed: int = 0,
@@ -344,8 +348,11 @@ def simulate_experiment(
     draw_inputs : bool
         Draw the true values from the stated uncertainties: modulus, Poisson's ratio
         (reflected at 0.5) and thickness of the film, the radii, and the common errors of the
-        rod's and of the sphere's loads, which are independent.  The files state the nominal
-        values.  Without it, the true values are those, and the mean of a Poisson's ratio.
+        rod's and of the sphere's loads.  The files state the nominal values.  Without it, the true
+        values are those, and the mean of a Poisson's ratio.
+    one_load_cell : bool
+        Whether the loads of rod and sphere have one common error, and all scans name its load
+        cell; else the two errors are independent.
     gain, thickness_factor : float
         Mistakes: factor on the voltages of the sphere's scans only, and the film's true thickness
         relative to the stated one.
@@ -378,10 +385,9 @@ def simulate_experiment(
     inputs_seed, rod_seed, dry_seed, lubricated_seed = (
         int(stream.generate_state(1)[0]) for stream in np.random.SeedSequence(seed).spawn(4)
     )
-    expected = replace(film.expected, poisson_ratio_uncertainty=None)
-    reality = Reality(film=film if draw_inputs else expected, rod=rod, sphere=sphere)
+    reality = Reality(film=film, rod=rod, sphere=sphere)
     if draw_inputs:
-        reality = drawn(reality, load_uncertainty or 0.0, inputs_seed)
+        reality = drawn(reality, load_uncertainty or 0.0, inputs_seed, one_load_cell=one_load_cell)
     thickness = thickness_factor * reality.film.thickness
     reality = replace(reality, film=replace(reality.film, thickness=thickness))
     shared: dict[str, Any] = {
@@ -449,10 +455,11 @@ def simulate_experiment(
     if (spread := calibration.load_uncertainty) is not None:
         spread *= rod_load / calibration.stated_load
     nominal = replace(calibration, load=rod_load, load_uncertainty=spread)
+    stated = {"film": film, "load_cell": LoadCell(name="a simulated load cell" * one_load_cell)}
     return Experiment(
-        rod=_as_stated(nominal, of_rod, film=film, indenter=rod),
-        dry=_as_stated(dry, common, film=film, indenter=sphere),
-        lubricated=_as_stated(lubricated, common, film=film, indenter=sphere),
+        rod=_as_stated(nominal, of_rod, indenter=rod, **stated),
+        dry=_as_stated(dry, common, indenter=sphere, **stated),
+        lubricated=_as_stated(lubricated, common, indenter=sphere, **stated),
     )
 
 

@@ -60,6 +60,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         **head,
         "loads": [_load(i, comparison, load) for i, load in enumerate(first)],
         "joint": joint,
+        **({"shear": file_json(comparison.shear.source)} if comparison.shear else {}),
         "dry_against_lubricated": [
             members(records.DRY_AGAINST_LUBRICATED, pair)
             for pair in comparison.dry_against_lubricated
@@ -340,9 +341,11 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
             else:
                 cells = [str(load.by_maximum), str(load.by_profile), *fit(load.by_profile)]
                 rows.append([*labels, *cells, f"{100 * load.bracketed:.0f} %"])
-        if count > 1:
+        sheared = isinstance(comparison, FrictionComparison) and comparison.shear is not None
+        if count > 1 or sheared:
             joint, name = by_loading[loading], lubrication or "not stated"
             name += " + lubricated" if joint.beside else ""
+            name += ", with shear" if sheared else ""
             cells = [str(joint), *fit(joint)]
             rows.append(["", name, "all", *(cells if shear else ["", *cells, ""])])
     return Table(f"Effective friction coefficient, {way} [{level} interval]", head, rows)

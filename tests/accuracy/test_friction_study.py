@@ -19,7 +19,7 @@ from scipy.stats import binom, kstest, norm
 
 import memscal
 from memscal.friction.calculated import amontons_family
-from memscal.friction.compare import _confronted, _joint, compare_measured
+from memscal.friction.compare import _channels, _confronted, _joint, compare_measured
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import FrictionComparison, Interval
 from memscal.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
@@ -48,8 +48,9 @@ class Outcome:
     @cached_property
     def apart(self) -> Any:
         """The same with the lubricated loads by themselves."""
-        confronted = _confronted(self.comparison.measured, self.apparatus, families())
-        return _joint(self.comparison.measured, confronted)["dry"]["incremental"]
+        measured = self.comparison.measured
+        confronted = _confronted(measured, _channels(measured, self.apparatus, families()))
+        return _joint(measured, confronted)["dry"]["incremental"]
 
     @property
     def readings(self) -> list[Any]:

@@ -63,6 +63,9 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
     run("compare", folder / "zz.apparatus.h5", folder / "dry.stress.h5", *options).exits(
         3, "of channel zz"
     )
+    both = run("compare", folder / "zz.apparatus.h5", folder / "dry.stress.h5", *options[2:],
+               "--shear", folder / "xz.apparatus.h5")  # fmt: skip
+    assert "dry, with shear" in both.exits(0).out
     figure = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options,
                  "--figure", "f.png")  # fmt: skip
     figure.exits(2, "no effect")

@@ -21,7 +21,7 @@ from memscal.formats.stress import read_stress, write_stress
 from memscal.model.checks import QualityCheck
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.scan import StressSensor
+from memscal.model.scan import LoadCell, StressSensor
 
 DATA = Path(__file__).parent / "data"
 
@@ -30,6 +30,7 @@ SCANS = tuple(
         film=make_film(),
         indenter=Sphere(radius=0.1288, radius_uncertainty=0.5e-3),
         sensor=StressSensor(name="S1", model="MEMS", channel="zz"),
+        load_cell=LoadCell(name="balance", serial_number="7"),
         width=3e-3,
         lubrication=lubrication,
         position_scale_uncertainty=scale,

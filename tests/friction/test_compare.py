@@ -217,16 +217,17 @@ def test_an_error_of_the_film_that_sensor_and_contact_share_counts_once(
 ) -> None:
     # A film that is thicker than stated: the calibration's A G and the contacts err together.
     family, film = families["incremental"], made.dry.film
-    sensor = sensor_of(apparatus, family, 8e-3, film)
-    assert set(sensor.by_film) == {"young_modulus", "thickness", "poisson_ratio"}
+    sensor = sensor_of(apparatus, family, 8e-3, [made.dry])
+    assert set(sensor.shared) == {"young_modulus", "thickness", "poisson_ratio"}
     points = load_points(memscal.measure_stress(made.dry, apparatus).profiles[0])
     found = predict(points, sensor, family.at(0.2), 0)
     u = film.thickness_uncertainty or 0.0
     thick = replace(film, thickness=film.thickness + u)
     other = memscal.calibrate(replace(made.rod, film=thick), method="evidence").apparatus
     thicker = amontons_family(thick, made.dry.indenter, [0.69], friction=[0.2], reach=24e-3)
-    truth = predict(points, sensor_of(other, thicker, 8e-3), thicker, 0).signal - found.signal
+    theirs = sensor_of(other, thicker, 8e-3, [made.dry])
+    truth = predict(points, theirs, thicker, 0).signal - found.signal
     change = found.columns["thickness"][0, :, 0]
     assert np.abs(change - truth[0]).max() < 0.1 * np.abs(truth).max()
     # Of another film, each has its own.
-    assert not sensor_of(apparatus, family, 8e-3, thick).by_film
+    assert not sensor_of(apparatus, family, 8e-3, [replace(made.dry, film=thick)]).shared

@@ -25,7 +25,7 @@ _UNITS = {
 _CLASSES = {"instrument": "NXinstrument", "process": "NXprocess", "numerics": "NXparameters"}
 _MEASURED_ON = {
     "indenter": records.INDENTER, "sample": records.SAMPLE, "sample/film": records.FILM,
-    "instrument/stress_sensor": records.SENSOR,
+    "instrument/stress_sensor": records.SENSOR, "instrument/load_cell": records.LOAD_CELL,
 }  # fmt: skip
 _ANYTHING = record("NXcollection")
 _NOTE = record("NXnote")

@@ -18,6 +18,7 @@ BARE: dict[str, Any] = {
     **dict.fromkeys(("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")),
     **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
     "channels": {},
+    "load_cell": memscal.LoadCell(),
 }
 """Changes that leave a scan without all that is optional."""
 
@@ -68,6 +69,7 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
         indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), rod_friction=np.inf,
         film=make_film(),
         sensor=StressSensor(name="S1", model="MEMS", channel="zz"), title="A scan",
+        load_cell=memscal.LoadCell(name="balance", serial_number="7", certificate="2024-11"),
         start_time="2024-01-02T03:04:05+00:00", end_time="2024-01-02T04:04:05+00:00",
         notes="Two lines\nof notes, with an é.", reference=make_profile(),
         synthetic={"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "shape": "gaussian"},
@@ -113,6 +115,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
         film=make_film(),
         indenter=Rod(radius=0.25e-3),
         sensor=StressSensor(name="S1", model="MEMS"),
+        load_cell=memscal.LoadCell(serial_number="7"),
         load=1.0,
         reference=make_profile(),
         process=Process(

@@ -1,0 +1,163 @@
+"""One load cell for calibration and contacts: its common error counts once, and partly cancels."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+
+import memscal
+from memscal import ApparatusFunction, Experiment, LoadCell, MeasuredStress
+from memscal.friction.calculated import amontons_family
+from memscal.friction.compare import compare_measured
+from memscal.friction.family import ProfileFamily
+from memscal.friction.likelihood import Predicted, load_points, points_at, predict, sensor_of
+from memscal.measurement.measure_stress import pooled_force
+from memscal.model.arrays import FloatArray
+from memscal.simulation.experiment import PAPER_SPHERE, simulate_contacts
+from memscal.simulation.rod_scan import PAPER_FILM
+
+SEEDS = range(8)
+CHANCE = 1e-3
+SHARE = 0.05  # standard uncertainty of the load cell's scale
+LOADS = (0.69, 2.75)
+FRICTION = 0.1
+FILM = replace(PAPER_FILM, law="linear")
+OTHER = LoadCell(name="another")
+OFFSETS = np.linspace(-6e-3, 6e-3, 25)
+
+
+@lru_cache
+def experiment(seed: int) -> Experiment:
+    """Scans of one load cell, whose error is drawn with everything else."""
+    return memscal.simulate_experiment(
+        film=FILM, loads=LOADS, lubricated_loads=LOADS[:1], friction=FRICTION, seed=seed,
+        load_uncertainty=SHARE, draw_inputs=True, one_load_cell=True,
+    )  # fmt: skip
+
+
+@lru_cache
+def measured(seed: int, other: LoadCell | None = None) -> tuple[MeasuredStress, ApparatusFunction]:
+    """Dry contacts and their sensor, which may name another load cell."""
+    made = experiment(seed)
+    sensor = memscal.calibrate(made.rod, method="evidence").apparatus
+    sensor = sensor if other is None else replace(sensor, load_cell=other)
+    return memscal.measure_stress(made.dry, sensor), sensor
+
+
+@lru_cache
+def family() -> ProfileFamily:
+    return amontons_family(FILM, PAPER_SPHERE, LOADS, reach=24e-3)
+
+
+@pytest.mark.parametrize(
+    ("mine", "theirs", "same"),
+    [
+        (LoadCell(name="K", serial_number="7"), LoadCell(name="L", serial_number="7"), True),
+        (LoadCell(name="K"), LoadCell(name="K", certificate="2024"), True),
+        (LoadCell(name="K", serial_number="7"), LoadCell(name="K"), False),
+        (LoadCell(name="K", serial_number="7"), LoadCell(name="K", serial_number="8"), False),
+        (LoadCell(), LoadCell(), False),
+    ],
+)
+def test_load_cells_are_told_apart_by_serial_number_then_by_name(mine, theirs, same) -> None:
+    assert mine.same_as(theirs) == theirs.same_as(mine) == same
+
+
+def test_scans_of_two_load_cells_calibrate_a_sensor_of_none() -> None:
+    for cells, named in (("KK", "K"), ("KL", "")):
+        scans = [
+            replace(memscal.simulate(film=FILM, seed=seed), load_cell=LoadCell(name=name))
+            for seed, name in enumerate(cells)
+        ]
+        assert memscal.calibrate(scans, method="evidence").apparatus.load_cell.name == named
+
+
+def force_of(rod_scale: float, sphere_scale: float, seed: int) -> tuple[float, float]:
+    """Force less load, and what the check allows, by true loads over the stated; in N."""
+    cell = {"load_cell": LoadCell(name="K")}
+    rod = memscal.simulate(film=FILM, load=rod_scale, load_uncertainty=SHARE, seed=seed)
+    sensor = memscal.calibrate(replace(rod, load=1.0, **cell), method="evidence").apparatus
+    contact = simulate_contacts(
+        film=FILM, load=LOADS[1], load_scale=sphere_scale, load_uncertainty=SHARE,
+        seed=seed,
+    )  # fmt: skip
+    measured = memscal.measure_stress(replace(contact, **cell), sensor)
+    off = measured.profiles[0].force - LOADS[1]
+    return off, abs(off) / measured.checks[0].value
+
+
+@pytest.mark.parametrize("seed", SEEDS[:3])
+def test_a_load_cell_that_is_wrong_for_both_leaves_the_check_where_it_is(seed: int) -> None:
+    (right, u), (both, _), (one, _) = (
+        force_of(*scales, seed) for scales in ((1, 1), (1.05, 1.05), (1, 1.05))
+    )
+    assert both == pytest.approx(right, abs=0.3 * u)
+    assert one == pytest.approx(right + 0.05 * LOADS[1], rel=0.15)
+    assert u < 0.03 * LOADS[1]
+
+
+@pytest.mark.parametrize("seed", SEEDS[:2])
+def test_the_checks_do_not_allow_for_what_cancels(seed: int) -> None:
+    squares = []
+    for stress, sensor in (measured(seed), measured(seed, OTHER)):
+        values = {check.name: check.value for check in stress.checks}
+        off = [profile.force / profile.load - 1 for profile in stress.profiles]
+        allowed = [abs(d) / values[f"applied_force_{i}"] for i, d in enumerate(off, 1)]
+        rod = memscal.restore(experiment(seed).rod, sensor)
+        of_rod = next(check.value for check in rod.checks if check.name == "restored_force")
+        allowed += [pooled_force(stress.profiles)[1], abs(rod.force - 1) / of_rod]
+        squares.append(np.square(allowed))
+    # Force over load: u_A^2 + u_P^2 of two load cells, (u_A - u_P)^2 of one.
+    np.testing.assert_allclose(squares[1] - squares[0], 2 * SHARE**2, rtol=0.05)
+    same, apart = measured(seed)[0].profiles, measured(seed, OTHER)[0].profiles
+    for mine, theirs in zip(same, apart, strict=True):
+        assert mine.force_uncertainty == pytest.approx(theirs.force_uncertainty, rel=1e-3)
+        assert mine.maximum_uncertainty == pytest.approx(theirs.maximum_uncertainty, rel=1e-3)
+
+
+def test_the_force_over_load_has_the_error_that_it_states() -> None:
+    z = []
+    for seed in SEEDS:
+        ratio, spread = pooled_force(measured(seed)[0].profiles)
+        z.append((ratio - 1) / np.hypot(spread, 0.005))
+    low, high = chi2.ppf([CHANCE, 1 - CHANCE], len(z)) / len(z)
+    assert 0.3 * low < np.mean(np.square(z)) < high
+    apart = [pooled_force(measured(seed, OTHER)[0].profiles)[1] for seed in SEEDS[:2]]
+    assert min(apart) > 3 * pooled_force(measured(0)[0].profiles)[1]
+
+
+def predicted(other: LoadCell | None = None) -> Predicted:
+    stress, sensor = measured(0, other)
+    sensed = sensor_of(sensor, family(), 8e-3, stress.scans)
+    return predict(
+        points_at(OFFSETS, load_points(stress.profiles[1])), sensed, family().at(FRICTION), 1
+    )
+
+
+def test_its_error_changes_a_and_the_contact_as_one() -> None:
+    one, two = predicted(), predicted(OTHER)
+    assert set(one.columns) == set(two.columns)
+    # A ~ 1/P of the rod: the column of both is u (dU/d ln P - U), which is that of a softer film.
+    signal, by_load = one.signal[0], one.by_load[0]
+    np.testing.assert_allclose(
+        one.columns["load"][0, :, 0], SHARE * (by_load - signal), atol=1e-3 * signal.max() * SHARE
+    )
+    softer = -one.columns["young_modulus"] * FILM.young_modulus / FILM.young_modulus_uncertainty
+    np.testing.assert_allclose(
+        one.columns["load"], SHARE * softer, atol=1e-2 * signal.max() * SHARE
+    )
+
+    def variance(found: Predicted) -> FloatArray:
+        return sum(np.sum(column[0] ** 2, axis=1) for column in found.columns.values())
+
+    crossed = -2 * SHARE**2 * by_load * signal
+    difference = variance(one) - variance(two)
+    np.testing.assert_allclose(difference, crossed, atol=1e-2 * np.abs(crossed).max())
+
+
+def test_the_interval_of_friction_holds() -> None:
+    comparisons = (compare_measured(*measured(seed), {"incremental": family()}) for seed in SEEDS)
+    held = [c.joint["dry"]["incremental"].interval.holds(FRICTION) for c in comparisons]
+    assert sum(held) >= binom.ppf(CHANCE, len(held), 0.93)
