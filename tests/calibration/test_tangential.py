@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 from helpers.bounds import root_mean_square_limit
 from helpers.machine import assert_same_to_rounding
-from helpers.scans import CENTRE, EXACT_FILM, SHEAR_CONVERSION, SHEAR_SIGMA, plane_error, shear_scan
+from helpers.scans import (
+    CENTRE,
+    EXACT_FILM,
+    EXACT_ROD,
+    SHEAR_CONVERSION,
+    SHEAR_SIGMA,
+    plane_error,
+    shear_scan,
+)
 from scipy.stats import binom, norm
 
 import memscal
@@ -22,6 +30,10 @@ from memscal.errors import InputError
 SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
 CHANCE = 1e-4
 RING = GaussianMixture((1.5, -0.5), (500e-6, 300e-6))
+OTHERS = {
+    "disc": memscal.SmoothedDisc(radius=0.6e-3, sigma=0.1e-3),
+    "tail": GaussianMixture((0.75, 0.25), (450e-6, 900e-6)), "ring": RING,
+}  # fmt: skip
 
 
 def calibrated(scan: Scan, channel: str = "xz") -> Calibration:
@@ -32,20 +44,18 @@ def checks_of(scan: Scan) -> dict[str, QualityCheck]:
     return {check.name: check for check in calibrated(scan).apparatus.checks}
 
 
+EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
+
+
 @lru_cache
 def study(noise: float) -> dict[str, np.ndarray]:
     """Errors in standard uncertainties; the film and the rod are exact, and so is the load."""
-    exact = {
-        "film": EXACT_FILM,
-        "rod": replace(memscal.simulate().indenter, radius_uncertainty=None),
-        "load_uncertainty": None,
-    }
     truth = {
         "conversion_constant": SHEAR_CONVERSION, "conversion_constant_gaussian": SHEAR_CONVERSION,
         "gaussian_sigma": SHEAR_SIGMA, "centre": CENTRE,
     }  # fmt: skip
     found = [
-        calibrated(shear_scan(seed=seed, noise=noise, **exact)).apparatus.parameters
+        calibrated(shear_scan(seed=seed, noise=noise, **EXACT)).apparatus.parameters
         for seed in range(SEEDS)
     ]
     return {
@@ -87,6 +97,22 @@ def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
     # What the prior admits beyond a Gaussian makes u(A) ten times as large as its errors.
     least, most = (root_mean_square_limit(1.0, 12, p) for p in (1 - CHANCE, CHANCE))
     assert 0.1 * least < np.sqrt(np.mean(np.square(a))) < most
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name: str) -> None:
+    r, kernel, count = np.linspace(0.0, 3e-3, 31), OTHERS[name], SEEDS // 3
+    within, z = [], []
+    for seed in range(count):
+        found = calibrated(shear_scan(seed=seed, kernel=kernel, **EXACT)).apparatus
+        error, p = found.radial(r) - kernel.radial(r), found.parameters
+        within.append(np.mean(np.abs(error) <= 1.96 * found.radial_uncertainty(r)))
+        z.append(
+            (p["conversion_constant"] - SHEAR_CONVERSION) / p.uncertainty("conversion_constant")
+        )
+    # Radii of one scan err together: the scan is the unit.
+    assert np.mean(within) > 0.95 - norm.isf(CHANCE) * np.std(within) / np.sqrt(count)
+    assert np.sum(np.abs(z) < 1.96) >= binom.ppf(CHANCE, count, 0.95)
 
 
 def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
