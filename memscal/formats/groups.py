@@ -341,11 +341,10 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(sensor: StressSensor, load_cell: LoadCell) -> Group:
     """Return the NXinstrument that holds the sensor, and the load cell where it is stated."""
-    group = write_record(records.SENSOR, sensor)
-    group = replace(group, children={**group.children, **_NOWHERE})
-    children: dict[str, Node] = {"stress_sensor": group}
+    sensors = {"stress_sensor": write_record(records.SENSOR, sensor)}
     if load_cell != LoadCell():
-        children["load_cell"] = write_record(records.LOAD_CELL, load_cell)
+        sensors["load_cell"] = write_record(records.LOAD_CELL, load_cell)
+    children = {n: replace(g, children={**g.children, **_NOWHERE}) for n, g in sensors.items()}
     return Group("NXinstrument", children)
 
 
