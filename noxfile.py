@@ -91,6 +91,14 @@ def accuracy(session: nox.Session) -> None:
 
 
 @nox.session(default=False)
+def robustness(session: nox.Session) -> None:
+    """Run the whole campaign of damaged inputs, kills and flipped bits; print its table."""
+    with outside_the_checkout(session, requirements=group("test")):
+        session.env["MEMSCAL_ROBUSTNESS"] = os.environ.get("MEMSCAL_ROBUSTNESS", "1")
+        run_pytest(session, "tests/robustness", *session.posargs)
+
+
+@nox.session(default=False)
 def notebooks(session: nox.Session) -> None:
     """Execute the notebooks against the built wheel."""
     with outside_the_checkout(session, requirements=group("test")):

@@ -186,12 +186,16 @@ def test_checks_of_friction_pass_where_nothing_is_wrong() -> None:
 
 
 @pytest.mark.full_study
-def test_a_mistaken_gain_raises_friction_and_a_thicker_film_lowers_it() -> None:
+def test_a_mistake_that_sensor_and_film_share_cancels_beside_lubricated_loads() -> None:
     seeds = range(min(SEEDS, 16))
 
-    def values(**mistakes: float) -> list[float]:
-        return [outcome(0.1, seed, **mistakes).joint.best for seed in seeds]
+    def shifts(**mistakes: float) -> tuple[float, float]:
+        """Median change of the coefficient, dry loads apart, and beside the lubricated ones."""
+        pairs = [(outcome(0.1, seed, **mistakes), outcome(0.1, seed)) for seed in seeds]
+        apart = np.median([wrong.apart.best - clean.apart.best for wrong, clean in pairs])
+        return float(apart), float(np.median([w.joint.best - c.joint.best for w, c in pairs]))
 
-    clean = np.array(values())
-    assert np.median(values(gain=1.05) - clean) > 0.01
-    assert np.median(values(thickness=1.05) - clean) < -0.01
+    for mistakes, sign in (({"gain": 1.05}, 1), ({"thickness": 1.05}, -1)):
+        apart, beside = shifts(**mistakes)
+        assert sign * apart > 0.008
+        assert abs(beside) < abs(apart) / 3

@@ -1,17 +1,15 @@
 """Damaged inputs, drawn by hypothesis: each is read or refused, in little time and memory.
 
-The whole campaign (``nox --session robustness``) draws a hundred times as many.
+The whole campaign, of 100,000 inputs, is ``nox --session robustness``.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import os
 import resource
 import time
 import warnings
-from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from helpers.builders import make_artifact, make_profile, make_scan
 from helpers.console import names
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from robustness.campaign import count, number
 from robustness.damage import (
     BYTES,
     EDITS,
@@ -35,18 +34,15 @@ from memscal.formats.artifact import write_artifact
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
 
-#: How many times as many inputs as in reduced form; ``nox --session robustness`` draws the whole.
-FACTOR = int(os.environ.get("MEMSCAL_ROBUSTNESS") or 1)
 #: Documented exit codes: done, a check failed, usage, input refused, output not written.
 CODES = {0, 1, 2, 3, 4}
 SECONDS, GIBIBYTE = 20.0, 2**30
-COUNTS: Counter[str] = Counter()
 
 
-def drawn(reduced: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Settings of a test that draws so many inputs in reduced form."""
+def drawn(reduced: int, whole: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Settings of a test that draws so many inputs."""
     return settings(
-        max_examples=FACTOR * reduced,
+        max_examples=number(reduced, whole),
         deadline=None,
         database=None,
         phases=(Phase.explicit, Phase.generate),  # to shrink a failure takes longer than to read it
@@ -114,7 +110,7 @@ def survives(folder: Path, data: bytes, *commands: tuple[str, ...], name: str = 
             with contextlib.redirect_stderr(said), contextlib.redirect_stdout(shown):
                 code = main([*command])
         words = said.getvalue() + shown.getvalue()
-        COUNTS[f"{command[0]}: exit {code}"] += 1
+        count(f"inputs of `{command[0]}`", f"exit {code}")
         assert code in CODES, f"{command}: exit {code}\n{words[-3000:]}"
         assert "Traceback" not in words, words[-3000:]
         assert "\x1b" not in words, words[-1000:]
@@ -144,22 +140,32 @@ USED: dict[str, tuple[tuple[str, ...], ...]] = {
 }
 
 
-@drawn(40)
+@drawn(40, 30_000)
 @given(kind=st.sampled_from(sorted(USED)), changes=BYTES)
 def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
     survives(folder, change_bytes(good[kind], changes), *LOOKED_AT, *USED[kind])
 
 
-@drawn(100)
+@drawn(80, 50_000)
 @given(kind=st.sampled_from(sorted(USED)), edits=EDITS, digest=st.booleans())
 def test_edited_values_are_read_or_refused(good, folder, kind, edits, digest) -> None:
     data = edit_hdf5(good[kind], edits, digest=digest)
     survives(folder, data, *LOOKED_AT, *USED[kind])
 
 
-@drawn(60)
+@drawn(60, 19_000)
 @given(changes=st.one_of(TABLE, BYTES))
 def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
     change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
     run = ("import", "in.csv", "-o", "out.h5", "--x", "x", "--u", "u_zz", "--load", "1")
     survives(folder, change(good["table"], changes), run, name="in.csv")
+
+
+@drawn(6, 1000)
+@given(changes=st.one_of(BYTES, TABLE))
+def test_damaged_meshes_are_read_or_refused(good, folder, changes) -> None:
+    # Each is read by a process of its own.
+    change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
+    run = ("import", "in.vtu", "-o", "out.h5", "--format", "reference", "--r-unit", "mm",
+           "--sigma", "S", "--sigma-unit", "MPa", "--load", "1")  # fmt: skip
+    survives(folder, change(good["mesh"], changes), run, name="in.vtu")

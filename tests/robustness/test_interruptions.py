@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 from helpers.builders import make_artifact, make_scan
 from helpers.console import names, run_program
+from robustness.campaign import count, number
 
 import memscal
 from memscal.errors import MemscalError
@@ -25,7 +26,6 @@ from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.scan import write_scan
 
-FACTOR = int(os.environ.get("MEMSCAL_ROBUSTNESS") or 1)
 COMMAND = ("calibrate", "scan.h5", "-o", "out.h5", "--figure", "out.png", "--report", "out.html")
 OUTPUTS = {"out.h5", "out.png", "out.html"}
 #: What the shell says of a process that a signal has ended, and what the program says.
@@ -71,9 +71,10 @@ def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
     folder: Path, seed: int
 ) -> None:
     draw, whole = random.Random(seed), timed(folder)
-    for _ in range(6 * FACTOR):
+    for _ in range(number(5, 250)):
         code, _ = interrupted(folder, signal.SIGKILL, draw.uniform(0, 1.1 * whole))
         assert code in (0, 1, -signal.SIGKILL)
+        count("runs that were killed", "done before" if code >= 0 else "killed")
         for name in OUTPUTS & {*names(folder)}:
             path = folder / name
             assert path.stat().st_size > 1000
@@ -88,11 +89,12 @@ def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
 
 def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder: Path, seed: int) -> None:
     draw, whole = random.Random(seed), timed(folder)
-    for _ in range(2 * FACTOR):
-        for number, expected in CODES.items():
-            code, said = interrupted(folder, number, draw.uniform(0, whole))
+    for _ in range(number(1, 84)):
+        for sent, expected in CODES.items():
+            code, said = interrupted(folder, sent, draw.uniform(0, whole))
+            count(f"runs that {sent.name} ended", f"exit {code}")
             # Before its first line of Python runs, the system ends it.
-            assert code in (0, 1, expected, -number), said
+            assert code in (0, 1, expected, -sent), said
             assert "Traceback" not in said
             left = {*names(folder)} - {"scan.h5"}
             assert left == (OUTPUTS if code in (0, 1) else set())
@@ -136,11 +138,13 @@ def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path: Path, seed: int) -> N
     for name in ("artifact.h5", "scan.h5"):
         path = tmp_path / name
         good, known = path.read_bytes(), described(path)
-        for _ in range(40 * FACTOR):
+        for _ in range(number(40, 500)):
             damaged, at = bytearray(good), draw.randrange(len(good))
             damaged[at] ^= 1 << draw.randrange(8)
             path.write_bytes(damaged)
-            if all(finding.passed for finding in check(path)):
+            passed = all(finding.passed for finding in check(path))
+            count(f"bits flipped of {name}", "harmless" if passed else "refused")
+            if passed:
                 assert described(path) == known, f"the bit flipped in byte {at} of {name}"
         path.write_bytes(good)
 
