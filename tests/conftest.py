@@ -4,12 +4,17 @@ import gc
 import logging
 import os
 import secrets
+import signal
 import sys
 from collections.abc import Iterator
 
 # Before numpy loads: threads on matrices as small as ours cost ten times the work itself.
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
+
+# A run under nohup ignores it, and so would the programs that tests start and end.
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 import pytest  # noqa: E402
 from helpers.nexus import definitions_folder, structure, violations  # noqa: E402

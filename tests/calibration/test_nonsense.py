@@ -76,7 +76,8 @@ def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
     path = Path(shutil.copy(SHIPPED, tmp_path / "scan.h5"))
     with h5py.File(path, "r+") as file:
         file["entry/sample/film/thickness"][...] = 2.5
-    assert main(["calibrate", str(path), "--method", method]) == 3
+    given = ["calibrate", str(path), "--accept-altered", "--method", method]
+    assert main(given) == 3
     assert "scan.h5: the scan is narrower" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
 

@@ -244,9 +244,10 @@ def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
         memscal.calibrate(simulated(), **arguments)
 
 
-def test_positions_in_the_wrong_unit_fail_a_check() -> None:
+def test_positions_ten_times_too_large_are_refused() -> None:
     scan = simulated()
-    assert not check(memscal.calibrate(replace(scan, x=10 * scan.x)), "width_over_thickness").passed
+    with pytest.raises(InputError, match="80 times the film's thickness"):
+        memscal.calibrate(replace(scan, x=10 * scan.x))
 
 
 def shapely(scan: memscal.Scan, method: str, seed: int = 0) -> bool:

@@ -48,7 +48,8 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             "parameters/film": records.FILM, "parameters/indenter": records.INDENTER,
             "process": records.SOLVER, "process/numerics": records.NUMERICS,
         },
-        ("reference", "parameters"),
+        # An ideal reference is a NXcollection in its place.
+        ("parameters",),
     ),
     writer.ARTIFACT_SCHEMA: (
         "The apparatus function of a stress sensor under a film, with all that it rests on.",
@@ -67,7 +68,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
         },
         (
             "radial_profile", "radial_covariance", "transfer_function", "reconvolution",
-            "parameters", "quality", "reference", "process",
+            "parameters", "quality", "process",
         ),
     ),
     writer.STRESS_SCHEMA: (

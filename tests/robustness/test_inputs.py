@@ -23,6 +23,7 @@ from robustness.damage import (
     BYTES,
     EDITS,
     TABLE,
+    Edit,
     change_bytes,
     change_table,
     edit_hdf5,
@@ -144,6 +145,29 @@ USED: dict[str, tuple[tuple[str, ...], ...]] = {
 @given(kind=st.sampled_from(sorted(USED)), changes=BYTES)
 def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
     survives(folder, change_bytes(good[kind], changes), *LOOKED_AT, *USED[kind])
+
+
+_U, _X, _LIMIT = "/entry/data/u_zz", "/entry/data/x", "/entry/quality/reconvolution/limit"
+_OPTIONS = "/entry/process/configuration/data"
+#: Edits with which commands once crashed, hung, ran out of memory or printed what is no JSON.
+CORPUS = (
+    ("scan", Edit("scale", _U, 1e303)), ("scan", Edit("scale", _U, 1e-297)),
+    ("scan", Edit("fill", _X, 1e308)), ("scan", Edit("units", _X, unit="furlong")),
+    ("scan", Edit("units", _X, unit="m")), ("scan", Edit("scale", _X, 1e200)),
+    ("scan", Edit("sparse", _U)), ("scan", Edit("sparse", _X, dtype="i1")),
+    ("artifact", Edit("text", _OPTIONS, text='{"A": NaN}')),
+    ("artifact", Edit("text", _OPTIONS, text="[1e999]")),
+    ("artifact", Edit("fill", _LIMIT, float("inf"))),
+    ("artifact", Edit("replace", "/entry/parameters/centre_errors", shape=(0,))),
+    ("compact", Edit("replace", "/entry/radial_profile/r", shape=(1, 7))),
+    ("stress", Edit("text", "/entry/profiles", text='["a", "a"]')),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "edit"), CORPUS)
+@pytest.mark.parametrize("digest", [True, False])
+def test_inputs_that_once_failed_are_read_or_refused(good, folder, kind, edit, digest) -> None:
+    survives(folder, edit_hdf5(good[kind], [edit], digest=digest), *LOOKED_AT, *USED[kind])
 
 
 @drawn(80, 50_000)
