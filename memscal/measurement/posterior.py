@@ -98,7 +98,7 @@ class PressureShape:
 
     def transform(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
         """Transform at ``k`` (rad/m) for a width (m), one at k = 0; its derivative by the width."""
-        plain, first, second = self._orders(k, width)
+        plain, first, second = _orders(self.exponent, k.tobytes(), width)
         slope = -width * k**2 * first
         if self.shear == 0.0:
             return plain, slope
@@ -108,15 +108,18 @@ class PressureShape:
         share = 0.5 * self.shear * _pull(self.film, k.tobytes())
         return plain - share * k * width * first, slope - share * rise
 
-    def _orders(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the transforms of the exponents m, m + 1 and m + 2, at the radius a of m."""
-        if math.isinf(self.exponent):
-            same = gaussian_transfer(k, width)
-            return same, same, same
-        z, b = -(self.exponent + 2) * (k * width) ** 2 / 2, self.exponent + 2
-        first, second = (np.asarray(hyp0f1(b + i, z), np.float64) for i in (1, 2))
-        # Downwards the recurrence is stable (DLMF 10.6.1).
-        return first + z / (b * (b + 1)) * second, first, second
+
+@lru_cache(maxsize=32)
+def _orders(m: float, nodes: bytes, width: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the transforms of the exponents m, m + 1 and m + 2, at the radius a of m."""
+    k = np.frombuffer(nodes)
+    if math.isinf(m):
+        same = gaussian_transfer(k, width)
+        return same, same, same
+    z, b = -(m + 2) * (k * width) ** 2 / 2, m + 2
+    first, second = (np.asarray(hyp0f1(b + i, z), np.float64) for i in (1, 2))
+    # Downwards the recurrence is stable (DLMF 10.6.1).
+    return first + z / (b * (b + 1)) * second, first, second
 
 
 @lru_cache(maxsize=16)
@@ -232,8 +235,9 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate, fit: GaussianFit) ->
     weighed = weigh_departures(reduced, basis, float(start.outlier_weight.sum()))
     kernels = basis.kernels(model.k)
     rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
-    kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)[0]
-    first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
+    first = np.concatenate(
+        [fit.conversion_constant * kernels[:, 0], fit.centre[model.points.free], fit.drift]
+    )
     # Priors are flat in log force, log width and the others: the information's log determinant.
     flat = fit.jacobian * np.r_[fit.conversion_constant, fit.sigma, np.ones(basis.flat - 2)]
     root = np.linalg.qr(model.points.standardised(flat, weights), mode="r")
