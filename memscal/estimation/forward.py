@@ -32,12 +32,15 @@ from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
 from memscal.model.arrays import FloatArray
+from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 Rows: TypeAlias = slice | NDArray[np.bool_]
 
+#: Above :data:`DENSE` points of lines, no more waves are decomposed: minutes and gigabytes.
+_MOST_WAVES = 1000
 #: In place of the order of a Bessel function: J_1(x)/x.
 TURN = -1
 #: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
@@ -336,6 +339,11 @@ class ForwardModel:
 
 def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> ForwardModel:
     """Return the model of scans, in two dimensions where a reference is not round."""
+    nodes, size = references[0].wavenumbers.k.size, points.u.size
+    if nodes > _MOST_WAVES and size > DENSE and not points.planar:
+        why = f"A source with an edge takes {nodes:,} wavenumbers, where a film takes some hundred."
+        cure = "Average neighbouring readings, or give a source without an edge (gaussian:S)."
+        raise too_large("The scan", size, DENSE, "points for such a reference", cure=cure, why=why)
     models = [reference.model for reference in references if reference.model]
     model: ForwardModel = (models or [ForwardModel])[0](points, tuple(references))
     return model

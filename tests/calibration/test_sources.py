@@ -206,3 +206,10 @@ def test_a_slit_is_not_the_reference_of_a_raster_nor_beside_a_stress() -> None:
         memscal.calibrate(scanned("disc", raster=True, n=9), reference="slit:1mm")
     with pytest.raises(InputError, match="mixed"):
         memscal.calibrate([scanned("disc"), scanned("slit")], reference=["disc:1mm", "slit:1mm"])
+
+
+def test_more_points_than_a_source_with_an_edge_allows_are_refused_at_once() -> None:
+    scan = memscal.simulate(noise=0.005, points=401)
+    with pytest.raises(InputError, match="401 points for such a reference, but at most 400"):
+        memscal.calibrate(scan, reference="disc:0.5mm")
+    assert memscal.calibrate(scan, reference="gaussian:0.5mm").apparatus.conversion_constant > 0
