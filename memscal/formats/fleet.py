@@ -43,11 +43,14 @@ def manifest_scans(source: Path) -> Iterator[FleetScan]:
     if not source.is_file():
         cure = "Give a folder of scans, or a text file that lists one scan a line."
         raise InputError(f"{source} is neither a folder nor a regular file.", cure=cure)
-    with source.open(encoding="utf-8-sig", newline="") as lines:
-        try:
+    try:
+        with source.open(encoding="utf-8-sig", newline="") as lines:
             yield from _listed_scans(source.name, lines)
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise FormatError(f"{source} is not a table of text: {error}.") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(f"{source} is not a table of text: {error}.") from error
+    except OSError as error:
+        cure = "Give a manifest that you may read."
+        raise InputError(f"{source} cannot be read: {error.strerror}.", cure=cure) from error
 
 
 def _folder_scans(folder: Path) -> Iterator[FleetScan]:

@@ -275,3 +275,14 @@ def test_a_figure_of_a_fleet_without_places_or_results_is_drawn(results: Path) -
     empty = replace(fleet, **dict.fromkeys(names, nowhere), failed={}, errors={})
     assert len(empty.plot().axes) == len(fleet.plot().axes)
     assert "Distributions" not in empty.summary()
+
+
+def test_a_manifest_that_may_not_be_read_is_refused(
+    fleet: Path, folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def denied(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", denied)
+    outcome = run(*arguments(fleet / "wafer.csv", folder / "results"))
+    outcome.exits(3, "wafer.csv cannot be read: Permission denied.")
