@@ -127,7 +127,9 @@ def _items(file: h5py.File) -> list[str]:
 def _edit(file: h5py.File, edit: Edit) -> None:
     paths = _items(file)
     datasets = [path for path in paths if isinstance(file[path], h5py.Dataset)]
-    numbers = [path for path in datasets if file[path].dtype.kind in "fiu"]
+    # What an edit made to claim gigabytes is not filled with them.
+    small = [path for path in datasets if (file[path].size or 0) < 10**6]
+    numbers = [path for path in small if file[path].dtype.kind in "fiu"]
     chosen = {"text": [p for p in datasets if p not in numbers], "delete": paths}
     chosen |= {"attribute": ["/", *paths], "drop attribute": ["/", *paths], "group": datasets}
     among = chosen.get(edit.kind, numbers)
