@@ -97,7 +97,8 @@ def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder: Path, seed
             assert code in (0, 1, expected, -sent), said
             assert "Traceback" not in said
             left = {*names(folder)} - {"scan.h5"}
-            assert left == (OUTPUTS if code in (0, 1) else set())
+            # All or none: the last moment of a run is after they are in their places.
+            assert left == OUTPUTS or (code not in (0, 1) and left == set())
             for name in left:
                 (folder / name).unlink()
 
