@@ -223,9 +223,12 @@ def _unstated(solution: Solution, results: Results) -> list[Message]:
         slopes = [
             f"d ln {symbol}/d ln {of} = {float(changes[a][row] / value / _VARIED):+.2f}"
             for a, of in varied.values()
+            if a in changes  # a share of a value near zero changes nothing
             for symbol, row, value in _a_and_sigma(results.parameters)
         ]
-        messages = [replace(m, text=f"{m.text} {', '.join(slopes)}.") for m in messages]
+        messages = [
+            replace(m, text=f"{m.text} {', '.join(slopes)}.") if slopes else m for m in messages
+        ]
     return messages
 
 

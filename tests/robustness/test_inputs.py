@@ -18,7 +18,7 @@ from helpers.builders import make_artifact, make_profile, make_scan
 from helpers.console import names
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from robustness.campaign import count, number
+from robustness.campaign import SHARE, count, number
 from robustness.damage import (
     BYTES,
     EDITS,
@@ -46,6 +46,7 @@ def drawn(reduced: int, whole: int) -> Callable[[Callable[..., None]], Callable[
         max_examples=number(reduced, whole),
         deadline=None,
         database=None,
+        derandomize=not SHARE,  # a run that looks for what is new is one of the campaign
         phases=(Phase.explicit, Phase.generate),  # to shrink a failure takes longer than to read it
         suppress_health_check=list(HealthCheck),
     )
@@ -155,6 +156,7 @@ CORPUS = (
     ("scan", Edit("fill", _X, 1e308)), ("scan", Edit("units", _X, unit="furlong")),
     ("scan", Edit("units", _X, unit="m")), ("scan", Edit("scale", _X, 1e200)),
     ("scan", Edit("sparse", _U)), ("scan", Edit("sparse", _X, dtype="i1")),
+    ("scan", Edit("fill", "/entry/sample/film/poisson_ratio", 5e-324)),
     ("artifact", Edit("text", _OPTIONS, text='{"A": NaN}')),
     ("artifact", Edit("text", _OPTIONS, text="[1e999]")),
     ("artifact", Edit("fill", _LIMIT, float("inf"))),
