@@ -148,7 +148,7 @@ def command(
     if folder is not None:
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
-    shear = None if options["shear"] is None else load_apparatus(options["shear"])
+    shear = options["shear"] and load_apparatus(options["shear"], **accepted)
     inputs = [artifact, *scans, *options["references"], *filter(None, [options["shear"]])]
     outputs = figures = [*single, *named.values()]
     if folder is not None and not folder.is_dir():

@@ -188,7 +188,8 @@ def _single(file: SafeFile, path: str) -> float | int:
     if (numbers := file.array(path)).size != 1:
         problem = f"{file.where(path)} has {numbers.size} values, but one number is expected."
         raise FormatError(problem)
-    return numbers.item()  # type: ignore[no-any-return]
+    number: float | int = numbers.item()
+    return number
 
 
 def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
