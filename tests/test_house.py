@@ -35,7 +35,7 @@ SLOW = {
     "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats",
 }  # fmt: skip
 LONGEST, SHORT = 600, 120
-MOST_MODULES, MOST_LINES, MOST_LINES_OF_TESTS = 185, 38_400, 25_100
+MOST_MODULES, MOST_LINES, MOST_LINES_OF_TESTS = 194, 40_700, 27_000
 SHORT_WITH_ONE_IMPORTER = {
     "memscal.cli.commands": "asking for help imports it and nothing that a command needs"
 }
