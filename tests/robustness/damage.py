@@ -118,20 +118,21 @@ def edit_hdf5(data: bytes, edits: Sequence[Edit], *, digest: bool) -> bytes:
         return path.read_bytes()
 
 
-def _items(file: h5py.File) -> list[str]:
-    paths: list[str] = []
-    file.visit(lambda name: paths.append(f"/{name}"))
-    return [path for path in paths if not path.startswith("/entry/contents")]
+def _items(file: h5py.File) -> dict[str, h5py.Dataset | h5py.Group]:
+    """What stands at each path, in one pass: to open an item by its path takes far longer."""
+    items: dict[str, h5py.Dataset | h5py.Group] = {}
+    file.visititems(lambda name, item: items.update({f"/{name}": item}))
+    return {path: item for path, item in items.items() if not path.startswith("/entry/contents")}
 
 
 def _edit(file: h5py.File, edit: Edit) -> None:
     paths = _items(file)
-    datasets = [path for path in paths if isinstance(file[path], h5py.Dataset)]
+    datasets = {path: item for path, item in paths.items() if isinstance(item, h5py.Dataset)}
     # What an edit made to claim gigabytes is not filled with them.
-    small = [path for path in datasets if (file[path].size or 0) < 10**6]
-    numbers = [path for path in small if file[path].dtype.kind in "fiu"]
-    chosen = {"text": [p for p in datasets if p not in numbers], "delete": paths}
-    chosen |= {"attribute": ["/", *paths], "drop attribute": ["/", *paths], "group": datasets}
+    small = {path: item for path, item in datasets.items() if (item.size or 0) < 10**6}
+    numbers = [path for path, item in small.items() if item.dtype.kind in "fiu"]
+    chosen = {"text": [p for p in datasets if p not in numbers], "delete": [*paths]}
+    chosen |= {"attribute": ["/", *paths], "drop attribute": ["/", *paths], "group": [*datasets]}
     among = chosen.get(edit.kind, numbers)
     if not among:
         return
@@ -187,12 +188,13 @@ def _replace(file: h5py.File, path: str, edit: Edit) -> None:
 
 def _sign(file: h5py.File) -> None:
     """Have the file state its digest and the list of its contents, as its writer would."""
-    sizes = [file[p].size or 0 for p in _items(file) if isinstance(file[p], h5py.Dataset)]
+    items = _items(file)
+    sizes = [item.size or 0 for item in items.values() if isinstance(item, h5py.Dataset)]
     if "/entry/contents" not in file or max(sizes, default=0) > 10**6:
         return
     contents = {"/": sorted(set(file.attrs) - {DIGEST_ATTRIBUTE})}
-    for path in [*_items(file), "/entry/contents"]:
-        names = set(file[path].attrs) - {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}
+    for path, item in [*items.items(), ("/entry/contents", file["/entry/contents"])]:
+        names = set(item.attrs) - {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}
         contents[path] = sorted(names)
     for path in [p for p in file.get("/entry/contents", ()) if p != "data"]:
         contents[f"/entry/contents/{path}"] = []
