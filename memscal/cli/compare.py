@@ -10,7 +10,14 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, Quantity, accept_altered_option, option, output_options
+from memscal.cli.options import (
+    FILE,
+    Quantity,
+    accept_altered_option,
+    brief_option,
+    option,
+    output_options,
+)
 from memscal.formats.files import together
 
 
@@ -113,6 +120,7 @@ Examples:
     "coefficients, maxima, effective friction, likelihood, interface."
 )
 @option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
+@brief_option
 @output_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -190,7 +198,7 @@ def command(
             }
             out.emit_json(comparison.to_dict() | files)
         else:
-            out.emit_tables(*comparison.tables())
+            out.emit_result(comparison, brief=options["brief"])
     out.show_messages(notes(comparison))
     for path in figures:
         out.message(f"Written: {path}")
@@ -230,7 +238,7 @@ def _of_shear(
     if as_json:
         out.emit_json(comparison.to_dict() | {"artifact": file_json(apparatus.source)})
     else:
-        out.emit_tables(*comparison.tables())
+        out.emit_result(comparison, brief=options["brief"])
     out.show_messages(comparison.messages)
     return DONE
 
