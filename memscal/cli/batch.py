@@ -96,8 +96,8 @@ def command(
     counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
     counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
     if as_json:
-        stated = {"schema_version": "1", "results": str(results), **counts, "seconds": seconds}
-        out.emit_json(stated)
+        stated = {"schema_version": "1", "results": str(results), **counts}
+        out.emit_json(stated | {"time": {"value": seconds, "unit": "s"}})
     else:
         rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
         out.emit_tables(

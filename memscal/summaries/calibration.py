@@ -26,8 +26,6 @@ from memscal.summaries.table import Table, checks_json, checks_table, finite, te
 
 Calibrated: TypeAlias = Calibration | ApparatusData
 
-_IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "centre",
-            "baseline")  # fmt: skip
 _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm",
                "noise_equivalent_area")  # fmt: skip
 #: What scans tell of the film, where they do.
@@ -111,7 +109,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     values: dict[str, Any] = {
         "schema_version": "1",
         "method": _method(apparatus) or None,
-        **{name: parameter_json(parameters, name) for name in _IN_JSON if name in parameters},
+        **{name: parameter_json(parameters, name) for name in parameters.names},
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
         "film_law": (apparatus.film and apparatus.film.law) or None,

@@ -19,7 +19,7 @@ from memscal.friction.results import (
 )
 from memscal.model import records
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
@@ -195,7 +195,7 @@ def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
         **members(records.ESTIMATE_FIT, estimate),
         "lubricated_beside": estimate.beside,
         "profile_likelihood": {
-            "friction_coefficient": _shortened(estimate.values),
+            "friction_coefficient": {"value": _shortened(estimate.values), "unit": "1"},
             "deviance": _shortened(estimate.deviance),
         },
     }
@@ -210,8 +210,7 @@ _FAR = 0.26
 
 
 def notes(comparison: FrictionComparison) -> Iterator[Message]:
-    """Return what a user should know, each thing once; what failed of several profiles, once."""
-    others = (message for message in comparison.messages if message.kind != FAILED_CHECK)
+    """Return what a user should know, each thing once."""
     laws = comparison.interface
     of_laws = () if laws is None else laws.messages
     texts = (
@@ -220,7 +219,7 @@ def notes(comparison: FrictionComparison) -> Iterator[Message]:
         if joint.reason
     )
     missing = (Message("no_value", text[:1].upper() + text[1:]) for text in texts)
-    about = (*_failed(comparison), *others, *missing, *_about_profiles(comparison), *of_laws)
+    about = (*comparison.messages, *missing, *_about_profiles(comparison), *of_laws)
     yield from dict.fromkeys(about)
 
 
@@ -248,20 +247,6 @@ def _by_kind(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
     for check in checks:
         kinds.setdefault(check.kind, []).append(check)
     return kinds
-
-
-def failures(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
-    """Return the checks that failed, by kind."""
-    return _by_kind(check for check in checks if not check.passed)
-
-
-def _failed(comparison: FrictionComparison) -> Iterator[Message]:
-    """Return one warning for each kind of check that failed, about the first profile."""
-    for first, *others in failures(comparison.checks).values():
-        [message] = failed_check_messages([first])
-        numbers = ", ".join(check.profile for check in others)
-        text = f"{message.text} The same of profiles {numbers}." if others else message.text
-        yield replace(message, text=text)
 
 
 def _which(lubrication: str, loading: str) -> str:
