@@ -89,6 +89,7 @@ from .model.stress import StressProfile as StressProfile
 from .planning.design import Design as Design
 from .planning.design import Plan as Plan
 from .planning.design import design as design
+from .progress import Progress as Progress
 from .simulation.experiment import Experiment as Experiment
 from .simulation.experiment import simulate_experiment as simulate_experiment
 from .simulation.rod_scan import simulate as simulate

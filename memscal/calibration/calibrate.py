@@ -56,6 +56,7 @@ from memscal.model.scan import LoadCell, Scan
 from memscal.model.sizes import MOST_OF_LINES
 from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
+from memscal.progress import Listener, reported
 from memscal.version import __version__
 
 #: Parameters that differ between a division and the Bayesian estimate.
@@ -250,6 +251,7 @@ class Calibration(Result):
         return replace(swept, reading=self.apparatus.reading)
 
 
+@reported
 @single_threaded()
 def calibrate(
     scan: Scans,
@@ -270,6 +272,7 @@ def calibrate(
     accept_altered: bool = False,
     relative: bool = False,
     other: bool = True,
+    progress: Listener = None,  # noqa: ARG001 - @reported
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -332,6 +335,8 @@ def calibrate(
         by the reference over its largest stress, and no result states pascals from it.
     other : bool, default True
         Whether ``.apparatus.other``, the estimate by the other route, is calculated, too.
+    progress : callable or True, optional
+        Told how far it is where film or inputs take long: :class:`memscal.Progress`.
     **options
         Parameters of the method, such as ``amplitude``.
 

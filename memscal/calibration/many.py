@@ -17,6 +17,7 @@ from memscal.model.checks import Message, QualityCheck
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import cores, shared
+from memscal.progress import Listener, counted, reported
 
 _Result = TypeVar("_Result")
 
@@ -73,8 +74,13 @@ class FleetCalibration(Result):
         return self.error is None and all(check.passed for check in self.checks)
 
 
+@reported
 def calibrate_many(
-    scans: Iterable[Scans], executor: Executor | None = None, **options: Any
+    scans: Iterable[Scans],
+    executor: Executor | None = None,
+    *,
+    progress: Listener = None,  # noqa: ARG001 - @reported
+    **options: Any,
 ) -> Iterator[FleetCalibration]:
     """Calibrate with many scans, each by itself.
 
@@ -89,6 +95,8 @@ def calibrate_many(
     executor : concurrent.futures.Executor, optional
         What calibrates: a pool of processes or threads, or that of a cluster, such as
         ``dask.distributed.Client(...).get_executor()``.  By default a process for each core.
+    progress : callable or True, optional
+        Told how many scans are done, where their number is known: :class:`memscal.Progress`.
     **options
         Options of :func:`memscal.calibrate`, the same for all.
 
@@ -124,7 +132,8 @@ def calibrate_many(
     chosen_method(method, of_method, seed=seed)
     task, items = partial(_calibrated, options=options), enumerate(scans)
     sized = list(items) if isinstance(scans, Sized) else items
-    return shared(task, sized, workers=cores(), executor=executor)
+    results = shared(task, sized, workers=cores(), executor=executor)
+    return counted(results, "scans", len(sized)) if isinstance(sized, list) else results
 
 
 def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:

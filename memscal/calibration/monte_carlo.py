@@ -3,7 +3,7 @@
 Each draw is a scan with new noise and other true inputs; it states the nominal ones.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -33,6 +33,7 @@ from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, shared, single_threaded
+from memscal.progress import Listener, counted, reported
 
 
 @dataclass(frozen=True)
@@ -297,6 +298,7 @@ class MonteCarlo(Result):
         return self.comparisons[BUDGETED.index(name)]
 
 
+@reported
 @single_threaded()
 def monte_carlo(
     calibration: Calibration,
@@ -304,7 +306,7 @@ def monte_carlo(
     draws: int = 1000,
     seed: int = 0,
     workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Listener = None,  # noqa: ARG001 - @reported
 ) -> MonteCarlo:
     r"""Propagate the distributions of noise and inputs through a calibration.
 
@@ -323,8 +325,8 @@ def monte_carlo(
         Every draw has a seed of its own, spawned from this one.
     workers : int, default 1
         Processes that share the draws.
-    progress : callable, optional
-        Called with the number of draws that are done and the number of all draws.
+    progress : callable or True, optional
+        Told how many draws are done: :class:`memscal.Progress`.
 
     Returns
     -------
@@ -353,10 +355,8 @@ def monte_carlo(
     model = DrawnScans(solution, effects, calibration.correlations, seed)
     rows: list[FloatArray] = []
     failures: list[str] = []
-    for done, result in enumerate(shared(model.result, range(draws), workers=workers), start=1):
+    for result in counted(shared(model.result, range(draws), workers=workers), "draws", draws):
         (failures if isinstance(result, str) else rows).append(result)
-        if progress is not None:
-            progress(done, draws)
     if len(rows) < 2:
         problem = f"{len(failures)} of {draws} draws could not be calibrated."
         cure = "The scan is close to failing, too; measure with less noise."

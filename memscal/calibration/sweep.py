@@ -11,6 +11,7 @@ from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
+from memscal.progress import counted
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,10 +59,12 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
     fields = prepare_fields(solution.estimate, solution.smoothed, solution.choice)
     solution, seeds = replace(solution, fields=fields), range(seed, seed + draws)
     amplitude = np.logspace(-1, 1, amplitudes)
-    expected = np.array([_outcome(solution, WhiteNoise(amplitude=a)) for a in amplitude])
-    single = [WhiteNoiseDraw(amplitude=a, seed=s) for a in amplitude for s in seeds]
-    drawn = np.reshape([_outcome(solution, draw) for draw in single], (amplitudes, draws, 3))
-    return Sweep(amplitude, *expected.T, *np.moveaxis(drawn, -1, 0))
+    methods: list[Regulariser] = [WhiteNoise(amplitude=a) for a in amplitude]
+    methods += [WhiteNoiseDraw(amplitude=a, seed=s) for a in amplitude for s in seeds]
+    outcomes = (_outcome(solution, method) for method in methods)
+    results = np.array(list(counted(outcomes, "divisions", len(methods))))
+    drawn = results[amplitudes:].reshape(amplitudes, draws, 3)
+    return Sweep(amplitude, *results[:amplitudes].T, *np.moveaxis(drawn, -1, 0))
 
 
 def _outcome(solution: Solution, regulariser: Regulariser) -> tuple[float, float, float]:

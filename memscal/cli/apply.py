@@ -7,7 +7,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, accept_altered_option, option, output_options
+from memscal.cli.options import FILE, accept_altered_option, brief_option, option, output_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -31,6 +31,7 @@ Examples:
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
+@brief_option
 @output_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -53,7 +54,6 @@ def command(
     out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
 
     from memscal.measurement.measure_stress import measure_stress
-    from memscal.summaries.stress import tables
 
     with out.working("Measuring"):
         stress = measure_stress(data, artifact, **accepted)
@@ -65,7 +65,7 @@ def command(
         if as_json:
             out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
         else:
-            out.emit_tables(*tables(stress))
+            out.emit_result(stress, brief=options["brief"])
     out.show_messages(stress.messages)
     for path in (written, *figures):
         out.message(f"Written: {path}")

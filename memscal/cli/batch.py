@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,9 +20,6 @@ from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
     from memscal.calibration.batch import Batch, ShardOutcome
-
-#: Seconds between two lines about the progress, where it is not shown on a terminal.
-_EVERY = 60.0
 
 EXAMPLES = """\b
 Examples:
@@ -83,6 +79,7 @@ def command(
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
     from memscal.calibration.batch import Batch
+    from memscal.progress import span
 
     chosen = calibration_settings(**settings)
     source, results = (Path(os.path.realpath(path)) for path in (source, results))
@@ -99,12 +96,12 @@ def command(
     counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
     counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
     if as_json:
-        stated = {"schema_version": "1", "results": str(results), **counts, "seconds": seconds}
-        out.emit_json(stated)
+        stated = {"schema_version": "1", "results": str(results), **counts}
+        out.emit_json(stated | {"time": {"value": seconds, "unit": "s"}})
     else:
         rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
         out.emit_tables(
-            Table(f"Batch of {source.name}", ("", ""), [*rows, ("time", _span(seconds))])
+            Table(f"Batch of {source.name}", ("", ""), [*rows, ("time", span(seconds))])
         )
     out.message(f"Written: {results}")
     if not errors + failed:
@@ -117,32 +114,14 @@ def command(
 def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:
     """Yield the outcomes of a batch, and show how far it is."""
     from memscal.parallel import cluster, cores, worker_pool
+    from memscal.progress import counted
 
-    start = said = monotonic()
-    done, calibrated, total = 0, 0, batch.count
     with ExitStack() as stack:
         if scheduler:
             executor, most = stack.enter_context(cluster(scheduler))
         else:
             count = workers or cores()
             executor, most = stack.enter_context(worker_pool(count)), lambda: 2 * count
-        show = stack.enter_context(out.working(f"Calibrating {total} scans"))
-        for outcome in batch.run(executor, most):
-            done += outcome.scans
-            calibrated += 0 if outcome.kept else outcome.scans
-            text, rate = f"{done} of {total} scans", calibrated / (monotonic() - start)
-            if rate:
-                text += f", {_span((total - done) / rate)} left, {rate:.3g} a second"
-            show(text)
-            if not (sys.stderr and sys.stderr.isatty()) and monotonic() - said >= _EVERY:
-                out.message(text)
-                said = monotonic()
-            yield outcome
-
-
-def _span(seconds: float) -> str:
-    """Return a time in words: 12 s, 3 min, 2.5 h."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds:.0f} s"
+        stack.enter_context(out.working("Calibrating"))
+        outcomes = batch.run(executor, most)
+        yield from counted(outcomes, "scans", batch.count, lambda outcome: outcome.scans)

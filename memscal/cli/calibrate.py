@@ -39,14 +39,8 @@ def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
 
     # Starting a process takes about as long as forty draws of a line.
     workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
-    with out.working(f"Drawing {draws} scans") as show:
-        drawn = monte_carlo(
-            calibration,
-            draws=draws,
-            seed=seed,
-            workers=workers,
-            progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
-        )
+    with out.working("Calibrating drawn scans"):
+        drawn = monte_carlo(calibration, draws=draws, seed=seed, workers=workers)
     differing = [c for c in drawn.comparisons if not c.agrees]
     texts = [f"{estimated_quantity(c.name).words}: {c.reason}" for c in differing]
     out.show_messages([*drawn.messages, *(Message("disagreement", text) for text in texts)])
@@ -221,6 +215,7 @@ def calibration_settings(
     "film of a stated law that is not linear; the stated thickness is its prior."
 )
 @json_option
+@common.brief_option
 @option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw scan, apparatus function and transfer function. May be repeated."
@@ -249,6 +244,7 @@ def command(
     reference: Path | None,
     alternative: Path | None,
     as_json: bool,
+    brief: bool,
     report: Path | None,
     figures: tuple[Path, ...],
     sweeping: bool,
@@ -307,7 +303,12 @@ def command(
     with together():
         apparatus.save(output, overwrite=force)
         out.write_files(contents, force=force)
-        _print(calibration, further, output, as_json)
+        if as_json:
+            files = {"schema_version": "1", "artifact": str(output)}
+            values = {name: result.to_dict() for name, result in further.items()}
+            out.emit_json(files | calibration.to_dict() | values)
+        else:
+            out.emit_result(calibration, *further.values(), brief=brief)
     out.show_messages(apparatus.process.messages)
     for path in outputs:
         out.message(f"Written: {path}")
@@ -381,18 +382,3 @@ def _rehearse(
         taken = replace(taken, load=load)
         out.emit_tables(rehearsal_table(taken, joined_points(readings), stress, *plan))
     out.message("Nothing was written (--dry-run).")
-
-
-def _print(
-    calibration: Calibration,
-    further: Mapping[str, Sweep | MonteCarlo],
-    output: Path,
-    as_json: bool,
-) -> None:
-    if as_json:
-        files = {"schema_version": "1", "artifact": str(output)}
-        values = {name: result.to_dict() for name, result in further.items()}
-        out.emit_json(files | calibration.to_dict() | values)
-    else:
-        tables = [table for result in further.values() for table in result.tables()]
-        out.emit_tables(*calibration.tables(), *tables)

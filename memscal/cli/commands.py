@@ -21,6 +21,7 @@ COMMANDS = {
     "import": ("import_", "Convert a table (CSV) or a mesh to a scan or a reference."),
     "inspect": ("inspect", "Show what a file holds."),
     "check": ("check", "Check a file's safety, schema, digest and content."),
+    "explain": ("explain", "Explain what a quality check tests, and what to do if it fails."),
     "completion": ("completion", "Print the shell's completion script."),
 }
 """Command: its module in this package, and what it does."""

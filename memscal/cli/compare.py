@@ -10,7 +10,14 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, Quantity, accept_altered_option, option, output_options
+from memscal.cli.options import (
+    FILE,
+    Quantity,
+    accept_altered_option,
+    brief_option,
+    option,
+    output_options,
+)
 from memscal.formats.files import together
 
 
@@ -113,6 +120,7 @@ Examples:
     "coefficients, maxima, effective friction, likelihood, interface."
 )
 @option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
+@brief_option
 @output_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -138,7 +146,7 @@ def command(
     from memscal.formats.opened import opened_contacts
     from memscal.formats.reference import read_reference
     from memscal.friction.compare import compare, scans_of
-    from memscal.summaries.comparison import failures, file_json, notes
+    from memscal.summaries.comparison import file_json, notes
 
     accepted = {"accept_altered": options["accept_altered"]}
     apparatus, data = load_apparatus(artifact, **accepted), opened_contacts(scans, **accepted)
@@ -190,15 +198,11 @@ def command(
             }
             out.emit_json(comparison.to_dict() | files)
         else:
-            out.emit_tables(*comparison.tables())
+            out.emit_result(comparison, brief=options["brief"])
     out.show_messages(notes(comparison))
     for path in figures:
         out.message(f"Written: {path}")
-    failed = [
-        f"{kind} {' '.join(check.profile for check in checks)}".strip()
-        for kind, checks in failures(comparison.checks).items()
-    ]
-    return exit_code_of(comparison.checks, failed)
+    return exit_code_of(comparison.checks)
 
 
 def _of_shear(
@@ -230,7 +234,7 @@ def _of_shear(
     if as_json:
         out.emit_json(comparison.to_dict() | {"artifact": file_json(apparatus.source)})
     else:
-        out.emit_tables(*comparison.tables())
+        out.emit_result(comparison, brief=options["brief"])
     out.show_messages(comparison.messages)
     return DONE
 

@@ -154,14 +154,15 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
     warn(f"{category.__name__}: {message}")
 
 
-def exit_code_of(
-    checks: Sequence[QualityCheck], named: Sequence[str] | None = None, then: str = ""
-) -> int:
-    """Return the exit code of quality checks; warn of those that failed, ``named`` so."""
-    failed = [check.name for check in checks if not check.passed]
+def exit_code_of(checks: Sequence[QualityCheck], then: str = "") -> int:
+    """Return the exit code of quality checks; warn of those that failed, each kind once."""
+    failed = [check for check in checks if not check.passed]
     if not failed:
         return DONE
     count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
-    words = ", ".join(name.replace("_", " ") for name in (failed if named is None else named))
-    warn(f"{count} failed ({words}).{then}")
+    kinds: dict[str, list[str]] = {}
+    for check in failed:
+        kinds.setdefault(check.kind.replace("_", " "), []).append(check.profile)
+    words = ", ".join(" ".join([kind, *profiles]).strip() for kind, profiles in kinds.items())
+    warn(f"{count} failed ({words}): memscal explain CHECK tells what to do.{then}")
     return CHECK_FAILED

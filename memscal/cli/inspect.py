@@ -50,18 +50,21 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     ]
     yield Table(str(contents["file"]), ("", ""), [row for row in rows if row[1]])
 
-    head = ("quantity", "value", "path")
     quantities = [
         (item["name"].replace("_", " "), _value(item), item["path"])
         for item in contents["quantities"]
     ]
-    yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
+    yield Table(
+        "Quantities (± standard uncertainty, k = 1)", ("quantity", "value", "path"), quantities
+    )
     arrays = []
     for item in contents["arrays"]:
         shape = " x ".join(str(n) for n in item["shape"]) or "one"
         low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
         arrays.append((item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")))
-    yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
+    head = ("path", "shape", "from", "to", "unit", "missing")
+    shown = len(head) - all(row[-1] == "-" for row in arrays)
+    yield Table("Arrays", head[:shown], [row[:shown] for row in arrays])
     checks, failed, meanings = [], set(), []
     for i, check in enumerate(contents["checks"]):
         name, numbers = check["name"].replace("_", " "), (check["value"], check["limit"])

@@ -104,7 +104,19 @@ def options_of(*options: _Adder) -> _Adder:
     return add
 
 
-json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")
+def _one_form(ctx: click.Context, param: click.Parameter, given: bool) -> bool:
+    """Refuse two forms of the results."""
+    if given and (other := ctx.meta.setdefault("memscal.form", param.opts[0])) != param.opts[0]:
+        raise click.UsageError(f"Give {other} or {param.opts[0]}, not both.")
+    return given
+
+
+json_option = option("--json as_json", is_flag=True, callback=_one_form)(
+    "Print one JSON object in place of tables."
+)
+brief_option = option("--brief", is_flag=True, callback=_one_form)(
+    "Print the first lines only, which say what was found."
+)
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
 accept_altered_option = option("--accept-altered", is_flag=True)(
     "Use files although their content does not fit their digest: recorded in the output."

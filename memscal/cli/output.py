@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,10 +17,12 @@ import click
 from memscal.errors import OutputError
 from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import Message
-from memscal.summaries.table import Table, readable
+from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from memscal.model.result import Result
 
 
 def emit(text: str) -> None:
@@ -84,10 +87,19 @@ def warn(text: str) -> None:
     _to_stderr([f"Warning: {text}"])
 
 
+#: What messages that say the same of several things differ in.
+_PARTICULARS = re.compile(r"\([^)]*\)|[-+]?\d[\d.e+-]*")
+
+
 def show_messages(messages: Iterable[Message]) -> None:
-    """Write the messages of a result to standard error, each as a note or a warning."""
+    """Write the messages of a result to standard error, those that say the same once."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
     for item in messages:
-        (warn if item.severity == "warning" else note)(item.text)
+        key = item.kind, item.severity, _PARTICULARS.sub("", item.text)
+        alike.setdefault(key, []).append(item.text)
+    for (_, severity, _), (text, *others) in alike.items():
+        more = f" ({len(others)} more like it; --json lists all.)" if others else ""
+        (warn if severity == "warning" else note)(text + more)
 
 
 def error(problem: str, why: str = "", cure: str = "") -> None:
@@ -96,92 +108,86 @@ def error(problem: str, why: str = "", cure: str = "") -> None:
 
 
 def _to_stderr(lines: Sequence[str]) -> None:
-    width = min(100, max(40, shutil.get_terminal_size().columns))
     for line in lines:
         text = readable(line, sys.stderr)
         if sys.stderr is not None and sys.stderr.isatty():
-            indent = "  " if text.startswith("  ") else ""
-            text = click.wrap_text(text.strip(), width, indent, "  ")
+            text = "\n  ".join(folded(text, _columns() - 2))
         try:
             click.echo(text, err=True)
         except OSError:  # standard error is closed
             return
 
 
-_FIRST_AFTER = 0.7
-_EVERY = 0.2
+#: Seconds until something is shown, and between two times: on a terminal, and elsewhere in lines.
+_ON_TERMINAL, _IN_LINES = (0.7, 0.2), (10.0, 60.0)
 _CLEAR = "\r\x1b[K"
 
 
 @contextmanager
-def working(task: str) -> Iterator[Callable[[str], None]]:
-    """Show a task on a terminal, if it takes long; yield what replaces its text."""
-    shown = [task]
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda _: None
+def working(task: str) -> Iterator[None]:
+    """Show on standard error that a task takes long, how much of it is done, and the time left."""
+    if sys.stderr is None:
+        yield
         return
     from threading import Event, Thread
     from time import monotonic
 
-    done, stream, start = Event(), sys.stderr, monotonic()
+    from memscal.progress import Progress, reporting, span
+
+    done, stream, start, counts = Event(), sys.stderr, monotonic(), [""]
+    terminal = stream.isatty()
+    (wait, every), begin, end = (_ON_TERMINAL, _CLEAR, "") if terminal else (_IN_LINES, "", "\n")
 
     def show() -> None:
-        if done.wait(_FIRST_AFTER):
-            return
         with suppress(OSError, ValueError):
-            while True:
-                stream.write(f"{_CLEAR}{shown[0]} ... {monotonic() - start:.0f} s")
+            interval = wait
+            while not done.wait(interval):
+                text = f"{task}{counts[0]} ({span(monotonic() - start)})"
+                room = _columns() - 1 if terminal else len(text)
+                stream.write(f"{begin}{readable(text, stream)[:room]}{end}")
                 stream.flush()
-                if done.wait(_EVERY):
-                    break
-            stream.write(_CLEAR)
-            stream.flush()
+                interval = every
+            if terminal and interval == every:
+                stream.write(_CLEAR)
+                stream.flush()
+
+    def hear(progress: Progress) -> None:
+        counts[0] = f": {progress}"
 
     thread = Thread(target=show, daemon=True)
     thread.start()
     try:
-        yield lambda text: shown.__setitem__(0, text)
+        with reporting(hear):
+            yield
     finally:
         done.set()
         thread.join()
 
 
-def emit_tables(*tables: Table) -> None:
-    """Print tables that have rows, with an empty line between them."""
-    filled = [table for table in tables if table.rows]
-    if sys.stdout is not None and sys.stdout.isatty():
-        emit(_drawn(filled))
-    else:
-        emit("\n\n".join(table.plain() for table in filled))
+#: A terminal of more columns than this leaves the others empty.
+_WIDEST = 120
 
 
-def _drawn(tables: Sequence[Table]) -> str:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table as RichTable
-    from rich.text import Text
+def _columns() -> int:
+    """Return for how many columns of text there is room, 80 where nothing says it."""
+    return min(_WIDEST, max(40, shutil.get_terminal_size((WIDTH, 24)).columns))
 
-    console = Console(highlight=False)
-    blocks = []
-    for table in tables:
-        drawn = RichTable(
-            box=box.SIMPLE_HEAD if any(table.head) else None,
-            show_header=any(table.head),
-            padding=(0, 1),
-        )
-        for name in table.head:
-            # A narrow terminal breaks names between words, not within.
-            longest = max((len(word) for word in name.split()), default=0)
-            drawn.add_column(Text(readable(name)), overflow="fold", min_width=longest)
-        for k, row in enumerate(table.rows):
-            # Text, not markup: a cell may hold what stood in a file.
-            cells = (Text(readable(cell)) for cell in row)
-            drawn.add_row(*cells, style="bold red" if k in table.marked else "")
-        with console.capture() as capture:
-            console.print(Text(readable(table.title)), style="bold")
-            console.print(drawn)
-        blocks.append("\n".join(line for line in capture.get().splitlines() if line.strip()))
-    return "\n\n".join(blocks)
+
+def emit_tables(*tables: Table, answer: str = "") -> None:
+    """Print the answer, then tables that have rows, with an empty line between them."""
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    drawn = sys.stdout is not None and sys.stdout.isatty() and not plain
+    emit(text_of(answer, tables, _columns(), _in_bold if drawn else as_it_is))
+
+
+def emit_result(result: Result, *further: Result, brief: bool) -> None:
+    """Print the answer of a result, and unless that is enough its tables and those of others."""
+    tables = () if brief else (table for one in (result, *further) for table in one.tables())
+    emit_tables(*tables, answer=result.answer())
+
+
+def _in_bold(text: str, failed: bool) -> str:
+    return click.style(text, bold=True, fg="red" if failed else None)
 
 
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")

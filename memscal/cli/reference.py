@@ -209,8 +209,7 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
     settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
     settings |= {"interface": interface_of(options), "film_radius": si(options["film_radius"], -3)}
     settings["strain"] = "linear" if film.law == "linear" else "finite"
-    with out.working("Pressing") as show:
-        settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
+    with out.working("Pressing"):
         if depths := [si(depth, -6) for depth in options["depths"]]:
             return indent(film, body, depth=depths, **settings)
         return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)

@@ -8,13 +8,20 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, accept_altered_option, option, output_options
+from memscal.cli.options import (
+    FILE,
+    Quantity,
+    accept_altered_option,
+    brief_option,
+    option,
+    output_options,
+)
 from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
   memscal restore sensor.apparatus.h5 sphere.h5
-  memscal restore sensor.apparatus.h5 sphere.h5 -o stress.h5 --figure stress.png
+  memscal restore sensor.apparatus.h5 sphere.h5 --load 1.37 -o stress.h5 --figure stress.png
   memscal restore sensor.apparatus.h5 sphere.h5 --expected sticking.h5 --json
 """
 
@@ -30,6 +37,7 @@ Examples:
     "adds the check expected_stress. By default the scan's indenter is pressed on its film without "
     "friction, to be shown beside the result."
 )
+@option("--load", Quantity("N"))("Which load of a scan of several is restored, in N.")
 @option("--override", is_flag=True)(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
@@ -37,6 +45,7 @@ Examples:
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
+@brief_option
 @output_options
 def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: Any) -> int:
     """Restore the stress at the base of a film from a SCAN with a calibrated sensor (ARTIFACT).
@@ -63,11 +72,12 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     from memscal.mechanics.press_rod import press_rod
 
     with out.working("Restoring"):
-        restored = restore(data, apparatus, expected=stress, override=options["override"])
+        settings = {name: options[name] for name in ("load", "override")}
+        restored = restore(data, apparatus, expected=stress, **settings)
         if stress is None:
             # The calculated contact is shown beside it; one that has no solution is left out.
             try:
-                contact = press_rod(*data.set_up, data.rod_friction)
+                contact = press_rod(*restored.scan.set_up, data.rod_friction)
                 restored = replace(restored, comparison=restored.compare(contact))
             except MemscalError as failure:
                 out.note(f"No contact is shown beside the result: {failure.problem}")
@@ -81,7 +91,7 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
             written = None if output is None else str(output)
             out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
         else:
-            out.emit_tables(*restored.tables())
+            out.emit_result(restored, brief=options["brief"])
     out.show_messages(restored.messages)
     for path in files:
         out.message(f"Written: {path}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from memscal.formats.files import together
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
+    from memscal.model import quantities
     from memscal.model.scan import Scan
 
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
@@ -123,20 +125,32 @@ def _described(scan: Scan, path: Path) -> dict[str, Any]:
         "synthetic": True,
         "kind": scan.kind,
         "shape": list(scan.u_zz.shape),
-        "truth_si": {k: "inf" if v == math.inf else v for k, v in (scan.synthetic or {}).items()},
+        "truth": {name: _member(name, value) for name, value in (scan.synthetic or {}).items()},
     }
+
+
+def _member(name: str, value: float | str) -> Any:
+    """Return a truth as JSON holds it: text, also of what is infinite, or a number and its unit."""
+    if isinstance(value, str) or value == math.inf or name == "seed":
+        return int(value) if name == "seed" else str(value)
+    quantity = _quantity(name)
+    return {"value": value / quantity.scale, "unit": quantity.unit_text}
 
 
 def _entry(name: str, value: float | str) -> tuple[str, str]:
     """Return a truth in words, and with its unit."""
     if isinstance(value, str):
         return name.replace("_", " "), value
-    if name.startswith("load_") and name.removeprefix("load_").isdigit():
-        return f"true load {name.removeprefix('load_')}", f"{value:.6g} N"
+    shown = _quantity(name)
+    return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()
+
+
+def _quantity(name: str) -> quantities.Quantity:
     from memscal.model.quantities import TRUTH, estimated_quantity
 
-    shown = TRUTH.get(name) or estimated_quantity(name)
-    return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()
+    if name.startswith("load_") and name.removeprefix("load_").isdigit():
+        return replace(TRUTH["load"], words=f"true load {name.removeprefix('load_')}")
+    return TRUTH.get(name) or estimated_quantity(name)
 
 
 _ROD_NAMES = ("half_range", "raster")

@@ -21,6 +21,7 @@ from memscal.model.indenter import Rod
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
+from memscal.progress import counted
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
@@ -343,14 +344,17 @@ def reference_sensitivities(
     # Scans share the error of a common film or rod, and that of the film's law.
     changes: dict[str, list[FloatArray]] = {}
     of_inputs = film_sensitivities, rod_sensitivities, law_sensitivities
-    for sensitivities, of in zip(of_inputs, ("film", "indenter", "law"), strict=True):
+    inputs = zip(of_inputs, ("film", "indenter", "law"), strict=True)
+    todo = [(function, of, i) for function, of in inputs for i in range(len(scans))]
+    found = (f(scans[i], references[i]) if scans[i].film else {} for f, _, i in todo)
+    done = counted(found, "uncertain inputs", len(todo))
+    for (_, of, i), by_source in zip(todo, done, strict=True):
         owners = [getattr(scan, of, None) for scan in scans]
-        for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
-            number = list(dict.fromkeys(owners)).index(owner)
-            suffix = f"_{number + 1}" if number else ""
-            for source, change in (sensitivities(scan, references[i]) if scan.film else {}).items():
-                blank = [np.zeros_like(change) for _ in scans]
-                changes.setdefault(source + suffix, blank)[i] = change
+        number = list(dict.fromkeys(owners)).index(owners[i])
+        suffix = f"_{number + 1}" if number else ""
+        for source, change in by_source.items():
+            blank = [np.zeros_like(change) for _ in scans]
+            changes.setdefault(source + suffix, blank)[i] = change
     return changes
 
 

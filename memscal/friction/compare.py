@@ -43,6 +43,7 @@ from memscal.model.provenance import accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
+from memscal.progress import Listener, reported
 
 
 def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredScan]:
@@ -128,6 +129,7 @@ _REACH = 1.5
 _MM = 1e-3
 
 
+@reported
 @single_threaded()
 def compare(
     contacts: Contacts,
@@ -145,6 +147,7 @@ def compare(
     accept_altered: bool = False,
     cache: CacheFolder = None,
     workers: int = 1,
+    progress: Listener = None,  # noqa: ARG001 - @reported
 ) -> FrictionComparison:
     r"""Hold measured stress against calculated contacts, and find the friction that explains it.
 
@@ -190,6 +193,8 @@ def compare(
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
         Processes that calculate contacts.
+    progress : callable or True, optional
+        Told how many loads are measured and contacts calculated: :class:`memscal.Progress`.
 
     Returns
     -------
@@ -443,6 +448,7 @@ def _pairs(
     return tuple(pair for pair in pairs if pair is not None)
 
 
+@reported
 @single_threaded()
 def compare_shear(
     measured: MeasuredStress | str | PathLike[str],
@@ -454,6 +460,7 @@ def compare_shear(
     accept_altered: bool = False,
     cache: CacheFolder = None,
     workers: int = 1,
+    progress: Listener = None,  # noqa: ARG001 - @reported
 ) -> ShearComparison:
     r"""Find the friction that explains a tangential channel's voltage under a sphere.
 
@@ -480,6 +487,8 @@ def compare_shear(
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
         Processes that calculate contacts.
+    progress : callable or True, optional
+        Told how many loads are measured and contacts calculated: :class:`memscal.Progress`.
 
     Returns
     -------

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -28,6 +29,7 @@ from memscal.model.arrays import FloatArray, FrozenArrays, finite_vector, requir
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
+from memscal.progress import counted
 from memscal.version import __version__
 
 FRICTION_SCALE = 0.3
@@ -209,11 +211,12 @@ def solve_paths(
     paths: Sequence[LoadingPath], k: FloatArray, *, workers: int
 ) -> list[dict[str, FloatArray]]:
     """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes."""
-    several = min(workers, len(paths))
-    if several < 2:
-        return [_solve(path, k) for path in paths]
-    with worker_pool(several) as pool:
-        return list(pool.map(_solve, paths, [k] * len(paths)))
+    with ExitStack() as stack:
+        solve: Any = map
+        if (several := min(workers, len(paths))) > 1:
+            solve = stack.enter_context(worker_pool(several)).map
+        solved, total = solve(_solve, paths, [k] * len(paths)), sum(len(p.loads) for p in paths)
+        return list(counted(solved, "contacts", total, lambda arrays: arrays["depths"].size))
 
 
 def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:

@@ -18,6 +18,7 @@ from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
+from memscal.measurement.single_loads import load_of, single_loads
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
@@ -26,6 +27,7 @@ from memscal.model.provenance import Process, accepted_alterations, timestamp
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT
 from memscal.parallel import single_threaded
+from memscal.progress import Listener, counted, reported
 from memscal.version import __version__
 
 #: Sources of a force's uncertainty that all profiles have in common.
@@ -115,6 +117,7 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
 _OF_ALL_PROFILES = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NOISE_UNSTATED)
 
 
+@reported
 @single_threaded()
 def measure_stress(
     scan: Scans,
@@ -122,6 +125,7 @@ def measure_stress(
     *,
     override: bool = False,
     accept_altered: bool = False,
+    progress: Listener = None,  # noqa: ARG001 - @reported
 ) -> MeasuredStress:
     r"""Turn contact scans into measured stress, load by load.
 
@@ -142,6 +146,8 @@ def measure_stress(
         ``overridden``.
     accept_altered : bool
         Accept files whose content does not fit their digest; recorded like what is overridden.
+    progress : callable or True, optional
+        Told how many loads are done: :class:`memscal.Progress`.
 
     Returns
     -------
@@ -176,15 +182,16 @@ def measure_stress(
     for data in scans:
         require_span(data)
     origins = tuple(one_load.measured_scan(data) for data in scans)
-    singles = [one_load.single_loads(data) for data in scans]
+    singles = [single_loads(data) for data in scans]
     for single in chain(*singles):
         restore.require_contact_size(single, MOST_OF_CONTACT)
-    loads = [
+    loads = (
         _measure(origin, single, sensor)
         for origin, of_scan in zip(origins, singles, strict=True)
         for single in of_scan
-    ]
-    profiles, restored, notes = zip(*loads, strict=True)
+    )
+    measured = counted(loads, "loads", sum(map(len, singles)))
+    profiles, restored, notes = zip(*measured, strict=True)
     checks = stress_checks(profiles, restored)
     return MeasuredStress(
         profiles=profiles,
@@ -280,7 +287,7 @@ def _prepared(
 
 
 def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
-    problem = f"{one_load.load_of(scan)}: {failure.problem}"
+    problem = f"{load_of(scan)}: {failure.problem}"
     return type(failure)(problem, why=failure.why, cure=failure.cure)
 
 

@@ -20,6 +20,7 @@ from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
+from memscal.measurement.single_loads import scan_at_load
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
@@ -61,7 +62,7 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
             f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
             why=f"The contact of a {scan.set_up.indenter.shape} grows with its load: each has a "
             "stress of its own.",
-            cure="Give the scan of one load.",
+            cure="Choose one of them by load (--load), or give the scan of one load.",
         )
 
 
@@ -258,6 +259,7 @@ def restore(
     scan: Scan | str | PathLike[str],
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
+    load: float | None = None,
     expected: Expected = None,
     override: bool = False,
     accept_altered: bool = False,
@@ -274,6 +276,8 @@ def restore(
         Voltage against the indenter's position, at one load; a rod's loads may differ.
     apparatus : ApparatusFunction or path
         The calibrated sensor.
+    load : float, optional
+        Which load of a scan of several, in N, to within 5 %.
     expected : StressProfile, Contact or path, optional
         A calculated base stress to hold against the restored one: adds a check.
     override : bool
@@ -303,6 +307,7 @@ def restore(
     """
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     measured = opened_scan(scan, accept_altered=accept_altered)
+    measured = measured if load is None else scan_at_load(measured, load)
     if isinstance(expected, str | PathLike):
         expected = read_reference(expected, accept_altered=accept_altered)
     require_measurement(measured, sensor)

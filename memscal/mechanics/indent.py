@@ -1,7 +1,7 @@
 """Indentation of a film by a rigid indenter: the entry point of the mechanics."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, overload
 
@@ -19,6 +19,7 @@ from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.film import LINEAR, ElasticFilm, more_and_less
 from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
+from memscal.progress import Listener, reported
 
 _Several = Sequence[float] | FloatArray
 
@@ -35,7 +36,7 @@ def indent(
     friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
     interface: Interface | None = None, strain: str | None = None,
     film_radius: float | None = None, rings: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Listener = None,
 ) -> Contact: ...  # fmt: skip
 @overload
 def indent(
@@ -44,8 +45,9 @@ def indent(
     friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
     interface: Interface | None = None, strain: str | None = None,
     film_radius: float | None = None, rings: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Listener = None,
 ) -> list[Contact]: ...  # fmt: skip
+@reported
 @single_threaded()
 def indent(
     film: ElasticFilm,
@@ -60,7 +62,7 @@ def indent(
     strain: str | None = None,
     film_radius: float | None = None,
     rings: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Listener = None,  # noqa: ARG001 - @reported
 ) -> Contact | list[Contact]:
     r"""Press a rigid indenter on a bonded film, to a load or to a depth.
 
@@ -95,8 +97,8 @@ def indent(
     rings : int, optional
         Rings from the axis to the largest contact, at least 16.  By default they are doubled
         until base stress, load and depth change by less than 1e-4.
-    progress : callable, optional
-        At finite strain it is called with the share of the work that is done, from 0 to 1.
+    progress : callable or True, optional
+        Told how far it is, of loads or of the loading at finite strain: :class:`memscal.Progress`.
 
     Returns
     -------
@@ -156,7 +158,7 @@ def indent(
     # Without friction there is nothing for a slip length to act on.
     rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
     if strain == "finite":
-        contacts = press_at_finite_strain(request, progress)
+        contacts = press_at_finite_strain(request)
     elif isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel":
         contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:

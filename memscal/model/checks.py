@@ -21,6 +21,90 @@ REPEAT_CENTRES = "repeat_centres"
 OVERRIDE = "override"
 
 
+_EXPLAINED = """\
+reconvolution: scan against G convolved with the reference, or the restored stress blurred
+    the result misses something: if chi_square passes, calibrate by method bayesian
+constraint: rise of chi-square by --option nonnegative=true or monotone=true
+    the scan contradicts the constraint: leave it out
+gaussian_misfit: scan against the best Gaussian convolved with the reference
+    G is not Gaussian: use G, not gaussian_sigma
+method_agreement: division against Bayesian estimate, in A and G(r), over what noise explains
+    one follows a feature that the other does not: compare both G(r) and the residuals
+width_agreement: width of G against that of the Gaussian, in standard uncertainties without misfit
+    one width does not describe G: use the profile
+shape_width: full width of G at half maximum over a Gaussian's, or the inverse
+    G is a spike or has lobes far out: use white-noise or bayesian
+shape_negative: share of the integral of abs(G) where G is negative
+    G consists of ripples: use white-noise or bayesian
+shape_roughness: share of the power of G beyond 1.5 times the wavenumbers that the scan determines
+    the detail of G is noise: use white-noise or bayesian
+width_over_thickness: width of G over the film's thickness
+    check the units of positions and thickness
+resolved_band: the Gaussian's transfer function at the end of the resolved band
+    average repeats, or raise the load
+tail_share: share of the voltage's integral beyond the scan
+    scan farther
+baseline_drift: change of the baseline across the scan over the largest signal
+    let amplifier and film settle; scan faster
+reference_force: total force of the reference against its load
+    check the reference's load and the reach of its table
+indentation: depth of the rod over the film's thickness
+    give the film's law (--film-law), leave it out, or calibrate at a lighter load
+outliers: share of points with less than half of their weight
+    find out what disturbs these points
+saturation: number of points at a ceiling near the largest voltage (not of a shear)
+    lower gain or load, scan again; the check names the points
+noise_as_stated: scatter over the stated noise
+    look for noise of position and load; state the actual noise
+chi_square: residuals that no radial G, or no radial stress, explains, against the noise
+    check the reference (rod, film), baseline and stated noise; whether a contact is round
+residual_runs: runs of residuals of one sign
+    look for a step or bend of the baseline, a wrong reference, slow noise
+residual_correlation: correlation of neighbouring residuals
+    as residual_runs; or state a known correlation of the noise (u_zz_correlation)
+gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
+    use G; the check names the kind of departure
+symmetry: difference of left and right (lines); even part of a shear
+    look for a tilted rod, an uneven film, a drifting load
+axisymmetry: ellipticity of the sensor or of the contact (rasters)
+    contact or sensor is not round; of a calibration G(r) is a mean over directions
+load_linearity: change of A with the load (several loads)
+    calibrate at the load of use
+hysteresis: difference of approach and retreat, in A, position and baseline
+    wait before each reading, come from the same side, or calibrate with one branch
+repeat_centres: a centre for each repeat of a line against one for all (F ratio)
+    stage or sensor moved: --centre per-repeat, the default then
+held_out_repeat: each repeat against its prediction from the others; the worst
+    look at the repeat that it names
+held_out_load: each load against its prediction from the others; the worst
+    calibrate at the load of use; check the load cell's scale
+held_out_scan: each scan against its prediction from the others; the worst
+    calibrate the scans one by one and compare
+applied_force: total force of a profile against its load, in standard uncertainties; not A
+    gain, load or a unit differ between calibration and scan
+applied_force_all: mean of total forces over loads against one, in standard uncertainties; not A
+    gain, loads or a unit differ between calibration and scans
+restored_force: restored total force against the load, in standard uncertainties; not A
+    gain, load or a unit differ from the calibration, or Poisson's ratio is wrong
+expected_stress: scan against the expected stress blurred by A G, chi-square per degree
+    the contact is not as it was calculated: friction, shape, film, or load
+profile_chi_square: one load against the friction that explains it best, chi-square per degree
+    no contact explains it: check noise, scatter of loads, shape, film, gain and load
+bracketing: share of a load's points outside of what no friction and full stick give
+    friction alone does not explain the stress: look at the profile's figure
+joint_chi_square: all loads of a kind against one friction coefficient, chi-square per degree
+    alone: friction changes with the load, see the coefficient of each, or --interface
+lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
+    they have friction, or A, load or thickness is wrong: the dry ones are doubtful
+"""
+_LINES = _EXPLAINED.splitlines()
+_NAMED = [line.partition(": ") for line in _LINES[::2]]
+EXPLANATIONS = {
+    name: (tests, cure.strip()) for (name, _, tests), cure in zip(_NAMED, _LINES[1::2], strict=True)
+}
+"""What each kind of check tests, and what to do if it fails; docs/quality.md has the same."""
+
+
 @dataclass(frozen=True)
 class Message:
     """One message that accompanies a result.

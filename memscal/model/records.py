@@ -313,7 +313,7 @@ PLAN = (
 EXPECTED = (*measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")), TRANSFER.quantities[-1])
 """What a planned scan is expected to give beside its parameters."""
 
-FORCE_BUDGET = Quantity("force_budget", _COUNT, "uncertainty of the force by source, in N")
+FORCE_BUDGET = Quantity("force_budget", "force", "uncertainty of it by source", axes=("source",))
 MAXIMUM_BUDGET = Quantity("maximum_budget", _P, "that of the maximum", axes=("source",))
 APPLIED = (
     *measured(Quantity("conversion_constant", _A, "conversion constant A")),
@@ -342,7 +342,7 @@ FRICTION = Quantity("friction", _ONE, "friction coefficient", "μ")
 SLIP_LENGTH = Quantity("length", _L, "slip length", shown="um")
 
 ESTIMATE_FIT = (
-    Quantity("budget", _ONE, "standard uncertainty by source", axes=("source",)),
+    Quantity("budget", _COUNT, "standard uncertainty by source", axes=("source",)),
     Quantity("least", _COUNT, "least chi-square", "χ²", label="chi2"),
     *FIT[1:],
 )
@@ -359,7 +359,7 @@ COMPARED_MAXIMA = (
 """What was measured at one load: the profile's force, maxima beside the frictionless ones."""
 
 CALCULATED = (
-    Quantity("friction", _COUNT, "friction coefficient", "μ", label="friction_coefficient"),
+    Quantity("friction", _ONE, "friction coefficient", "μ", label="friction_coefficient"),
     Quantity("sticking", "truth", "whether nothing slips"),
     Quantity("p_max", _P, "largest calculated stress"),
     FIT[0],

@@ -6,6 +6,7 @@ Both import the results, so that they are imported when a method is called.
 
 from __future__ import annotations
 
+from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -23,9 +24,9 @@ class Result:
     """A result that prints, tabulates and draws itself.
 
     ``_summary`` names the module of :mod:`memscal.summaries` with the functions
-    ``tables(result)``, ``mapping(result)`` and, where there is one, ``dataset(result)``,
-    ``frame(result)`` and ``correlated(result)``; ``_figure`` names the module and function of
-    :mod:`memscal.figures` that draws it.
+    ``tables(result)``, ``mapping(result)`` and, where there is one, ``answer(result)``,
+    ``dataset(result)``, ``frame(result)`` and ``correlated(result)``; ``_figure`` names the module
+    and function of :mod:`memscal.figures` that draws it.
     """
 
     _summary: ClassVar[str]
@@ -35,16 +36,23 @@ class Result:
         """Return the tables of the result, those without rows left out."""
         return [table for table in self._told("tables") if table.rows]
 
+    def answer(self) -> str:
+        """Return what the result says, in about two lines; empty where only its tables do."""
+        told = getattr(import_module(f"memscal.summaries.{self._summary}"), "answer", None)
+        return str(told(self)) if told else ""
+
     def summary(self) -> str:
-        """Return the tables of the result as text, as the command line prints them."""
-        return "\n\n".join(table.plain() for table in self.tables())
+        """Return answer and tables of the result as text, as the command line prints them."""
+        text: str = import_module("memscal.summaries.table").text_of(self.answer(), self.tables())
+        return text
 
     def __str__(self) -> str:
         """Return the summary."""
         return self.summary()
 
     def _repr_html_(self) -> str:
-        return "\n".join(table.html() for table in self.tables())
+        answer = f"<p>{escape(self.answer())}</p>\n" if self.answer() else ""
+        return answer + "\n".join(table.html() for table in self.tables())
 
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them."""

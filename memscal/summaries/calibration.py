@@ -22,12 +22,10 @@ from memscal.summaries.declared import (
     parameter_json,
     record_arrays,
 )
-from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
+from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
 Calibrated: TypeAlias = Calibration | ApparatusData
 
-_IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "centre",
-            "baseline")  # fmt: skip
 _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm",
                "noise_equivalent_area")  # fmt: skip
 #: What scans tell of the film, where they do.
@@ -47,7 +45,7 @@ def tables(result: Calibrated) -> list[Table]:
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
         rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
         rows.append(("reconvolution with the Gaussian", "", _misfit(gaussian)))
-    title = f"{advice(apparatus)}\n{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
+    title = f"{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
     shown = [Table(title, ("", "", ""), rows)]
     if (other := apparatus.other) is not None:
         title = f"The same by method {other.method}, to compare"
@@ -55,20 +53,21 @@ def tables(result: Calibrated) -> list[Table]:
     return [*shown, checks_table(apparatus.checks)]
 
 
-def advice(apparatus: ApparatusData) -> str:
+def answer(result: Calibrated) -> str:
     """Return which A and which description of G to use, and why."""
+    apparatus = apparatus_of(result)
     parameters, method = apparatus.parameters, _method(apparatus)
     failed = [c.name for c in apparatus.checks if c.name in _OF_GAUSSIAN and not c.passed]
     which = (
-        f"its Gaussian of σ = {measured_text(parameters, 'gaussian_sigma')} suffices: the scan "
-        "shows no departure from it."
+        f"Its Gaussian of σ = {measured_text(parameters, 'gaussian_sigma')} suffices: the scan "
+        "shows no departure."
         if not failed
-        else f"use G(r), for the Gaussian fails the check {' and '.join(failed)}."
+        else f"Use G(r), for the Gaussian fails the check {' and '.join(failed)}."
     ).replace("_", " ")
     by = f" (method {method})" if method else ""
     a = measured_text(parameters, "conversion_constant")
     a = a.replace("(relative)", "(relative: the load is not known)")
-    return f"{_of_the_law(apparatus)}Use A = {a}{by}; {which}"
+    return f"Use A = {a}{by}. {verdict(apparatus.checks)}\n{which}{_of_the_law(apparatus)}"
 
 
 def _of_the_law(apparatus: ApparatusData) -> str:
@@ -80,8 +79,8 @@ def _of_the_law(apparatus: ApparatusData) -> str:
     if not dominated or apparatus.film is None or apparatus.film.law:
         return ""
     return (
-        "The film's law, which is not stated, dominates the uncertainty: it makes up "
-        f"{' and '.join(dominated)}.\n"
+        "\nThe film's law, which is not stated, dominates the uncertainty: it makes up "
+        f"{' and '.join(dominated)}."
     )
 
 
@@ -110,7 +109,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     values: dict[str, Any] = {
         "schema_version": "1",
         "method": _method(apparatus) or None,
-        **{name: parameter_json(parameters, name) for name in _IN_JSON if name in parameters},
+        **{name: parameter_json(parameters, name) for name in parameters.names},
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
         "film_law": (apparatus.film and apparatus.film.law) or None,

@@ -19,7 +19,7 @@ from memscal.friction.results import (
 )
 from memscal.model import records
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
@@ -27,7 +27,7 @@ from memscal.model.quantities import MM, measured
 from memscal.summaries import interface_laws
 from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members
 from memscal.summaries.interface_laws import friction_name
-from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
+from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
@@ -195,7 +195,7 @@ def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
         **members(records.ESTIMATE_FIT, estimate),
         "lubricated_beside": estimate.beside,
         "profile_likelihood": {
-            "friction_coefficient": _shortened(estimate.values),
+            "friction_coefficient": {"value": _shortened(estimate.values), "unit": "1"},
             "deviance": _shortened(estimate.deviance),
         },
     }
@@ -210,8 +210,7 @@ _FAR = 0.26
 
 
 def notes(comparison: FrictionComparison) -> Iterator[Message]:
-    """Return what a user should know, each thing once; what failed of several profiles, once."""
-    others = (message for message in comparison.messages if message.kind != FAILED_CHECK)
+    """Return what a user should know, each thing once."""
     laws = comparison.interface
     of_laws = () if laws is None else laws.messages
     texts = (
@@ -220,7 +219,7 @@ def notes(comparison: FrictionComparison) -> Iterator[Message]:
         if joint.reason
     )
     missing = (Message("no_value", text[:1].upper() + text[1:]) for text in texts)
-    about = (*_failed(comparison), *others, *missing, *_about_profiles(comparison), *of_laws)
+    about = (*comparison.messages, *missing, *_about_profiles(comparison), *of_laws)
     yield from dict.fromkeys(about)
 
 
@@ -250,28 +249,30 @@ def _by_kind(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
     return kinds
 
 
-def failures(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
-    """Return the checks that failed, by kind."""
-    return _by_kind(check for check in checks if not check.passed)
-
-
-def _failed(comparison: FrictionComparison) -> Iterator[Message]:
-    """Return one warning for each kind of check that failed, about the first profile."""
-    for first, *others in failures(comparison.checks).values():
-        [message] = failed_check_messages([first])
-        numbers = ", ".join(check.profile for check in others)
-        text = f"{message.text} The same of profiles {numbers}." if others else message.text
-        yield replace(message, text=text)
-
-
 def _which(lubrication: str, loading: str) -> str:
     words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
     return ", ".join(word for word in words if word)
 
 
+def answer(comparison: FrictionComparison | ShearComparison) -> str:
+    """Return the coefficients of all loads with their intervals, and how the checks stand."""
+    held = any(joint.beside for *_, joint in _joint(comparison))
+    lines = []
+    for lubrication, by_loading in comparison.joint.items():
+        ways: dict[str, str] = {}
+        for loading, joint in by_loading.items():
+            ways.setdefault(str(joint), loading)
+        told = ", ".join(f"{text} {way}" if len(ways) > 1 else text for text, way in ways.items())
+        equals = {"n": " is", "[": " in"}.get(told[0], " =" if told[0].isdigit() else "")
+        level = "" if "%" in told else f" ({percent(joint.interval.level)})"
+        beside = ", held at 0 beside dry" if held and lubrication == "lubricated" else ""
+        name = (lubrication or "all contacts").capitalize()
+        lines.append(f"{name}: μ{equals} {told}{level}{beside}.")
+    checks = comparison.checks if isinstance(comparison, FrictionComparison) else ()
+    return ("\n".join(lines) + f" {verdict(checks)}").strip()
+
+
 _LABELS = ("", "state", "load (N)")
-#: No table is wider than this many columns of text.
-_WIDTH = 98
 #: From here on chi-square is written without a decimal, and as a power of ten.
 _WIDE, _LONG = 100, 1e5
 
@@ -284,7 +285,7 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
     return [
         _maxima_table(comparison),
         *friction,
-        *(table for way in comparison.loadings for table in _likelihood_tables(comparison, way)),
+        *(_likelihood_table(comparison, loading) for loading in comparison.loadings),
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
@@ -309,7 +310,7 @@ def _maxima_table(comparison: FrictionComparison) -> Table:
         ]
         for i, load in enumerate(comparison.loads[comparison.loadings[0]], start=1)
     ]
-    return Table(title, head, rows)
+    return Table(title, head, rows, labels=len(_LABELS))
 
 
 def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
@@ -348,7 +349,8 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
             name += ", with shear" if sheared else ""
             cells = [str(joint), *fit(joint)]
             rows.append(["", name, "all", *(cells if shear else ["", *cells, ""])])
-    return Table(f"Effective friction coefficient, {way} [{level} interval]", head, rows)
+    title = f"Effective friction coefficient, {way} [{level} interval]"
+    return Table(title, head, rows, labels=len(_LABELS))
 
 
 def _fit(reading: BoundedEstimate) -> tuple[str, str]:
@@ -357,34 +359,16 @@ def _fit(reading: BoundedEstimate) -> tuple[str, str]:
     return f"{reading.least / reading.degrees:.2f}", f"{reading.p_value:.2g}"
 
 
-def _likelihood_tables(comparison: FrictionComparison, loading: str) -> Iterator[Table]:
-    """Return what each load says of each calculated profile, in as few tables as fit."""
-    loads = comparison.loads[loading]
+def _likelihood_table(comparison: FrictionComparison, loading: str) -> Table:
+    """Return what each load says of each calculated profile."""
     way = f"{loading} loading" if loading else "profiles as given"
-    labels = [[*_labels(i, load.profile), f"{load.degrees}"] for i, load in enumerate(loads, 1)]
-    head = [*_LABELS, "ν"]
-    columns = [
-        [friction_name(float(mu)), *(_short(float(load.deviance[i])) for load in loads)]
-        for i, mu in enumerate(comparison.friction)
+    rows = [
+        [*_labels(i, load.profile), f"{load.degrees}", *(_short(float(d)) for d in load.deviance)]
+        for i, load in enumerate(comparison.loads[loading], start=1)
     ]
-    room = _WIDTH - sum(2 + max(map(len, column)) for column in zip(head, *labels, strict=True))
-    for fitting in _fitting(columns, room):
-        values = zip(*(column[1:] for column in fitting), strict=True)
-        rows = [[*label, *row] for label, row in zip(labels, values, strict=True)]
-        title = f"-2 ln(p/p_max) of each profile by friction coefficient, {way}"
-        yield Table(title, [*head, *(column[0] for column in fitting)], rows)
-
-
-def _fitting(columns: Sequence[list[str]], room: int) -> Iterator[list[list[str]]]:
-    """Divide columns among tables none of which is wider than there is room for."""
-    fitting: list[list[str]] = []
-    for column in columns:
-        widths = [2 + max(map(len, cells)) for cells in (*fitting, column)]
-        if fitting and sum(widths) > room:
-            yield fitting
-            fitting = []
-        fitting.append(column)
-    yield fitting
+    head = [*_LABELS, "ν", *(friction_name(float(mu)) for mu in comparison.friction)]
+    title = f"-2 ln(p/p_max) of each profile by friction coefficient, {way}"
+    return Table(title, head, rows, labels=len(_LABELS))
 
 
 def _short(value: float) -> str:

@@ -21,26 +21,29 @@ else:  # their libraries are imported when they are needed
     DataFrame = Dataset = Any
 
 _UNCERTAINTY = "_uncertainty"
+#: Endings of names of what stands beside a quantity in JSON, in its unit, and as what.
+_BESIDE = {
+    _UNCERTAINTY: "standard_uncertainty",
+    "_errors": "standard_uncertainty",
+    "_budget": "budget",
+}
 
 
 def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
     """Return an object's quantities as JSON holds them; ``values`` stand in for attributes."""
-    # In the units in which they are shown: a number stands with its unit and, where that is
-    # declared, its standard uncertainty; an array or a budget by source has it in its key.
+    # In the units in which they are shown: a number or an array stands with its unit and, where
+    # they are declared, its standard uncertainty and the budget of it; counts, statistics and
+    # text stand alone.
     declared, held = by_name(quantities), {}
     for name, quantity in declared.items():
         key = quantity.label or name
         if quantity.dimension not in DIMENSIONS:
             held[key] = plain(_value(name, holder, values))
-        elif quantity.axes:
-            unit = quantity.unit.lower().replace("/", "_per_")
-            key = f"{key}_{unit}" if unit else key
-            held[key] = plain(_value(name, holder, values), quantity.scale)
-        elif not name.endswith(_UNCERTAINTY):
+        elif not name.endswith(tuple(_BESIDE)):
             held[key] = {"value": plain(_value(name, holder, values), quantity.scale)}
-            if (spread := name + _UNCERTAINTY) in declared:
-                u = plain(_value(spread, holder, values), quantity.scale)
-                held[key]["standard_uncertainty"] = u
+            for ending, beside in _BESIDE.items():
+                if (other := name + ending) in declared:
+                    held[key][beside] = plain(_value(other, holder, values), quantity.scale)
             held[key]["unit"] = quantity.unit_text
     return held
 

@@ -97,7 +97,7 @@ def mapping(planned: Design) -> dict[str, Any]:
         "planned": True,
         "method": planned.method,
         "plan": declared.members(PLAN, planned.plan),
-        "wanted_si": dict(planned.want),
+        "wanted": {name: _wanted(name, value) for name, value in planned.want.items()},
         "expected": {
             name: {
                 **declared.parameter_json(planned.parameters, name),
@@ -108,6 +108,11 @@ def mapping(planned: Design) -> dict[str, Any]:
         },
         **declared.members(EXPECTED, planned, **axis),
     }
+
+
+def _wanted(name: str, value: float) -> dict[str, Any]:
+    resolved = name == "resolved"
+    return {"value": value / (PER_MM if resolved else 1), "unit": "rad/mm" if resolved else "1"}
 
 
 def dataset(planned: Design) -> declared.Dataset:

@@ -12,7 +12,7 @@ from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
 from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
 from memscal.summaries import declared
 from memscal.summaries.declared import DataFrame, Dataset, members
-from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
+from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
 _SHOWN_RADII = 9
 #: The table of the stress ends where it has fallen to this share of its maximum.
@@ -72,6 +72,16 @@ def mapping(restored: Restoration) -> dict[str, Any]:
         "checks": checks_json(restored.checks),
         "warnings": texts_of(restored.messages),
     }
+
+
+def answer(restored: Restoration) -> str:
+    """Return stress on the axis and total force."""
+    shown, values = by_name(_determined(restored)), _values(restored)
+    axis, force = (declared.cell(shown[name], restored, **values) for name in _NUMBERS[1::-1])
+    return (
+        f"Stress on the axis {axis}; force {force} at {restored.scan.load:.4g} N.\n"
+        f"{verdict(restored.checks)}"
+    )
 
 
 def tables(restored: Restoration) -> list[Table]:

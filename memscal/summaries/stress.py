@@ -9,7 +9,7 @@ from memscal.model import records
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import MM, Quantity, by_name
 from memscal.summaries import declared
-from memscal.summaries.table import Table, checks_json, checks_table, texts_of
+from memscal.summaries.table import Table, checks_json, checks_table, texts_of, verdict
 
 _NUMBERS = by_name(records.STRESS_NUMBERS.quantities)
 _QUANTITIES = by_name(records.STRESS_PROFILE.quantities) | _NUMBERS
@@ -52,6 +52,23 @@ def _centre(profile: MeasuredProfile) -> dict[str, Any]:
     """Return the centre along the scan, in m."""
     u = profile.centre_uncertainty[profile.axis]
     return {"centre": profile.centre[profile.axis], "centre_uncertainty": u}
+
+
+def answer(stress: MeasuredStress) -> str:
+    """Return how large the stress is, and whether the force is the load."""
+    profiles, force = stress.profiles, records.APPLIED[2]
+    lightest = min(profiles, key=lambda profile: profile.load)
+    strongest = max(profiles, key=lambda profile: profile.maximum)
+    texts = [
+        f"{declared.cell(_NUMBERS['maximum'], profile)} at {profile.load:.4g} N"
+        for profile in ([lightest, strongest] if strongest is not lightest else [lightest])
+    ]
+    number = f"{len(profiles)} profile{'s' if len(profiles) > 1 else ''}"
+    ratio = declared.cell(force, stress, **_force_over_load(stress))
+    return (
+        f"S_zz up to {', '.join(texts)}.\n"
+        f"{number}: total force over applied load {ratio}. {verdict(stress.checks)}"
+    )
 
 
 def tables(stress: MeasuredStress) -> list[Table]:

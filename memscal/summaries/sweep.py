@@ -40,9 +40,9 @@ def tables(result: Sweep) -> list[Table]:
 
 def mapping(result: Sweep) -> dict[str, Any]:
     """Return the whole sweep: lists over amplitudes, and lists of draws within them."""
-    return {"amplitude": plain(result.amplitude)} | {
+    return {"amplitude": {"value": plain(result.amplitude), "unit": "1"}} | {
         quantity.name: {
-            "values": plain(getattr(result, quantity.name), quantity.scale),
+            "value": plain(getattr(result, quantity.name), quantity.scale),
             "draws": plain(getattr(result, draws), quantity.scale),
             "unit": quantity.unit_text,
         }

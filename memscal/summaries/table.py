@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import zip_longest
 from typing import Any, TextIO
 
 from memscal.model.checks import Message, QualityCheck
@@ -20,7 +21,7 @@ _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 # How a character is written where the terminal's encoding lacks it.
 _PLAIN = dict(zip("×²Δ₀µ–", "x2d0u-", strict=True)) | {
-    "±": "+/-", "σ": "sigma", "χ": "chi", "ν": "nu", "…": "..."
+    "±": "+/-", "σ": "sigma", "χ": "chi", "ν": "nu", "μ": "mu", "…": "..."
 }  # fmt: skip
 
 
@@ -74,6 +75,14 @@ def checks_table(checks: Sequence[QualityCheck], *, meanings: bool = False) -> T
     return Table("Quality checks", head, rows, failed)
 
 
+def verdict(checks: Sequence[QualityCheck]) -> str:
+    """Return as a sentence how many checks passed, and the kinds of those that failed."""
+    failed = [check.kind.replace("_", " ") for check in checks if not check.passed]
+    if not failed:
+        return f"All {len(checks)} checks passed." if checks else ""
+    return f"{len(failed)} of {len(checks)} checks FAILED: {', '.join(dict.fromkeys(failed))}."
+
+
 def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
     """Return the entry ``checks`` of a command's JSON object."""
     return [
@@ -88,30 +97,89 @@ def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
     ]
 
 
+#: Columns of text for which tables are made where no terminal says how many it has.
+WIDTH = 80
 _GAP = "  "
+#: Prose is folded rather than widen its column beyond this.
+_PROSE = 24
+_LETTER = r"[^\W\d_⁰¹²³⁴⁵⁶⁷⁸⁹]"
+#: Where a line may end: between words, not within a number, its uncertainty, unit or interval.
+_BETWEEN_WORDS = re.compile(
+    rf"(?<={_LETTER}) (?![±%=<>\[×/])|(?<={_LETTER}[,;:.)]) |(?<=[,;:.]) (?!inf)(?={_LETTER})"
+)
+
+
+def folded(text: str, width: int) -> list[str]:
+    """Return lines of text of a width, or longer where a number or a path is."""
+    lines = []
+    for paragraph in text.split("\n"):
+        line, *chunks = _BETWEEN_WORDS.split(paragraph)
+        for chunk in chunks:
+            if len(line) + 1 + len(chunk) > width:
+                lines.append(line)
+                line = chunk
+            else:
+                line += f" {chunk}"
+        lines.append(line)
+    return lines
+
+
+_Style = Callable[[str, bool], str]
+"""What makes a line bold, or bold and red where it tells of a failure."""
+
+
+def as_it_is(text: str, _: bool) -> str:
+    """Return text without a style."""
+    return text
+
+
+def text_of(
+    answer: str, tables: Iterable[Table], width: int = WIDTH, style: _Style = as_it_is
+) -> str:
+    """Return an answer, if there is one, and the tables that have rows."""
+    lines = folded(readable(answer), width) if answer else []
+    blocks = [table.plain(width, style) for table in tables if table.rows]
+    head = ["\n".join(style(line, False) for line in lines)] if lines else []
+    return "\n\n".join([*head, *blocks])
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text: its title, names of the columns (or none), cells, and rows that failed."""
+    """A table of text: its title, names of the columns (or none), cells, and rows that failed.
+
+    ``labels``: how many columns at the left say what a row is about.
+    """
 
     title: str
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     marked: frozenset[int] = frozenset()
+    labels: int = 1
 
-    def plain(self) -> str:
-        """Return the table as aligned text, the last column unpadded."""
-        rows = [[readable(cell).replace("\n", " ") for cell in row] for row in self.rows]
-        head = [readable(cell) for cell in self.head]
-        columns = list(zip(*([head] if any(head) else []), *rows, strict=True))
-        widths = [max(len(cell) for cell in column) for column in columns]
-        shown = [head, ["-" * width for width in widths]] if any(head) else []
-        lines = [
-            _GAP + _GAP.join(f"{c:<{w}}" for c, w in zip(row, widths, strict=True)).rstrip()
-            for row in [*shown, *rows]
+    def plain(self, width: int = WIDTH, style: _Style = as_it_is) -> str:
+        """Return aligned text; columns that have no room follow below, beside the same labels."""
+        columns = [
+            [readable(cell).replace("\n", " ") for cell in column]
+            for column in zip(self.head, *self.rows, strict=True)
         ]
-        return "\n".join([readable(self.title), *lines])
+        title = [style(line, False) for line in folded(readable(self.title), width)]
+        parts = [self._part(part, style) for part in _parts(columns, self.labels, width)]
+        return "\n\n".join(["\n".join([*title, *parts[0]]), *("\n".join(p) for p in parts[1:])])
+
+    def _part(self, columns: Sequence[tuple[Sequence[str], int]], style: _Style) -> Iterator[str]:
+        """Yield the lines of columns, each with its width."""
+        cells = [[folded(cell, width) for cell in column] for column, width in columns]
+        for i, row in enumerate(zip(*cells, strict=True)):
+            deepest = max(map(len, row))
+            if i == 0:  # the names stand upon the rule
+                row = tuple([""] * (deepest - len(cell)) + cell for cell in row)
+            for line in zip_longest(*row, fillvalue=""):
+                padded = (f"{c:<{w}}" for c, (_, w) in zip(line, columns, strict=True))
+                text = _GAP + _GAP.join(padded).rstrip()
+                if i or any(self.head):
+                    yield style(text, True) if i - 1 in self.marked else text
+            if i == 0 and any(self.head):
+                yield _GAP + _GAP.join("-" * width for _, width in columns)
 
     def html(self) -> str:
         """Return the table as HTML, each row headed by its first cell, marked rows in bold."""
@@ -129,3 +197,40 @@ class Table:
 
 def _cell(text: str) -> str:
     return escape(printable(text, _LONGEST))
+
+
+def _parts(
+    columns: Sequence[Sequence[str]], labels: int, width: int
+) -> Iterator[list[tuple[Sequence[str], int]]]:
+    """Divide columns, names first, among tables of a width; yield each with its columns' widths."""
+    tight = [max(map(_longest_chunk, column)) for column in columns]
+    folding = [
+        max(least, min(_PROSE, max(map(len, column[1:]), default=0)))
+        for least, column in zip(tight, columns, strict=True)
+    ]
+    part = [*range(labels)]
+    for j in range(labels, len(columns)):
+        if len(part) > labels and sum(folding[i] + len(_GAP) for i in [*part, j]) > width:
+            yield _widened(columns, folding, part, width)
+            part = [*range(labels)]
+        part.append(j)
+    enough = sum(folding[i] + len(_GAP) for i in part) <= width
+    yield _widened(columns, folding if enough else tight, part, width)
+
+
+def _longest_chunk(cell: str) -> int:
+    return max(map(len, _BETWEEN_WORDS.split(cell)))
+
+
+def _widened(
+    columns: Sequence[Sequence[str]], least: Sequence[int], part: Sequence[int], width: int
+) -> list[tuple[Sequence[str], int]]:
+    """Return the columns of a part with widths that use the room that is left, labels first."""
+    room = width - sum(least[i] + len(_GAP) for i in part)
+    missing = {i: max(map(len, columns[i])) - least[i] for i in part}
+    widths = dict(zip(part, (least[i] for i in part), strict=True))
+    for i in sorted(part, key=lambda i: (i > 0, missing[i])):
+        more = max(min(missing[i], room), 0)
+        widths[i] += more
+        room -= more
+    return [(columns[i], widths[i]) for i in part]

@@ -34,9 +34,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
-
-# What is told the share of the work that is done.
-Progress = Callable[[float], None]
+from memscal.progress import counter
 
 _MM = 1e3
 _MPA = 1e6
@@ -62,9 +60,7 @@ _DRAWN_IN = 0.16
 _SAMPLES = np.linspace(0.0, 4.0, 41)
 
 
-def press_at_finite_strain(
-    request: RingRequest, progress: Progress | None = None
-) -> tuple[Contact, ...]:
+def press_at_finite_strain(request: RingRequest) -> tuple[Contact, ...]:
     """Return the contacts at the targets, visited in their order."""
     film, indenter, targets = request.film, request.indenter, request.targets
     friction = request.friction
@@ -93,9 +89,7 @@ def press_at_finite_strain(
             cure="Check the depth and its unit.",
         )
     radius = request.film_radius or _FREE_EDGE * film.thickness
-    return solve_finite_strain(
-        film, indenter, targets, sticking=friction > 0, radius=radius, progress=progress
-    )
+    return solve_finite_strain(film, indenter, targets, sticking=friction > 0, radius=radius)
 
 
 @lru_cache(maxsize=32)
@@ -108,14 +102,13 @@ def solve_finite_strain(
     radius: float = 25e-3,
     refinement: float = 1.0,
     edge: float | None = None,
-    progress: Progress | None = None,
 ) -> tuple[Contact, ...]:
     """Press a rod (edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m)."""
     # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
     # the wall; under a sphere that sticks nothing in the contact moves radially.
     goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
+    tell, rest = counter("the loading", 1.0), 1 - _COARSE_WORK
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
     coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(_COARSE_WORK * x)))
     return tuple(request.solve(refinement, coarse, lambda x: tell(1 - rest + rest * x)))
@@ -143,7 +136,10 @@ class _Request:
     finer: Finer = (1, 1)
 
     def solve(
-        self, refinement: float, coarse: Sequence[Contact] = (), progress: Progress = lambda _: None
+        self,
+        refinement: float,
+        coarse: Sequence[Contact] = (),
+        tell: Callable[[float], None] = lambda _: None,
     ) -> Iterator[Contact]:
         """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
@@ -153,7 +149,7 @@ class _Request:
                 others = coarse[i : i + 1]
                 guesses = map(pressing.interpolated, () if self.path_dependent else others)
                 for share in path.reach(goal, guesses):
-                    progress((i + share) / len(self.goals))
+                    tell((i + share) / len(self.goals))
                 contact = self._contact(pressing, path.states)
                 for other in others:
                     change = relative_change(contact, other, _SAMPLES * self.film.thickness)

@@ -1,0 +1,168 @@
+"""Progress of long work: how much of it is done, to a callback, to the log, or as a bar.
+
+What takes long counts its parts (:func:`counted`, :func:`counter`), wherever in a call it is; a
+public function tells the ``progress`` that it was given of all of them (:func:`reported`).
+"""
+
+import logging
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import wraps
+from html import escape
+from time import monotonic
+from typing import Any, Literal, TypeAlias, TypeVar, cast
+
+_LOG = logging.getLogger("memscal")
+#: Seconds between two lines of the log about one task.
+_EVERY = 10.0
+
+_Item = TypeVar("_Item")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How much of a task is done: what a ``progress`` callback is called with.
+
+    Parameters
+    ----------
+    task : str
+        What is counted: ``"draws"``, ``"contacts"``, ``"loads"``, ``"scans"``, ...
+    done, total : float
+        How many are done, and of how many; of ``"finite strain"`` the share of the work, of 1.
+    seconds : float
+        Since the task began.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> progress = memscal.Progress("contacts", 137, 500, seconds=30.0)
+    >>> print(progress)
+    137 of 500 contacts, 79 s left
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
+    >>> told = []
+    >>> drawn = memscal.monte_carlo(calibration, draws=2, progress=told.append)
+    >>> [(progress.task, progress.done, progress.total) for progress in told]
+    [('draws', 1, 2), ('draws', 2, 2)]
+    """
+
+    task: str
+    done: float
+    total: float
+    seconds: float
+
+    @property
+    def left(self) -> float:
+        """Seconds that the rest takes at the pace so far."""
+        return self.seconds * (self.total - self.done) / self.done if self.done else float("inf")
+
+    def __str__(self) -> str:
+        """Return the count with the time left."""
+        share = f"{self.done:.0%} of {self.task}"
+        text = share if self.total == 1 else f"{self.done:g} of {self.total:g} {self.task}"
+        return f"{text}, {span(self.left)} left" if 0 < self.done < self.total else text
+
+
+Listener: TypeAlias = Callable[[Progress], None] | Literal[True] | None
+"""What is told of progress: a callback, or ``True`` for a bar; ``None`` for what is told now."""
+
+_LISTENER: ContextVar[Callable[[Progress], None] | None] = ContextVar("listener", default=None)
+
+
+def _nobody(_: Progress) -> None:
+    """Hear of tasks within one that is counted: nothing is made of them."""
+
+
+def span(seconds: float) -> str:
+    """Return a time in words: 12 s, 3 min, 2.5 h."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.0f} s"
+
+
+@contextmanager
+def reporting(listener: Listener) -> Iterator[None]:
+    """Have a listener told of all work within."""
+    if listener is None:
+        yield
+        return
+    token = _LISTENER.set(_bar() if listener is True else listener)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(token)
+
+
+def reported(function: _Function) -> _Function:
+    """Have the ``progress`` that a function is given told of all work within it."""
+
+    @wraps(function)
+    def told(*args: Any, progress: Listener = None, **options: Any) -> Any:
+        with reporting(progress):
+            return function(*args, **options)
+
+    return cast("_Function", told)
+
+
+def counter(task: str, total: float) -> Callable[[float], None]:
+    """Begin a task; return what is called with how much of it is done."""
+    listener, start = _LISTENER.get(), monotonic()
+    if listener is _nobody:
+        return lambda _: None
+    said = start
+
+    def tell(done: float) -> None:
+        nonlocal said
+        now = monotonic()
+        progress = Progress(task, done, total, now - start)
+        if now - said >= _EVERY or (said > start and done == total):
+            _LOG.info("%s", progress)
+            said = now
+        if listener is not None:
+            listener(progress)
+
+    return tell
+
+
+def counted(
+    items: Iterable[_Item], task: str, total: float, size: Callable[[_Item], float] = lambda _: 1
+) -> Iterator[_Item]:
+    """Begin a task; return its items, which are told of as they come, each of some size."""
+    tell, rest = counter(task, total), iter(items)
+
+    def each() -> Iterator[_Item]:
+        done = 0.0
+        while True:
+            token = _LISTENER.set(_nobody)
+            try:
+                item = next(rest)
+            except StopIteration:
+                return
+            finally:
+                _LISTENER.reset(token)
+            done += size(item)
+            tell(done)
+            yield item
+
+    return each()
+
+
+def _bar() -> Callable[[Progress], None]:
+    """Return what shows a bar in a notebook, or else a line on standard error."""
+    if "ipykernel" in sys.modules:
+        from IPython.display import HTML, display
+
+        shown = display(HTML(""), display_id=True)
+        bar = '<progress value="{0.done}" max="{0.total}"></progress> {1}'
+        return lambda progress: shown.update(HTML(bar.format(progress, escape(str(progress)))))
+
+    def line(progress: Progress) -> None:
+        end = "\n" if progress.done >= progress.total else ""
+        sys.stderr.write(f"\r{progress!s:<60}{end}")
+        sys.stderr.flush()
+
+    return line
