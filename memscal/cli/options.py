@@ -106,6 +106,9 @@ def options_of(*options: _Adder) -> _Adder:
 
 json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+report_option = option("--report", FILE, metavar="FILE.html")(
+    "Write a report as one HTML page, without other files, network or scripts."
+)
 accept_altered_option = option("--accept-altered", is_flag=True)(
     "Use files although their content does not fit their digest: recorded in the output."
 )
