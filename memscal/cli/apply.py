@@ -7,14 +7,21 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, accept_altered_option, brief_option, option, output_options
+from memscal.cli.options import (
+    FILE,
+    accept_altered_option,
+    brief_option,
+    option,
+    output_options,
+    report_option,
+)
 from memscal.formats.files import together
 
 EXAMPLES = """\b
 Examples:
   memscal apply sensor.apparatus.h5 sphere.h5
   memscal apply sensor.apparatus.h5 dry.h5 lubricated.h5 -o sphere.stress.h5 --figure sphere.png
-  memscal apply sensor.apparatus.h5 sphere.h5 --json --force
+  memscal apply sensor.apparatus.h5 sphere.h5 --report sphere.html --json --force
 """
 
 
@@ -32,6 +39,7 @@ Examples:
     "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
 @brief_option
+@report_option
 @output_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -50,15 +58,15 @@ def command(
     accepted = {name: options[name] for name in ("override", "accept_altered")}
     data = opened_scans(scans, accept_altered=accepted["accept_altered"])
     written = options["output"] or out.beside(scans[0], ".stress.h5")
-    figures = options["figures"]
-    out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
+    figures, report = options["figures"], options["report"]
+    out.prove_writable([written, *figures, report], force=force, inputs=[artifact, *scans])
 
     from memscal.measurement.measure_stress import measure_stress
 
     with out.working("Measuring"):
         stress = measure_stress(data, artifact, **accepted)
     with out.working("Drawing"):
-        drawn = out.rendered(stress.plot, figures)
+        drawn = out.rendered(stress.plot, figures) | out.reported(stress, report)
     with together():
         stress.save(written, overwrite=force)
         out.write_files(drawn, force=force)
@@ -67,6 +75,6 @@ def command(
         else:
             out.emit_result(stress, brief=options["brief"])
     out.show_messages(stress.messages)
-    for path in (written, *figures):
+    for path in (written, *drawn):
         out.message(f"Written: {path}")
     return exit_code_of(stress.checks)

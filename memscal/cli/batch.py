@@ -14,8 +14,9 @@ import click
 from memscal.cli import output as out
 from memscal.cli.calibrate import calibration_options, calibration_settings
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
-from memscal.cli.options import FILE, json_option, option
+from memscal.cli.options import FILE, json_option, option, report_option
 from memscal.errors import MemscalError
+from memscal.formats.files import together
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  memscal batch scans -o results
+  memscal batch scans -o results --report scans.html
   memscal batch wafer.csv -o results --resume --method bayesian --artifacts none
   memscal batch wafer.csv -o results --resume --scheduler tcp://node1:8786
   memscal summary results
@@ -54,6 +55,8 @@ Examples:
     "Of which calibrations artifacts are written, too: of those with a failed check, all, or none."
 )
 @calibration_options
+@report_option
+@option("--force", is_flag=True)("Replace the page of --report; results are never replaced.")
 @json_option
 @debug_option
 def command(
@@ -64,6 +67,8 @@ def command(
     scheduler: str | None,
     shard_size: int | None,
     artifacts: str,
+    report: Path | None,
+    force: bool,
     as_json: bool,
     **settings: Any,
 ) -> int:
@@ -79,12 +84,17 @@ def command(
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
     from memscal.calibration.batch import Batch
+    from memscal.formats.fleet import read_fleet
     from memscal.progress import span
 
     chosen = calibration_settings(**settings)
     source, results = (Path(os.path.realpath(path)) for path in (source, results))
     batch = Batch(source, results, chosen, artifacts, shard_size)
+    if report is not None and results not in Path(os.path.realpath(report)).parents:
+        out.prove_writable([report], force=force, inputs=_inputs(batch, report))
     batch, start = batch.prepare(resume=resume), monotonic()
+    if report is not None:  # in the folder of results, too, which is there now
+        out.prove_writable([report], force=force)
     total = batch.count
     try:
         outcomes = list(_outcomes(batch, workers, scheduler))
@@ -95,20 +105,32 @@ def command(
     kept, seconds = sum(outcome.kept for outcome in outcomes), round(monotonic() - start, 1)
     counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
     counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
-    if as_json:
-        stated = {"schema_version": "1", "results": str(results), **counts}
-        out.emit_json(stated | {"time": {"value": seconds, "unit": "s"}})
-    else:
-        rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
-        out.emit_tables(
-            Table(f"Batch of {source.name}", ("", ""), [*rows, ("time", span(seconds))])
-        )
-    out.message(f"Written: {results}")
+    page = {} if report is None else out.reported(read_fleet(results), report)
+    with together():
+        out.write_files(page, force=force)
+        if as_json:
+            stated = {"schema_version": "1", "results": str(results), **counts}
+            out.emit_json(stated | {"time": {"value": seconds, "unit": "s"}})
+        else:
+            rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
+            rows.append(("time", span(seconds)))
+            out.emit_tables(Table(f"Batch of {source.name}", ("", ""), rows))
+    for path in (results, *page):
+        out.message(f"Written: {path}")
     if not errors + failed:
         return DONE
     what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
     out.warn(f"{what}: memscal summary {results}")
     return CHECK_FAILED
+
+
+def _inputs(batch: Batch, report: Path) -> list[Path]:
+    """Return what a page that is there already may be, and must not replace."""
+    from memscal.formats.fleet import manifest_scans
+
+    if not report.exists():
+        return []
+    return [batch.source, *(batch.folder / scan.path for scan in manifest_scans(batch.source))]
 
 
 def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:

@@ -216,7 +216,7 @@ def calibration_settings(
 )
 @json_option
 @common.brief_option
-@option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
+@common.report_option
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw scan, apparatus function and transfer function. May be repeated."
 )
@@ -291,12 +291,7 @@ def command(
     if draws is not None:
         further["monte_carlo"] = _drawn(calibration, draws, seed)
     with out.working("Drawing"):
-        contents = {}
-        if report is not None:
-            from memscal.figures.report import html_report
-
-            contents[report] = html_report(calibration.apparatus).encode("utf-8")
-        contents |= out.rendered(calibration.plot, figures)
+        contents = out.reported(calibration, report) | out.rendered(calibration.plot, figures)
         if sweep_figure is not None:
             contents |= out.rendered(further["sweep"].plot, [sweep_figure])
     apparatus = calibration.apparatus.compact() if compact else calibration.apparatus

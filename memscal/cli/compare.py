@@ -17,6 +17,7 @@ from memscal.cli.options import (
     brief_option,
     option,
     output_options,
+    report_option,
 )
 from memscal.formats.files import together
 
@@ -55,7 +56,7 @@ EXAMPLES = """\b
 Examples:
   memscal compare sensor.apparatus.h5 dry.h5
   memscal compare sensor.apparatus.h5 dry.stress.h5
-  memscal compare sensor.apparatus.h5 dry.h5 lubricated.h5 --macroscopic 1.6 --figure friction.pdf
+  memscal compare sensor.apparatus.h5 dry.h5 lubricated.h5 --macroscopic 1.6 --report friction.html
   memscal compare sensor.apparatus.h5 dry.h5 --friction 0.1 --friction 0.2 --json
   memscal compare sensor.apparatus.h5 dry.h5 --loading incremental --interface --macroscopic 1.6
   memscal compare sensor.apparatus.h5 dry.h5 --reference fem0.h5 --reference fem03.h5
@@ -121,6 +122,7 @@ Examples:
 )
 @option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
 @brief_option
+@report_option
 @output_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -139,7 +141,7 @@ def command(
     _check_usage(options, scans)
     cache = cache_from(options["cache"], options["no_cache"])
     if options["channel"] != "zz":
-        return _of_shear(artifact, scans[0], cache, options, as_json=as_json)
+        return _of_shear(artifact, scans[0], cache, options, as_json=as_json, force=force)
 
     from memscal.apparatus import load_apparatus
     from memscal.cli.failures import exit_code_of
@@ -158,11 +160,12 @@ def command(
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
     shear = options["shear"] and load_apparatus(options["shear"], **accepted)
     inputs = [artifact, *scans, *options["references"], *filter(None, [options["shear"]])]
-    outputs = figures = [*single, *named.values()]
+    figures, report = [*single, *named.values()], options["report"]
+    outputs = [*figures, report]
     if folder is not None and not folder.is_dir():
         if folder.exists():
             raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
-        outputs = [*single, folder]  # which is made at the end
+        outputs = [*single, folder, report]  # the folder is made at the end
     out.prove_writable(outputs, force=force, inputs=inputs)
 
     with out.working("Comparing with calculated contacts"):
@@ -182,7 +185,7 @@ def command(
             workers=min(2, os.cpu_count() or 1),
         )
     with out.working("Drawing"):
-        ready = out.rendered(comparison.plot, single)
+        ready = out.rendered(comparison.plot, single) | out.reported(comparison, report)
         if named:
             from memscal.figures.friction import comparison_figures
 
@@ -200,13 +203,19 @@ def command(
         else:
             out.emit_result(comparison, brief=options["brief"])
     out.show_messages(notes(comparison))
-    for path in figures:
+    for path in ready:
         out.message(f"Written: {path}")
     return exit_code_of(comparison.checks)
 
 
 def _of_shear(
-    artifact: Path, stress: Path, cache: Path | None, options: Mapping[str, Any], *, as_json: bool
+    artifact: Path,
+    stress: Path,
+    cache: Path | None,
+    options: Mapping[str, Any],
+    *,
+    as_json: bool,
+    force: bool,
 ) -> int:
     """Compare the points of a tangential channel in a file of measured stress."""
     from memscal.apparatus import load_apparatus
@@ -220,6 +229,8 @@ def _of_shear(
         problem = f"The artifact {artifact} is of channel {of_artifact}, not of {channel}."
         cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
         raise InputError(problem, cure=cure)
+    report: Path | None = options["report"]
+    out.prove_writable([report], force=force, inputs=[artifact, stress])
     settings = {"friction": _frictions(options), "loading": options["loadings"]}
     with out.working("Comparing with calculated contacts"):
         comparison = compare_shear(
@@ -231,11 +242,16 @@ def _of_shear(
             workers=min(2, os.cpu_count() or 1),
             **{name: value for name, value in settings.items() if value},
         )
-    if as_json:
-        out.emit_json(comparison.to_dict() | {"artifact": file_json(apparatus.source)})
-    else:
-        out.emit_result(comparison, brief=options["brief"])
+    page = out.reported(comparison, report)
+    with together():
+        out.write_files(page, force=force)
+        if as_json:
+            out.emit_json(comparison.to_dict() | {"artifact": file_json(apparatus.source)})
+        else:
+            out.emit_result(comparison, brief=options["brief"])
     out.show_messages(comparison.messages)
+    for path in page:
+        out.message(f"Written: {path}")
     return DONE
 
 

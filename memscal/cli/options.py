@@ -118,6 +118,9 @@ brief_option = option("--brief", is_flag=True, callback=_one_form)(
     "Print the first lines only, which say what was found."
 )
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+report_option = option("--report", FILE, metavar="FILE.html")(
+    "Write a report as one HTML page, without other files, network or scripts."
+)
 accept_altered_option = option("--accept-altered", is_flag=True)(
     "Use files although their content does not fit their digest: recorded in the output."
 )

@@ -17,6 +17,7 @@ import click
 from memscal.errors import OutputError
 from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import Message
+from memscal.model.result import Result
 from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, text_of
 
 if TYPE_CHECKING:
@@ -222,17 +223,20 @@ def beside(path: Path, suffix: str) -> Path:
     return path.parent / f"{stem}{suffix}"
 
 
-def prove_writable(outputs: Sequence[Path], *, force: bool, inputs: Sequence[Path] = ()) -> None:
-    """Refuse outputs that share a name, and prove that each can be written."""
+def prove_writable(
+    outputs: Iterable[Path | None], *, force: bool, inputs: Sequence[Path] = ()
+) -> None:
+    """Refuse outputs that share a name, and prove that each that is asked for can be written."""
+    wanted = [output for output in outputs if output is not None]
     seen: dict[Path, Path] = {}
-    for output in outputs:
+    for output in wanted:
         real = Path(os.path.realpath(output))
         if real in seen:
             raise click.UsageError(
                 f"Two outputs have the same name: {seen[real]} and {output}. Give each its own."
             )
         seen[real] = output
-    for output in outputs:
+    for output in wanted:
         ensure_writable(output, overwrite=force, inputs=inputs)
 
 
@@ -244,6 +248,11 @@ def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, by
 
     figure = draw()
     return {path: render_figure(figure, figure_format(path.suffix)) for path in paths}
+
+
+def reported(result: Result, path: Path | None) -> dict[Path, bytes]:
+    """Return a result's page as the bytes of its file, if one is asked for."""
+    return {} if path is None else {path: result.report().encode("utf-8")}
 
 
 def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:

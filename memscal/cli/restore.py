@@ -15,6 +15,7 @@ from memscal.cli.options import (
     brief_option,
     option,
     output_options,
+    report_option,
 )
 from memscal.formats.files import together
 
@@ -22,6 +23,7 @@ EXAMPLES = """\b
 Examples:
   memscal restore sensor.apparatus.h5 sphere.h5
   memscal restore sensor.apparatus.h5 sphere.h5 --load 1.37 -o stress.h5 --figure stress.png
+  memscal restore sensor.apparatus.h5 sphere.h5 --report stress.html
   memscal restore sensor.apparatus.h5 sphere.h5 --expected sticking.h5 --json
 """
 
@@ -46,6 +48,7 @@ Examples:
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
 @brief_option
+@report_option
 @output_options
 def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: Any) -> int:
     """Restore the stress at the base of a film from a SCAN with a calibrated sensor (ARTIFACT).
@@ -60,12 +63,14 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan
 
-    output, expected, figures = (options[name] for name in ("output", "expected", "figures"))
+    output, expected, figures, report = (
+        options[name] for name in ("output", "expected", "figures", "report")
+    )
     accepted = {"accept_altered": options["accept_altered"]}
     apparatus, data = load_apparatus(artifact, **accepted), read_scan(scan, **accepted)
     stress = None if expected is None else read_reference(expected, **accepted)
-    files = [path for path in (output, *figures) if path is not None]
-    out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
+    inputs = [path for path in (artifact, scan, expected) if path is not None]
+    out.prove_writable([output, *figures, report], force=force, inputs=inputs)
 
     from memscal.errors import MemscalError
     from memscal.measurement.restore import restore
@@ -82,7 +87,7 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
             except MemscalError as failure:
                 out.note(f"No contact is shown beside the result: {failure.problem}")
     with out.working("Drawing"):
-        drawn = out.rendered(restored.plot, figures)
+        drawn = out.rendered(restored.plot, figures) | out.reported(restored, report)
     with together():
         if output is not None:
             write_reference(restored.profile(), output, overwrite=force)
@@ -93,6 +98,6 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
         else:
             out.emit_result(restored, brief=options["brief"])
     out.show_messages(restored.messages)
-    for path in files:
+    for path in (*filter(None, [output]), *drawn):
         out.message(f"Written: {path}")
     return exit_code_of(restored.checks)

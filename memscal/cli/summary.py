@@ -1,6 +1,5 @@
 """``memscal summary``: the results of a batch as tables, a page and a figure."""
 
-import os
 from pathlib import Path
 
 import click
@@ -42,10 +41,7 @@ def command(
     fleet = read_fleet(results)
     out.prove_writable([output, *figures], force=force)
     with out.working("Drawing"):
-        from memscal.figures.fleet import fleet_page
-
-        page = fleet_page(fleet, Path(os.path.realpath(results)).name).encode("utf-8")
-        contents = {output: page, **out.rendered(fleet.plot, figures)}
+        contents = out.reported(fleet, output) | out.rendered(fleet.plot, figures)
     with together():
         out.write_files(contents, force=force)
         if as_json:

@@ -1,4 +1,4 @@
-"""Figure and page of a fleet of sensors: distributions, failures, and the map of the wafer."""
+"""Figure of a fleet of sensors: distributions, failures, and the map of the wafer."""
 
 from typing import Any
 
@@ -7,12 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from memscal.figures.report import html_figure, html_page
 from memscal.figures.style import COLOURS, drawable, legend_above, panels_of
 from memscal.model.arrays import FloatArray
 from memscal.model.fleet import ROBUST_LIMIT, FleetResults, robust_spread
 from memscal.summaries.declared import power_of_ten
-from memscal.summaries.fleet_results import error_classes, failures, tables, verdict
+from memscal.summaries.fleet_results import error_classes, failures
 
 _MOST_BINS, _MOST_BARS = 60, 12
 #: Markers that are drawn as an image, which keeps a page of many sensors small.
@@ -110,19 +109,3 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
                 shown |= {"color": COLOURS[colour], "label": f"{name} ({some.sum()})"}
                 axes.scatter(x[some], y[some], s=max(size, 6.0), marker="x", **shown)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=7)
-
-
-def fleet_page(fleet: FleetResults, name: str) -> str:
-    """Return the summary of a fleet as a self-contained HTML page."""
-    caption = (
-        "a, b: distributions of A and of the Gaussian width fitted to the scan. c: sensors that "
-        "failed each check, and errors by class. d: A over the wafer, or along the batch."
-    )
-    first, second, *further = tables(fleet)
-    sections = {
-        "Values": first.html() + second.html(),
-        "Figure": html_figure(fleet_figure(fleet), f"Panels: {caption} {verdict(fleet)}", caption),
-        "Failures and outliers": "\n".join(t.html() for t in further if t.rows) or "<p>None.</p>",
-    }
-    title, failed = f"Calibrations of {name}", bool(fleet.failed)
-    return html_page(title, verdict(fleet), sections, failed=failed)

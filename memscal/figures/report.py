@@ -1,113 +1,332 @@
-"""Reports as HTML pages, of a calibration first, without other files, network or scripts."""
+"""Reports of results as HTML pages, each without other files, network or scripts."""
 
 import base64
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import singledispatch
 from html import escape
 from pathlib import Path
 from string import Template
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from memscal.figures.calibration import calibration_figure, values_text
+from memscal.apparatus import ApparatusFunction
+from memscal.calibration.calibrate import Calibration
+from memscal.figures.calibration import values_text
+from memscal.figures.friction import comparison_figures
 from memscal.figures.style import render_figure
+from memscal.friction.results import FrictionComparison, ShearComparison, joint_text
+from memscal.measurement.restoration import Restoration
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData
+from memscal.model.checks import Message, QualityCheck, marked_texts
+from memscal.model.fleet import FleetResults
+from memscal.model.indenter import RoundIndenter
+from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.notation import format_measured
-from memscal.model.quantities import PER_MM, Record, estimated_quantity
-from memscal.summaries.calibration import sensor_title, tables
-from memscal.summaries.table import Table, checks_table, stated_text
+from memscal.model.provenance import Process, SourceFile
+from memscal.model.quantities import KPA, MM, PER_MM, Record, by_name, estimated_quantity
+from memscal.model.result import Result
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+from memscal.summaries import comparison as comparisons
+from memscal.summaries import fleet_results
+from memscal.summaries.calibration import apparatus_of, sensor_title
+from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, worst_checks
+from memscal.version import __version__
 
 #: By the policy in it a browser fetches nothing and runs nothing.
 _PAGE = Path(__file__).with_name("report.html")
+#: Bytes that the figures of a page may have, which leaves it below a megabyte.
+_MOST_OF_FIGURES = 800_000
+#: What a figure is drawn as until all fit: an SVG, then images of fewer dots per inch.
+_FORMS = (("svg", 72.0), ("png", 200.0), ("png", 130.0), ("png", 90.0), ("png", 60.0))
 
 
-def html_report(data: ApparatusData) -> str:
-    """Return a calibration as a self-contained HTML page; what came from files is escaped."""
-    title = sensor_title(data)
-    *values, _ = tables(data)
+class Picture(NamedTuple):
+    """A figure, drawn when it is called, with a text in its place and its caption."""
+
+    draw: Callable[[], Figure]
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What the page of a result says beside its tables, of which ``leading`` precede figures."""
+
+    title: str
+    verdict: str = ""  # by default that of the checks
+    failed: bool = False  # or if a check failed
+    leading: int = 2
+    pictures: Sequence[Picture] = ()
+    checks: Sequence[QualityCheck] = ()
+    messages: Sequence[Message] = ()
+    budgets: Sequence[Table] = ()
+    settings: Sequence[Table] = ()
+    files: Mapping[str, SourceFile | None] = field(default_factory=dict)
+    process: Process | None = None
+
+
+def html_report(result: Result) -> str:
+    """Return a result as a self-contained HTML page; what came from files is escaped."""
+    report = report_of(result)
+    tables = [table for table in result.tables() if table.title != CHECKS]
+    items = "\n".join(f"<li>{escape(text)}</li>" for text in marked_texts(report.messages))
     sections = {
-        "Values": "\n".join(table.html() for table in values),
-        "Quality checks": checks_table(data.checks, meanings=True).html(),
-        "Figure": _figure(data),
-        "Uncertainty budget": _budget(data),
-        "What was measured on": _setting(data).html(),
-        "Provenance": _provenance(data),
+        "Results": _html(tables[: report.leading]),
+        "Figures": _figures(report.pictures),
+        "Further results": _html(tables[report.leading :]),
+        "Quality checks": _checks(report.checks),
+        "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
+        "Uncertainty budget": _html(report.budgets),
+        "What was measured on": _html(report.settings),
+        "Provenance": _html(_provenance(report)),
     }
-    return html_page(title, _verdict_text(data), sections, failed=not data.passed)
-
-
-def html_page(title: str, verdict: str, sections: Mapping[str, str], *, failed: bool) -> str:
-    """Return a page of a title, a verdict, and sections of HTML by their headings."""
     body = "\n".join(
-        f"<section>\n<h2>{escape(heading)}</h2>\n{content}\n</section>"
+        f"<section>\n<h2>{heading}</h2>\n{content}\n</section>"
         for heading, content in sections.items()
+        if content
     )
-    kind = "verdict failed" if failed else "verdict"
-    note = f'<p class="{kind}" role="note">{escape(verdict)}</p>'
-    heading = f"<h1>{escape(title)}</h1>\n{note}\n"
+    failed = report.failed or not all(check.passed for check in report.checks)
+    kind, verdict = "verdict failed" if failed else "verdict", report.verdict
+    lines = "<br>\n".join(escape(verdict or _verdict(report.checks)).splitlines())
+    note = f'<p class="{kind}" role="note">{lines}</p>'
+    heading = f"<h1>{escape(report.title)}</h1>\n{note}\n"
     page = Template(_PAGE.read_text(encoding="utf-8"))
-    return page.substitute(title=escape(title), body=heading + body)
-
-
-def html_figure(figure: Figure, alt: str, caption: str) -> str:
-    """Return a figure with its caption, as an image that the page holds."""
-    svg = base64.b64encode(render_figure(figure, "svg")).decode("ascii")
-    return (
-        f'<figure>\n<img alt="{escape(alt)}" src="data:image/svg+xml;base64,{svg}">\n'
-        f"<figcaption>{escape(caption)}</figcaption>\n</figure>"
+    return page.substitute(
+        title=escape(report.title), body=heading + body, program=f"memscal {__version__}"
     )
 
 
-def _verdict_text(data: ApparatusData) -> str:
-    if not data.checks:
+def _html(tables: Sequence[Table]) -> str:
+    """Return tables, each in a box that scrolls on a narrow screen, by keys, too."""
+    boxes = (
+        f'<div class="scroll" role="group" tabindex="0" aria-label="{escape(table.title)}">\n'
+        f"{table.html()}\n</div>"
+        for table in tables
+        if table.rows
+    )
+    return "\n".join(boxes)
+
+
+def _checks(checks: Sequence[QualityCheck]) -> str:
+    shown = checks_table(worst_checks(checks), meanings=True)
+    title = "Each passes up to its limit; of one made several times, what failed and the worst"
+    return _html([Table(title, shown.head, shown.rows, shown.marked)])
+
+
+def _figures(pictures: Sequence[Picture]) -> str:
+    """Return figures with their captions, as images that the page holds."""
+    figures = [picture.draw() for picture in pictures]
+    images = [_image(figure, *_FORMS[0]) for figure in figures]
+    for form in _FORMS[1:]:
+        for i in sorted(range(len(images)), key=lambda i: -len(images[i])):
+            if sum(map(len, images)) > _MOST_OF_FIGURES:
+                images[i] = min(images[i], _image(figures[i], *form), key=len)
+    return "\n".join(
+        f'<figure>\n<img alt="{escape(picture.alt)}" src="{image}">\n'
+        f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
+        for picture, image in zip(pictures, images, strict=True)
+    )
+
+
+def _image(figure: Figure, file_format: str, dpi: float) -> str:
+    """Return a figure as the address of an image, which holds it."""
+    content = base64.b64encode(render_figure(figure, file_format, dpi=dpi)).decode("ascii")
+    return f"data:image/{file_format.replace('svg', 'svg+xml')};base64,{content}"
+
+
+@singledispatch
+def report_of(result: Result) -> Report:
+    """Return what the page of a result says beside its tables."""
+    tables: list[Table] = result.tables()
+    checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
+    title = tables[0].title if tables else type(result).__name__
+    pictures = [Picture(result.plot, title, title)] if result._figure else []
+    return Report(title=title, pictures=pictures, checks=checks, messages=messages)
+
+
+def _verdict(checks: Sequence[QualityCheck]) -> str:
+    if not checks:
         return "No quality check was made."
-    failed = [check.name.replace("_", " ") for check in data.checks if not check.passed]
+    failed = [check.name.replace("_", " ") for check in checks if not check.passed]
     if not failed:
-        return f"All {len(data.checks)} quality checks passed."
-    count = f"{len(failed)} of {len(data.checks)} quality checks failed"
+        return f"All {len(checks)} quality checks passed."
+    count = f"{len(failed)} of {len(checks)} quality checks failed"
     return f"{count}: {', '.join(failed)}. Read what each failure means before use."
 
 
-def _budget(data: ApparatusData) -> str:
-    """Return sources of uncertainty in rows, estimated quantities in columns."""
-    sources = dict.fromkeys(source for column in data.budget.values() for source in column)
-    if not sources:
-        return "<p>No budget by source was stored.</p>"
-    columns = []
-    for name, budget in data.budget.items():
-        quantity = estimated_quantity(name).read_in(data.reading)
-        total = float(np.sqrt(sum(u**2 for u in budget.values())))
-        cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
-        ratio = math.nan
-        if name in data.parameters and data.parameters[name] != 0:
-            ratio = data.parameters.uncertainty(name) / abs(data.parameters[name])
-        share = f"{100 * ratio:.2g} %" if math.isfinite(ratio) else "–"
-        column = f"{quantity.words} ({quantity.unit})"
-        columns.append((column, *cells, f"{total / quantity.scale:.2g}", share))
-    names = [source.replace("_", " ") for source in sources]
-    first = ("source", *names, "root sum of squares", "relative standard uncertainty")
-    head, *rows = zip(first, *columns, strict=True)
-    return Table("Standard uncertainty by source, and its share of the variance", head, rows).html()
+@report_of.register(ApparatusFunction)
+@report_of.register(Calibration)
+def _of_calibration(result: Calibration | ApparatusFunction) -> Report:
+    data = apparatus_of(result)
+    process = data.process
+    alt = (
+        f"Panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
+        f"the apparatus function with its band, linear and logarithmic; the transfer function "
+        f"resolved up to {data.resolved_wavenumber / PER_MM:.3g} rad/mm. "
+        f"{values_text(data)}. {_verdict(data.checks)}"
+    )
+    caption = (
+        "a, c: scan, reconvolutions with the deconvolved G and with the Gaussian, and the "
+        "reference. b: residuals in standard uncertainties. d, e: G with its band (k = 2) and "
+        "the Gaussian. f: transfer function; hatched, what the scan does not resolve. Of a scan "
+        "over the plane, from g: voltage, residuals and G; at several loads a row for each."
+    )
+    return Report(
+        title=sensor_title(data),
+        pictures=[Picture(result.plot, alt, caption)],
+        checks=data.checks,
+        messages=process.messages,
+        budgets=[_calibration_budget(data)],
+        settings=[_setting(data, data.load, data.reference)],
+        files={"scan": process.input_scan, "reference": process.input_reference},
+        process=process,
+    )
 
 
-def _share(u: float | None, total: float, scale: float) -> str:
-    if u is None:
-        return "–"
-    return f"{u / scale:.2g}" + (f" ({100 * (u / total) ** 2:.0f} %)" if total > 0 else "")
+@report_of.register
+def _of_stress(stress: MeasuredStress) -> Report:
+    largest = max(stress.profiles, key=lambda profile: profile.maximum)
+    top = format_measured(largest.maximum / KPA, largest.maximum_uncertainty / KPA, "kPa")
+    alt = (
+        f"Stress against the distance from the centre, {len(stress.profiles)} profiles on a "
+        f"linear and a logarithmic scale. The largest, at {largest.label}, has a maximum of {top}."
+    )
+    caption = (
+        "a: measured stress with its uncertainty; lines: the restored stress as the sensor blurs "
+        "it; ticks at the top: the radius of the contact without friction. b: the same on a "
+        "logarithmic scale, pale where the stress is not distinct from zero."
+    )
+    title = f"Stress measured at the base of {_contact_words(stress.scans[0])}"
+    return Report(
+        title=title,
+        pictures=[Picture(stress.plot, alt, caption)],
+        checks=stress.checks,
+        messages=stress.messages,
+        budgets=[_stress_budget(stress, name) for name in ("force", "maximum")],
+        **_of_measurement(stress),
+    )
 
 
-def _setting(data: ApparatusData) -> Table:
+@report_of.register
+def _of_restoration(restored: Restoration) -> Report:
+    on_axis, u = float(restored.stress(0.0)) / KPA, float(restored.stress_uncertainty(0.0)) / KPA
+    alt = (
+        "Left: stress at the base against the distance from the centre, restored, blurred again, "
+        f"and measured; on the axis it is {format_measured(on_axis, u, 'kPa')}. Right: residuals."
+    )
+    caption = (
+        "a: the restored stress with its band, the same as the sensor blurs it, the calculated "
+        "stress where there is one, and the scan. b: residuals over the standard uncertainty of "
+        "the noise."
+    )
+    budget = restored.force_budget
+    row = _budget_row("total force (N)", budget, budget, restored.force, 1.0)
+    head = ("quantity", *_words(budget), *_TOTALS)
+    return Report(
+        title=f"Stress restored at the base of {_contact_words(restored.scan)}",
+        pictures=[Picture(restored.plot, alt, caption)],
+        checks=restored.checks,
+        messages=restored.messages,
+        budgets=[Table(_OF_BUDGET, head, [row])],
+        settings=[_setting(restored.scan, restored.scan.load)],
+        files={"artifact": restored.apparatus.source, "scan": restored.scan.source},
+    )
+
+
+#: Captions of a comparison's figures, by the beginning of their names.
+_COMPARED = {
+    "profiles": "Measured and calculated profiles{}. Points: measured stress; solid and dashed: "
+    "the calculated limits, without friction and with full stick. Below: measured less calculated "
+    "stress over its uncertainty.",
+    "maxima": "Maximum of the stress against the load. Points: the largest measured stress over "
+    "the largest of the frictionless contact; lines: the same calculated with each friction "
+    "coefficient.",
+    "effective-friction": "Effective friction coefficient against the load, by the maximum and by "
+    "the whole profile, with 95 % intervals; band: all loads together.",
+    "likelihood": "Likelihood of each friction coefficient: twice the loss of its logarithm, for "
+    "each load and for all together; dotted: what bounds 68 % and 95 %.",
+    "interface": "Laws of the interface: how well each length explains all loads, the evidence of "
+    "each law, and the friction coefficients that a slip length means.",
+}
+
+
+@report_of.register(ShearComparison)
+@report_of.register(FrictionComparison)
+def _of_comparison(compared: FrictionComparison | ShearComparison) -> Report:
+    measured, pictures = compared.measured, []
+    checks: Sequence[QualityCheck] = ()
+    messages, joint = compared.messages, joint_text(compared.joint)
+    if isinstance(compared, FrictionComparison):
+        checks, messages = compared.checks, tuple(comparisons.notes(compared))
+        for stem, draw in comparison_figures(compared).items():
+            for name in (name for name in _COMPARED if stem.startswith(name)):
+                caption = _COMPARED[name].format(stem.removeprefix(name).replace("-", ", "))
+                alt = f"{caption} All loads together: {joint}."
+                pictures.append(Picture(draw, alt, caption))
+    return Report(
+        title=f"Friction of {_contact_words(measured.scans[0])}",
+        leading=1 + len(compared.loadings),
+        pictures=pictures,
+        checks=checks,
+        messages=messages,
+        **_of_measurement(measured),
+    )
+
+
+@report_of.register
+def _of_fleet(fleet: FleetResults) -> Report:
+    verdict = fleet_results.verdict(fleet)
+    caption = (
+        "a, b: distributions of A and of the Gaussian width fitted to the scan. c: sensors that "
+        "failed each check, and errors by class. d: A over the wafer, or along the batch."
+    )
+    picture = Picture(fleet.plot, f"Panels: {caption} {verdict}", caption)
+    title, failed = f"Calibrations of {fleet.name}", bool(fleet.failed)
+    return Report(title=title, verdict=verdict, failed=failed, pictures=[picture])
+
+
+def _contact_words(scan: Scan | MeasuredScan) -> str:
+    film, indenter = scan.film, scan.indenter
+    if film is None or not isinstance(indenter, RoundIndenter):
+        return "the film"
+    pressed = f"a {indenter.shape} of radius {indenter.radius / MM:.4g} mm"
+    return f"a {film.thickness / MM:.4g} mm film under {pressed}"
+
+
+def _of_measurement(measured: MeasuredStress) -> dict[str, Any]:
+    """Return what was measured on what, and the files and versions of it."""
+    settings: dict[str, Table] = {}
+    for scan in measured.scans:
+        table = _setting(scan)
+        settings.setdefault(table.plain(), table)
+    files = {f"scan {i}": scan.source for i, scan in enumerate(measured.scans, start=1)}
+    files = {"artifact": measured.artifact, **files}
+    return {"settings": [*settings.values()], "files": files, "process": measured.process}
+
+
+def _setting(
+    holder: Scan | MeasuredScan | ApparatusData,
+    load: float | None = None,
+    reference: StressProfile | None = None,
+) -> Table:
+    """Return sensor, indenter, film and reference as a table of items and values."""
+    indenter = holder.indenter
     rows = [
-        *_stated("", records.SENSOR, data.sensor),
-        ("load", "not stated" if data.load is None else f"{data.load:.4g} N"),
-        *_stated(f"{getattr(data.indenter, 'shape', '')}, ", records.ROUND_INDENTER, data.indenter),
-        *_stated("film, ", records.FILM, data.film),
-        *_stated("reference, ", records.SOLVER, data.reference),
-        *_stated("reference, ", records.NUMERICS, data.reference),
+        *_stated("", records.SENSOR, holder.sensor),
+        *([] if load is None else [("load", f"{load:.4g} N")]),
+        *_stated("", records.LOAD_CELL, getattr(holder, "load_cell", None)),
+        *_stated(f"{getattr(indenter, 'shape', '')}, ", records.ROUND_INDENTER, indenter),
+        *_stated("film, ", records.FILM, holder.film),
+        *_stated("reference, ", records.SOLVER, reference),
+        *_stated("reference, ", records.NUMERICS, reference),
     ]
-    return Table("Sensor, indenter, film and reference", ("item", "value"), rows)
+    return Table("Sensor, indenter and film", ("item", "value"), rows)
 
 
 def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, str]]:
@@ -126,34 +345,73 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
             yield prefix + quantity.words, text
 
 
-def _provenance(data: ApparatusData) -> str:
-    process = data.process
-    rows = [("program", f"{process.program} {process.version}"), ("date", process.date)]
-    for name, source in (("scan", process.input_scan), ("reference", process.input_reference)):
+_OF_BUDGET = "Standard uncertainty by source, and its share of the variance"
+_TOTALS = ("root sum of squares", "relative standard uncertainty")
+
+
+def _calibration_budget(data: ApparatusData) -> Table:
+    """Return sources of uncertainty in rows, estimated quantities in columns."""
+    sources = dict.fromkeys(source for column in data.budget.values() for source in column)
+    values = dict(zip(data.parameters.names, data.parameters.values, strict=True))
+    columns = []
+    for name, budget in data.budget.items():
+        quantity = estimated_quantity(name).read_in(data.reading)
+        value = values.get(name, math.nan)
+        heading = f"{quantity.words} ({quantity.unit})"
+        columns.append(_budget_row(heading, budget, sources, value, quantity.scale))
+    first = ("source", *_words(sources), *_TOTALS)
+    head, *rows = zip(first, *columns, strict=True)
+    return Table(_OF_BUDGET, head, rows if sources else [])
+
+
+def _stress_budget(stress: MeasuredStress, name: str) -> Table:
+    """Return profiles in rows, sources of the uncertainty of their force or maximum in columns."""
+    quantity = by_name(records.STRESS_NUMBERS.quantities)[name]
+    budgets = [getattr(profile, f"{name}_budget") for profile in stress.profiles]
+    sources = dict.fromkeys(source for budget in budgets for source in budget)
+    rows = [
+        _budget_row(f"{i}: {p.label}", budget, sources, getattr(p, name), quantity.scale)
+        for i, (p, budget) in enumerate(zip(stress.profiles, budgets, strict=True), start=1)
+    ]
+    title = f"{_OF_BUDGET}: {quantity.heading}"
+    return Table(title, ("profile", *_words(sources), *_TOTALS), rows)
+
+
+def _budget_row(
+    name: str, budget: Mapping[str, float], sources: Iterable[str], value: float, scale: float
+) -> tuple[str, ...]:
+    """Return the shares of the sources, their root sum of squares, and that over the value."""
+    total = float(np.linalg.norm(list(budget.values())))
+    cells = (_share(budget.get(source), total, scale) for source in sources)
+    ratio = total / abs(value) if value else math.nan
+    relative = f"{100 * ratio:.2g}%" if math.isfinite(ratio) else "–"
+    return (name, *cells, f"{total / scale:.2g}", relative)
+
+
+def _share(u: float | None, total: float, scale: float) -> str:
+    if u is None:
+        return "–"
+    return f"{u / scale:.2g}" + (f" ({(u / total) ** 2:.0%})" if total > 0 else "")
+
+
+def _words(names: Iterable[str]) -> list[str]:
+    return [name.replace("_", " ") for name in names]
+
+
+def _provenance(report: Report) -> list[Table]:
+    """Return program, files, options and versions."""
+    process = report.process
+    rows = []
+    if process is not None:
+        rows = [("program", f"{process.program} {process.version}"), ("date", process.date)]
+    for name, source in report.files.items():
         if source is not None:
             rows.append((f"input {name}", source.file_name))
             rows.append((f"its SHA-256 ({name})", source.sha256))
-    blocks = [Table("What was run on what", ("item", "value"), rows).html()]
-    for caption, mapping in (("Options", process.configuration), ("Versions", process.environment)):
-        if mapping:
-            rows = [(str(key), stated_text(value)) for key, value in mapping.items()]
-            blocks.append(Table(caption, ("name", "value"), rows).html())
-    items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
-    messages = f"<ul>\n{items}\n</ul>" if items else "<p>None.</p>"
-    return "\n".join([*blocks, "<h3>Messages</h3>", messages])
-
-
-def _figure(data: ApparatusData) -> str:
-    alt = (
-        f"Panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
-        f"the apparatus function with its band, linear and logarithmic; the transfer function "
-        f"resolved up to {data.resolved_wavenumber / PER_MM:.3g} rad/mm. "
-        f"{values_text(data)}. {_verdict_text(data)}"
-    )
-    caption = (
-        "a, c: scan, reconvolutions with the deconvolved G and with the Gaussian, and the "
-        "reference. b: residuals in standard uncertainties. d, e: G with its band (k = 2) and "
-        "the Gaussian. f: transfer function; hatched, what the scan does not resolve. Of a scan "
-        "over the plane, from g: voltage, residuals and G; at several loads a row for each."
-    )
-    return html_figure(calibration_figure(data), alt, caption)
+    tables = [Table("What was run on what", ("item", "value"), rows)]
+    if process is not None:
+        held = {"Options": process.configuration, "Versions": process.environment}
+        for title, mapping in held.items():
+            pairs = [(str(key), stated_text(value)) for key, value in mapping.items()]
+            tables.append(Table(title, ("name", "value"), pairs))
+    return tables

@@ -218,4 +218,5 @@ def read_fleet(results: Path) -> FleetResults:
         cure = "Run a batch for each unit of readings."
         raise FormatError(f"{results} holds sensors of several kinds.", why=why, cure=cure)
     columns = dict(zip(_NUMBERS, np.concatenate(numbers, axis=1), strict=True))
-    return FleetResults(paths=paths, failed=failed, errors=errors, unit=(*units, "")[0], **columns)
+    name, unit = os.path.basename(os.path.realpath(results)), (*units, "")[0]
+    return FleetResults(paths=paths, failed=failed, errors=errors, unit=unit, name=name, **columns)

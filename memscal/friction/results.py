@@ -195,7 +195,8 @@ class DryAgainstLubricated:
     relative_uncertainty: float
 
 
-def _joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
+def joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
+    """Return the coefficients of all loads together, by lubrication and loading."""
     return "; ".join(
         f"{lubrication or 'not stated'}, {loading or 'given'}: {estimate}"
         for lubrication, by_loading in joint.items()
@@ -228,7 +229,7 @@ class FrictionComparison(Result, Checked):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        return f"<FrictionComparison: {_joint_text(self.joint)}; {state_of_checks(self.checks)}>"
+        return f"<FrictionComparison: {joint_text(self.joint)}; {state_of_checks(self.checks)}>"
 
     @property
     def loadings(self) -> tuple[str, ...]:
@@ -251,7 +252,7 @@ class ShearComparison(Result):
 
     def __repr__(self) -> str:
         """Return the coefficients of all loads together."""
-        return f"<ShearComparison: {_joint_text(self.joint)}>"
+        return f"<ShearComparison: {joint_text(self.joint)}>"
 
     @property
     def loadings(self) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ class FleetResults(Result):
 
     ``conversion_constant`` is in ``unit``, ``gaussian_sigma`` and the places on a wafer are in mm,
     as in the files; ``failed`` has the names of the checks that failed, ``errors`` class and words
-    of errors, both by the number of the sensor.
+    of errors, both by the number of the sensor; ``name`` is that of the folder of results.
     """
 
     _summary: ClassVar[str] = "fleet_results"
@@ -39,6 +39,7 @@ class FleetResults(Result):
     failed: Mapping[int, tuple[str, ...]]
     errors: Mapping[int, tuple[str, str]]
     unit: str
+    name: str = "sensors"
 
 
 def robust_spread(values: FloatArray) -> float:

@@ -82,6 +82,11 @@ class Result:
         figure: Figure = draw(self, **options)
         return figure
 
+    def report(self) -> str:
+        """Return the result as an HTML page without other files, network or scripts."""
+        page: str = import_module("memscal.figures.report").html_report(self)
+        return page
+
     def _told(self, form: str) -> Any:
         function = getattr(import_module(f"memscal.summaries.{self._summary}"), form, None)
         if function is None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -27,7 +26,15 @@ from memscal.model.quantities import MM, measured
 from memscal.summaries import interface_laws
 from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members
 from memscal.summaries.interface_laws import friction_name
-from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
+from memscal.summaries.table import (
+    Table,
+    checks_json,
+    checks_table,
+    finite,
+    texts_of,
+    verdict,
+    worst_checks,
+)
 
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
@@ -290,7 +297,7 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
         *([] if comparison.interface is None else interface_laws.tables(comparison.interface)),
-        _checks_table(comparison.checks),
+        checks_table(worst_checks(comparison.checks)),
     ]
 
 
@@ -414,19 +421,6 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
         interval = f"{place} the {percent(joint.interval.level)} interval"
         rows.append([_which(lubrication, loading), str(joint), interval])
     return Table(title, ["all loads of", "effective coefficient", "macroscopic one"], rows)
-
-
-def _checks_table(checks: Sequence[QualityCheck]) -> Table:
-    """Return what failed, and of checks that were made of each profile the closest to failing."""
-    shown: list[QualityCheck] = []
-    for kind, of_kind in _by_kind(checks).items():
-        passed = [check for check in of_kind if check.passed]
-        shown += [check for check in of_kind if not check.passed]
-        if passed:
-            worst = max(passed, key=lambda check: check.value / check.limit)
-            many = f"{kind}, worst of {len(passed)}" if len(passed) > 1 else worst.name
-            shown.append(replace(worst, name=many))
-    return checks_table(shown)
 
 
 def _lubrication_table(comparison: FrictionComparison) -> Table:

@@ -6,7 +6,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import zip_longest
 from typing import Any, TextIO
@@ -49,12 +49,34 @@ def stated_text(value: object) -> str:
     """Return an option's value for reading: groups as "name: value", not as Python."""
     if isinstance(value, Mapping):
         return "; ".join(f"{key}: {stated_text(item)}" for key, item in value.items()) or "none"
+    if isinstance(value, list | tuple):
+        return "; ".join(map(stated_text, value)) or "none"
     return "not given" if value is None else str(value)
 
 
 def texts_of(messages: Iterable[Message]) -> list[str]:
     """Return messages as the JSON output holds them."""
     return [message.text for message in messages]
+
+
+CHECKS = "Quality checks"
+"""Title of the table of quality checks."""
+
+
+def worst_checks(checks: Iterable[QualityCheck]) -> list[QualityCheck]:
+    """Return what failed, and of checks that were made several times the closest to failing."""
+    kinds: dict[str, list[QualityCheck]] = {}
+    for check in checks:
+        kinds.setdefault(check.kind, []).append(check)
+    shown: list[QualityCheck] = []
+    for kind, of_kind in kinds.items():
+        passed = [check for check in of_kind if check.passed]
+        shown += [check for check in of_kind if not check.passed]
+        if passed:
+            worst = max(passed, key=lambda check: check.value / (check.limit or 1.0))
+            name = f"{kind}, worst of {len(passed)}" if len(passed) > 1 else worst.name
+            shown.append(replace(worst, name=name))
+    return shown
 
 
 def checks_table(checks: Sequence[QualityCheck], *, meanings: bool = False) -> Table:
@@ -72,7 +94,7 @@ def checks_table(checks: Sequence[QualityCheck], *, meanings: bool = False) -> T
     ]
     failed = frozenset(i for i, check in enumerate(checks) if not check.passed)
     head = ("check", "value", "limit", "p", "result", *(["meaning"] if meanings else []))
-    return Table("Quality checks", head, rows, failed)
+    return Table(CHECKS, head, rows, failed)
 
 
 def verdict(checks: Sequence[QualityCheck]) -> str:
@@ -100,6 +122,8 @@ def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
 #: Columns of text for which tables are made where no terminal says how many it has.
 WIDTH = 80
 _GAP = "  "
+#: The characters of a cell that a page shows in one line: numbers with uncertainty and unit fit.
+_ONE_LINE = 32
 #: Prose is folded rather than widen its column beyond this.
 _PROSE = 24
 _LETTER = r"[^\W\d_⁰¹²³⁴⁵⁶⁷⁸⁹]"
@@ -182,21 +206,34 @@ class Table:
                 yield _GAP + _GAP.join("-" * width for _, width in columns)
 
     def html(self) -> str:
-        """Return the table as HTML, each row headed by its first cell, marked rows in bold."""
+        """Return the table as HTML, each row headed by its first text, marked rows in bold."""
         lines = [f"<table>\n<caption>{_cell(self.title)}</caption>"]
         if any(self.head):
-            cells = "".join(f'<th scope="col">{_cell(cell)}</th>' for cell in self.head)
-            lines.append(f"<thead><tr>{cells}</tr></thead>")
+            named = "".join(
+                f'<th scope="col">{_cell(cell)}</th>' if cell else "<td></td>" for cell in self.head
+            )
+            lines.append(f"<thead><tr>{named}</tr></thead>")
         lines.append("<tbody>")
-        for i, (first, *others) in enumerate(self.rows):
+        for i, row in enumerate(self.rows):
             mark = ' class="failed" style="font-weight: bold"' if i in self.marked else ""
-            cells = "".join(f"<td>{_cell(cell)}</td>" for cell in others)
-            lines.append(f'<tr{mark}><th scope="row">{_cell(first)}</th>{cells}</tr>')
+            heading = next((k for k, cell in enumerate(row) if cell), None)
+            cells = (
+                f'<th scope="row"{_long(cell)}>{_cell(cell)}</th>'
+                if k == heading
+                else f"<td{_long(cell)}>{_cell(cell)}</td>"
+                for k, cell in enumerate(row)
+            )
+            lines.append(f"<tr{mark}>{''.join(cells)}</tr>")
         return "\n".join([*lines, "</tbody>\n</table>"])
 
 
 def _cell(text: str) -> str:
     return escape(printable(text, _LONGEST))
+
+
+def _long(text: str) -> str:
+    """Return a class for a cell that a page may show in several lines."""
+    return ' class="long"' if len(text) > _ONE_LINE else ""
 
 
 def _parts(

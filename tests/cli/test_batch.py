@@ -153,7 +153,7 @@ def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
 def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
     copy: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("memscal.cli.batch._EVERY", 0)
+    monkeypatch.setattr("memscal.progress._EVERY", 0)
     shards = sorted((copy / "results" / "shards").iterdir())
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--json")
     assert shards_of(run(*line)) == (0, 6)
