@@ -262,6 +262,8 @@ def answer(comparison: FrictionComparison | ShearComparison) -> str:
         ways: dict[str, str] = {}
         for loading, joint in by_loading.items():
             ways.setdefault(str(joint), loading)
+        if all(text.startswith("below") for text in ways):  # the larger bound holds for both
+            ways = {max(ways, key=lambda text: float(text.split()[1])): ""}
         told = ", ".join(f"{text} {way}" if len(ways) > 1 else text for text, way in ways.items())
         equals = {"n": " is", "[": " in"}.get(told[0], " =" if told[0].isdigit() else "")
         level = "" if "%" in told else f" ({percent(joint.interval.level)})"
