@@ -1,7 +1,7 @@
 """Comparisons of measured with calculated stress, as tables, JSON, data frames and notes."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -242,13 +242,6 @@ def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
             )
 
 
-def _by_kind(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
-    kinds: dict[str, list[QualityCheck]] = {}
-    for check in checks:
-        kinds.setdefault(check.kind, []).append(check)
-    return kinds
-
-
 def _which(lubrication: str, loading: str) -> str:
     words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
     return ", ".join(word for word in words if word)
@@ -267,7 +260,7 @@ def answer(comparison: FrictionComparison | ShearComparison) -> str:
         told = ", ".join(f"{text} {way}" if len(ways) > 1 else text for text, way in ways.items())
         equals = {"n": " is", "[": " in"}.get(told[0], " =" if told[0].isdigit() else "")
         level = "" if "%" in told else f" ({percent(joint.interval.level)})"
-        beside = ", held at 0 beside dry" if held and lubrication == "lubricated" else ""
+        beside = ", taken as 0" if held and lubrication == "lubricated" else ""
         name = (lubrication or "all contacts").capitalize()
         lines.append(f"{name}: μ{equals} {told}{level}{beside}.")
     checks = comparison.checks if isinstance(comparison, FrictionComparison) else ()
@@ -421,7 +414,10 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
 def _checks_table(checks: Sequence[QualityCheck]) -> Table:
     """Return what failed, and of checks that were made of each profile the closest to failing."""
     shown: list[QualityCheck] = []
-    for kind, of_kind in _by_kind(checks).items():
+    kinds: dict[str, list[QualityCheck]] = {}
+    for check in checks:
+        kinds.setdefault(check.kind, []).append(check)
+    for kind, of_kind in kinds.items():
         passed = [check for check in of_kind if check.passed]
         shown += [check for check in of_kind if not check.passed]
         if passed:

@@ -100,7 +100,7 @@ def test_tables_are_whole_at_80_columns(at_80, monkeypatch: pytest.MonkeyPatch, 
     ("apply", r"S_zz up to \(.*\) kPa at 0\.34 N, \(.*\) kPa at 2\.75 N\.",
      r"6 profiles: total force over applied load 1\.0\d\d ± 0\.0\d\d\. All \d+ checks passed\."),
     ("compare", r"Dry: μ = 0\.\d+ \[0\.\d+, 0\.\d+\].*",
-     r"Lubricated: μ below 0\.\d+ \(95 %\), held at 0 beside dry\. All \d+ checks passed\."),
+     r"Lubricated: μ below 0\.\d+ \(95 %\), taken as 0\. All \d+ checks passed\."),
     ("restore", r"Stress on the axis \(.*\) kPa; force \(.*\) N at 1\.37 N\.",
      r"All 6 checks passed\."),
 ])  # fmt: skip
