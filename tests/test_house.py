@@ -16,7 +16,7 @@ MODULES = {
 }
 
 FLOW = [
-    "version", "errors", "parallel", "model", "axisymmetry", "mechanics", "estimation",
+    "version", "errors", "parallel", "progress", "model", "axisymmetry", "mechanics", "estimation",
     "deconvolution", "apparatus", "calibration", "simulation", "measurement", "friction",
     "planning", "summaries", "figures", "cli", "__main__",
 ]  # fmt: skip
@@ -26,7 +26,7 @@ USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "friction", "m
 
 ONLY_IN = {
     "h5py": {"formats"}, "pint": {"formats"}, "meshio": {"formats"}, "matplotlib": {"figures"},
-    "click": {"cli"}, "rich": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"},
+    "click": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"},
     "pyarrow": {"formats"}, "distributed": {"parallel"},
 }  # fmt: skip
 
@@ -81,7 +81,7 @@ def without_types(tree: ast.Module) -> ast.Module:
 
 def allowed_rooms(importer: str) -> set[str]:
     if importer == "formats":
-        return {"version", "errors", "parallel", "model", "formats"}
+        return {"version", "errors", "parallel", "progress", "model", "formats"}
     earlier = set(FLOW[: FLOW.index(importer) + 1])
     return earlier | ({"formats"} if importer in USERS_OF_FORMATS else set())
 

@@ -54,7 +54,7 @@ def test_asking_for_help_loads_click_alone(arguments: str) -> None:
 
 def test_calibrating_is_possible_without_the_libraries_of_other_jobs() -> None:
     loaded = libraries_after("import memscal; memscal.calibrate, memscal.read_scan")
-    assert loaded.isdisjoint({"matplotlib", "meshio", "pint", "rich", "skfem", "skimage"})
+    assert loaded.isdisjoint({"matplotlib", "meshio", "pint", "skfem", "skimage"})
 
 
 def classes(hint: Any) -> Iterator[type]:

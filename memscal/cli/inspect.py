@@ -76,7 +76,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     columns = ("check", "value", "limit", "result")
     yield Table("Quality checks", columns, checks, frozenset(failed))
     yield Table("What the failures mean", ("", ""), meanings)
-    yield Table("Provenance", ("", ""), list(_provenance(contents["provenance"])))
+    yield from _provenance(contents["provenance"])
 
 
 def _value(item: Mapping[str, Any]) -> str:
@@ -108,14 +108,16 @@ def _number(value: float | None, form: str) -> str:
     return "-" if value is None else f"{value:{form}}"
 
 
-def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _provenance(provenance: Mapping[str, Any]) -> Iterator[Table]:
+    """Yield a table of what stands alone, then one for each group of options or versions."""
+    rows, groups = [], []
     for name, value in provenance.items():
         words = name.replace("_", " ")
         if isinstance(value, Mapping):
-            for key, item in value.items():
-                yield f"{words}: {key}".replace("_", " "), stated_text(item)
+            held = [(key.replace("_", " "), stated_text(item)) for key, item in value.items()]
+            groups.append(Table(words.capitalize(), ("", ""), held))
         elif isinstance(value, list):
-            for item in value:
-                yield words, str(item)
+            rows += [(words, str(item)) for item in value]
         else:
-            yield from ((words, line) for line in str(value).splitlines() if line)
+            rows += [(words, line) for line in str(value).splitlines() if line]
+    yield from (Table("Provenance", ("", ""), rows), *groups)

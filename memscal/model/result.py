@@ -51,8 +51,10 @@ class Result:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        answer = f"<p>{escape(self.answer())}</p>\n" if self.answer() else ""
-        return answer + "\n".join(table.html() for table in self.tables())
+        lines = "<br>\n".join(map(escape, self.answer().splitlines()))
+        return (f"<p>{lines}</p>\n" if lines else "") + "\n".join(
+            table.html() for table in self.tables()
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them."""

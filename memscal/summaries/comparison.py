@@ -1,7 +1,7 @@
 """Comparisons of measured with calculated stress, as tables, JSON, data frames and notes."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +18,7 @@ from memscal.friction.results import (
 )
 from memscal.model import records
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck
+from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
@@ -249,13 +249,6 @@ def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
             )
 
 
-def _by_kind(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
-    kinds: dict[str, list[QualityCheck]] = {}
-    for check in checks:
-        kinds.setdefault(check.kind, []).append(check)
-    return kinds
-
-
 def _which(lubrication: str, loading: str) -> str:
     words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
     return ", ".join(word for word in words if word)
@@ -269,10 +262,12 @@ def answer(comparison: FrictionComparison | ShearComparison) -> str:
         ways: dict[str, str] = {}
         for loading, joint in by_loading.items():
             ways.setdefault(str(joint), loading)
+        if all(text.startswith("below") for text in ways):  # the larger bound holds for both
+            ways = {max(ways, key=lambda text: float(text.split()[1])): ""}
         told = ", ".join(f"{text} {way}" if len(ways) > 1 else text for text, way in ways.items())
         equals = {"n": " is", "[": " in"}.get(told[0], " =" if told[0].isdigit() else "")
         level = "" if "%" in told else f" ({percent(joint.interval.level)})"
-        beside = ", held at 0 beside dry" if held and lubrication == "lubricated" else ""
+        beside = ", taken as 0" if held and lubrication == "lubricated" else ""
         name = (lubrication or "all contacts").capitalize()
         lines.append(f"{name}: μ{equals} {told}{level}{beside}.")
     checks = comparison.checks if isinstance(comparison, FrictionComparison) else ()

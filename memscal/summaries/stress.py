@@ -73,8 +73,8 @@ def answer(stress: MeasuredStress) -> str:
 
 def tables(stress: MeasuredStress) -> list[Table]:
     """Return the profiles, what holds for all of them, and the quality checks that matter."""
-    shown = [_NUMBERS[name] for name in ("force", "maximum", "centre")]
-    head = ("", _NUMBERS["load"].words, "state", *(q.words for q in shown), "checks")
+    load, *shown = (_NUMBERS[name] for name in ("load", "force", "maximum", "centre"))
+    head = ("", load.heading, "state", *(quantity.heading for quantity in shown), "checks")
     rows, marked = [], set()
     for i, profile in enumerate(stress.profiles):
         number = str(i + 1)
@@ -82,10 +82,11 @@ def tables(stress: MeasuredStress) -> list[Table]:
         if failed:
             marked.add(i)
         names = ", ".join(name.replace("_", " ") for name in failed)
-        cells = [declared.cell(quantity, profile, **_centre(profile)) for quantity in shown]
+        centre = _centre(profile)
+        cells = [declared.cell(quantity, profile, unit="", **centre) for quantity in shown]
         state = profile.lubrication or "not stated"
         checks = f"FAILED: {names}" if failed else "passed"
-        rows.append((number, f"{profile.load:.4g} N", state, *cells, checks))
+        rows.append((number, f"{profile.load:.4g}", state, *cells, checks))
     film, indenter = stress.scans[0].film, stress.scans[0].indenter
     title = (
         f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
@@ -101,7 +102,8 @@ def tables(stress: MeasuredStress) -> list[Table]:
     farthest = max(float(profile.r[-1]) for profile in stress.profiles)
     places = ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")
     common = Table("All profiles", ("", ""), [*numbers, places])
-    return [Table(title, head, rows, frozenset(marked)), common, checks_table(checks_shown)]
+    profiles = Table(title, head, rows, frozenset(marked), labels=3)
+    return [profiles, common, checks_table(checks_shown)]
 
 
 def dataset(stress: MeasuredStress) -> declared.Dataset:

@@ -136,16 +136,16 @@ def test_a_budget_counts_that_poissons_ratio_never_exceeds_one_half() -> None:
 
 
 def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
-    told: list[tuple[int, int]] = []
-    options = {"seed": 8, "workers": 2, "progress": lambda *numbers: told.append(numbers)}
+    told: list[memscal.Progress] = []
+    options = {"seed": 8, "workers": 2, "progress": told.append}
     two = memscal.monte_carlo(paper, draws=34, **options)
     np.testing.assert_allclose(two.samples, hundred.samples[:34], rtol=1e-9)
     other = memscal.monte_carlo(paper, draws=2, seed=9).samples
     assert not np.any(other == hundred.samples[:2])
-    done = [number for number, _ in told]
+    done = [progress.done for progress in told]
     assert done == sorted(done)
     assert len(done) > 2
-    assert told[-1] == (34, 34)
+    assert (told[-1].task, told[-1].done, told[-1].total) == ("draws", 34, 34)
 
 
 def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo) -> None:

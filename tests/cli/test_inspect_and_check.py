@@ -38,9 +38,9 @@ def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path):
         thickness[()] = 2000.0
         thickness.attrs["units"] = "um"
     lines = run("inspect", "scan.h5").out.splitlines()
-    (modulus,) = [line for line in lines if "film/young_modulus" in line]
+    (modulus,) = [line for line in lines if "young modulus  " in line and "MPa" in line]
     assert "2.20 ± 0.10) MPa" in modulus
-    (film,) = [line for line in lines if "film/thickness" in line]
+    (film,) = [line for line in lines if "thickness  " in line and "±" in line]
     assert "2.000 ± 0.020) mm" in film
     quantities = {q["name"]: q for q in run("inspect", "scan.h5", "--json").json["quantities"]}
     assert quantities["young_modulus"]["unit"] == "Pa"

@@ -1,13 +1,16 @@
-"""Words and tables for people."""
+"""Words and tables for people, on a terminal and elsewhere."""
 
 import io
+import re
 import sys
 import time
 
 import pytest
 
-from memscal.cli.output import emit_tables, working
-from memscal.summaries.table import Table
+from memscal.cli.output import emit_tables, show_messages, working
+from memscal.model.checks import Message
+from memscal.progress import counted
+from memscal.summaries.table import Table, folded
 
 
 class Terminal(io.StringIO):
@@ -23,43 +26,123 @@ TABLE = Table(
     "Quality checks", ("check", "result"), [("drift", "passed"), ("[bold]symmetry", "FAILED")],
     frozenset({1}),
 )  # fmt: skip
+PLAIN = (
+    "Quality checks\n"
+    "  check           result\n"
+    "  --------------  ------\n"
+    "  drift           passed\n"
+    "  [bold]symmetry  FAILED\n"
+)
+
+
+def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Have both streams go to a terminal of 80 columns."""
+    both = Terminal()
+    monkeypatch.setattr(sys, "stdout", both)
+    monkeypatch.setattr(sys, "stderr", both)
+    for name, value in (("TERM", "xterm-256color"), ("COLUMNS", "80"), ("NO_COLOR", "")):
+        monkeypatch.setenv(name, value)
+    return both
 
 
 def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]):
     emit_tables(TABLE, Table("empty", ("a",), []))
-    assert capsys.readouterr().out == (
-        "Quality checks\n"
-        "  check           result\n"
-        "  --------------  ------\n"
-        "  drift           passed\n"
-        "  [bold]symmetry  FAILED\n"
+    assert capsys.readouterr().out == PLAIN
+
+
+def test_a_terminal_gets_bold_titles_and_failures_in_red(monkeypatch: pytest.MonkeyPatch):
+    terminal = at_terminal(monkeypatch)
+    emit_tables(TABLE)
+    title, *_, failed = terminal.getvalue().splitlines()
+    assert title == "\x1b[1mQuality checks\x1b[0m"
+    assert failed == "\x1b[31m\x1b[1m  [bold]symmetry  FAILED\x1b[0m"
+    assert re.sub(r"\x1b\[\d+m", "", terminal.getvalue()) == PLAIN
+
+
+@pytest.mark.parametrize("name", ["NO_COLOR", "TERM"])
+def test_without_colour_nothing_is_bold(monkeypatch: pytest.MonkeyPatch, name: str):
+    terminal = at_terminal(monkeypatch)
+    monkeypatch.setenv(name, "dumb")
+    emit_tables(TABLE)
+    assert terminal.getvalue() == PLAIN
+
+
+WIDE = Table(
+    "A title of many words that says what all of the numbers in the table below it are about",
+    ("", "state", *(f"quantity {i} (kPa)" for i in range(9))),
+    [(str(row), "dry", *(f"(26.14 ± 0.{row}{i})×10⁻⁵ mV/Pa" for i in range(9))) for row in (1, 2)],
+    labels=2,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_columns_wrap_beside_their_labels_and_none_is_lost(width: int):
+    lines = WIDE.plain(width).splitlines()
+    assert max(map(len, lines)) <= width
+    for row in (1, 2):
+        parts = [line for line in lines if line.startswith(f"  {row}  dry  ")]
+        assert "".join(parts).count("±") == 9
+        assert re.findall(r"± (0\.\d\d)\)×10⁻⁵ mV/Pa", "".join(parts)) == [
+            f"0.{row}{i}" for i in range(9)
+        ]
+    assert len(parts) == {40: 9, 60: 9, 80: 5, 120: 3}[width]
+
+
+@pytest.mark.parametrize(("text", "lines"), [
+    ("a width of (0.560 ± 0.014) mm suffices", ["a width of", "(0.560 ± 0.014) mm", "suffices"]),
+    ("χ²/ν = 1.07, p = 0.5 or so", ["χ²/ν = 1.07,", "p = 0.5 or", "so"]),
+    ("0.178 [0.164, inf]", ["0.178 [0.164, inf]"]), ("no limit", ["no limit"]),
+    ("/a/long/path with spaces.h5 is whole", ["/a/long/path", "with", "spaces.h5 is", "whole"]),
+    ("above 0.12 (95 %)", ["above", "0.12 (95 %)"]), ("first\nsecond", ["first", "second"]),
+])  # fmt: skip
+def test_a_line_ends_between_words_and_never_within_a_number(text: str, lines: list[str]):
+    assert folded(text, 12) == lines
+
+
+def test_prose_is_folded_before_a_column_moves_to_another_table():
+    prose = " ".join(["The content is what was written."] * 4)
+    table = Table("", ("step", "finding"), [("digest", prose)])
+    lines = table.plain(50).splitlines()
+    assert max(map(len, lines)) <= 50
+    assert (
+        " ".join(" ".join(lines[3:]).split())
+        == f"digest {'The content is what was written. ' * 4}".strip()
     )
 
 
-def test_a_terminal_gets_a_drawn_table_with_cells_as_text(monkeypatch: pytest.MonkeyPatch):
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stdout", terminal)
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.delenv("NO_COLOR", raising=False)
-    emit_tables(TABLE)
-    shown = terminal.getvalue()
-    assert "[bold]symmetry" in shown
-    assert "\x1b[1;31m" in shown
-    assert "─" in shown
+def test_messages_of_a_kind_that_say_the_same_are_shown_once_with_their_number(monkeypatch):
+    terminal = at_terminal(monkeypatch)
+    text = "Outlier at x = {0} mm of repeat {1}: {2} mV instead of 4.756 mV."
+    outliers = [Message("outlier", text.format(0.5 * i, i, 4.1 - i)) for i in range(4)]
+    other = Message("missing", "Points are missing.", "warning")
+    verdicts = [Message("macroscopic", f"It ({way} loading) agrees.") for way in ("one", "two")]
+    show_messages([*outliers[:2], other, *outliers[2:], *verdicts, Message("macroscopic", "No.")])
+    assert terminal.getvalue().split("\n") == [
+        "Note: Outlier at x = 0.0 mm of repeat 0: 4.1 mV instead of 4.756 mV. (3 more",
+        "  like it; --json lists all.)",
+        "Warning: Points are missing.",
+        "Note: It (one loading) agrees. (1 more like it; --json lists all.)",
+        "Note: No.",
+        "",
+    ]
 
 
-def test_progress_of_long_work_leaves_no_trace(monkeypatch: pytest.MonkeyPatch):
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setattr("memscal.cli.output._FIRST_AFTER", 0.0)
-    with working("Sweeping"):
-        while "Sweeping" not in terminal.getvalue():
-            time.sleep(0.001)
+def test_progress_is_counted_on_a_terminal_and_leaves_no_trace(monkeypatch: pytest.MonkeyPatch):
+    terminal = at_terminal(monkeypatch)
+    monkeypatch.setattr("memscal.cli.output._ON_TERMINAL", (0.0, 0.001))
+    with working("Drawing"):
+        for _ in counted(range(5), "draws", 5):
+            time.sleep(0.02)
+    assert re.search(r"Drawing: 2 of 5 draws, 0 s left \(0 s\)", terminal.getvalue())
     assert terminal.getvalue().endswith("\r\x1b[K")
 
 
-def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]):
+def test_progress_is_a_line_now_and_then_where_nobody_watches(capsys, monkeypatch):
     with working("Sweeping"):
         pass
     assert capsys.readouterr().err == ""
+    monkeypatch.setattr("memscal.cli.output._IN_LINES", (0.01, 30.0))
+    with working("Sweeping"):
+        for _ in counted(range(3), "draws", 3):
+            time.sleep(0.1)
+    assert re.fullmatch(r"Sweeping: 1 of 3 draws, 0 s left \(0 s\)\n", capsys.readouterr().err)

@@ -51,7 +51,7 @@ def test_options_mean_their_units(run: Run, folder: Path):
     largest = float(truth["noise"]) / 0.002
     assert truth["baseline"] == pytest.approx(0.02 * largest)
     assert truth["drift"] == pytest.approx(-0.01 * largest)
-    assert done.json["truth_si"]["conversion_constant"] == pytest.approx(2e-7)
+    assert done.json["truth"]["conversion_constant"]["value"] == pytest.approx(2e-4)
 
 
 def test_repeats_loads_and_rasters_have_their_shapes(run: Run, folder: Path):
@@ -81,7 +81,7 @@ def test_a_linear_film_and_its_rod_are_simulated_on_request(run: Run, folder: Pa
     shown = run("simulate", "-o", "scan.h5", "--points", 9, *linear, "--json").exits(0).json
     scan = memscal.read_scan("scan.h5")
     assert (scan.film.law, scan.rod_friction) == ("linear", 0.0)
-    assert (shown["truth_si"]["film_law"], shown["truth_si"]["rod_friction"]) == ("linear", 0.0)
+    assert (shown["truth"]["film_law"], shown["truth"]["rod_friction"]["value"]) == ("linear", 0.0)
     assert "sliding freely" in run("calibrate", "scan.h5", "--dry-run").out
     assert FILM_LAWS == LAWS
 

@@ -52,7 +52,7 @@ def test_options_mean_their_units(run: Run, folder: Path):
     assert (dry.film.thickness, told["thickness"]) == pytest.approx((3e-3, 2.85e-3))
     assert [item["scan"] for item in done.json["scans"]] == [f"run/{name}" for name in FILES]
     assert done.json["synthetic"] is True
-    assert done.json["scans"][1]["truth_si"]["position_error"] == pytest.approx(5e-6)
+    assert done.json["scans"][1]["truth"]["position_error"]["value"] == pytest.approx(5.0)
 
 
 def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, folder: Path):
@@ -61,7 +61,7 @@ def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, fol
     done = run(*SPHERE, "-o", "slip", *still, *slip, "--json").exits(0)
     told = memscal.read_scan("slip/sphere_dry.h5").synthetic
     assert (told["friction"], told["slip_length"]) == (np.inf, pytest.approx(3e-6))
-    assert done.json["scans"][1]["truth_si"]["friction"] == "inf"
+    assert done.json["scans"][1]["truth"]["friction"] == "inf"
     run(*SPHERE, "-o", "rough", *still, "--exponential", 1, 0.5).exits(0)
     for name in FILES[1:]:
         told = memscal.read_scan(f"rough/{name}").synthetic

@@ -1,5 +1,7 @@
 """Printed results, public names and the contents of old files stay what they were."""
 
+import re
+from collections.abc import Iterator
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -50,6 +52,27 @@ def test_a_command_prints_the_golden_results(name, runs: Runs):
     tolerance = TOLERANCE_OF_DRAWS if name in {"calibrate-draw", "calibrate-sweep"} else TOLERANCE
     changes = list(differences(load(name), runs[name], tolerance))
     assert not changes, "\n".join(changes[:20])
+
+
+def test_json_has_one_convention_of_units():
+    """A quantity is an object of value, uncertainty and unit; no key names a unit."""
+    # Ranges of a file's arrays stand in the unit beside them; notes of a file are its own.
+    in_key = re.compile(r"_(mm|um|n|k?pa|mv|si|per_\w+|seconds)$")
+
+    def offenders(value: Any, path: str) -> Iterator[str]:
+        if isinstance(value, dict):
+            if "unit" in value and not value.keys() & {"value", "maximum"}:
+                yield path
+            for key, item in value.items():
+                if in_key.search(key) and not isinstance(item, str):
+                    yield f"{path}.{key}"
+                yield from () if key == "configuration" else offenders(item, f"{path}.{key}")
+        elif isinstance(value, list):
+            for item in value:
+                yield from offenders(item, f"{path}[]")
+
+    outputs = {name: load(name)["output"] for name in COMMANDS}
+    assert {place for name, told in outputs.items() for place in offenders(told, name)} == set()
 
 
 def test_every_golden_output_has_its_command():

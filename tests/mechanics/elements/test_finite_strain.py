@@ -13,6 +13,7 @@ from memscal.mechanics.finite_strain.film_elements import FilmElements, Rubber
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Depth, Load
+from memscal.progress import reporting
 
 EDGE = 0.05e-3
 RADII = np.array([0.0, 0.5, 1.0, 2.0]) * 1e-3
@@ -199,9 +200,8 @@ def test_a_sticking_sphere_moves_nothing_outward_and_a_sliding_one_does() -> Non
 def test_a_frictionless_film_comes_back_the_way_it_went() -> None:
     loads = (Load(0.34), Load(0.5), Load(0.34))
     shares: list[float] = []
-    up, deeper, back = solve_finite_strain(
-        FILM, SPHERE, loads, refinement=0.5, progress=shares.append
-    )
+    with reporting(lambda progress: shares.append(progress.done / progress.total)):
+        up, deeper, back = solve_finite_strain(FILM, SPHERE, loads, refinement=0.5)
     assert np.all(np.diff(shares) > 0)
     assert (shares[0] > 0, shares[-1]) == (True, pytest.approx(1.0))
     assert back.depth == pytest.approx(up.depth, rel=1e-6)

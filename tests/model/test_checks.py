@@ -1,0 +1,25 @@
+"""Every quality check is explained, in the program as in the documentation."""
+
+import re
+from pathlib import Path
+
+import memscal
+from memscal.model.checks import EXPLANATIONS
+
+ROOT = Path(__file__).parents[2]
+DECLARED = re.compile(
+    r"\b(?:check|_reduced|_chi_square|_added|_tested)\(\s*f?\"(\w+?)(?:_?\{(\w*)|\")"
+)
+
+
+def test_every_check_that_is_declared_is_explained() -> None:
+    sources = (path.read_text() for path in Path(memscal.__path__[0]).rglob("*.py"))
+    names = {match[1] for source in sources for match in DECLARED.finditer(source)}
+    assert len(names) > 25
+    assert names - EXPLANATIONS.keys() - {"held_out"} == set()
+
+
+def test_the_documentation_explains_checks_in_the_same_words() -> None:
+    rows = (ROOT / "docs" / "quality.md").read_text(encoding="utf-8").splitlines()
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows if "| `" in row]
+    assert {row[0].strip("`"): (row[1], row[3]) for row in cells} == EXPLANATIONS

@@ -1,0 +1,94 @@
+"""Long work tells how much of it is done: to callbacks, to the log, and as a bar."""
+
+import logging
+import math
+import sys
+import types
+
+import pytest
+from helpers.scans import contact_scan, known_apparatus
+
+import memscal
+from memscal import progress
+from memscal.progress import counted, counter, reporting
+
+FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+SPHERE = memscal.Sphere(radius=128.8e-3)
+
+
+def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
+    return [(one.task, one.done, one.total) for one in heard]
+
+
+@pytest.mark.parametrize(("arguments", "text"), [
+    (("contacts", 137, 500, 30.0), "137 of 500 contacts, 79 s left"),
+    (("contacts", 1, 500, 30.0), "1 of 500 contacts, 4.2 h left"),
+    (("contacts", 500, 500, 30.0), "500 of 500 contacts"), (("draws", 0, 9, 0.1), "0 of 9 draws"),
+    (("the loading", 0.25, 1.0, 60.0), "25% of the loading, 3 min left"),
+])  # fmt: skip
+def test_progress_in_words_has_the_count_and_the_time_left(arguments, text: str) -> None:
+    assert str(memscal.Progress(*arguments)) == text
+
+
+def test_only_the_outermost_task_is_told_of() -> None:
+    heard: list[memscal.Progress] = []
+    with reporting(heard.append):
+        list(counted((list(counted("ab", "inner", 2)) for _ in range(2)), "outer", 2))
+        counter("after", 1)(1)
+    list(counted("ab", "unheard", 2))
+    assert told(heard) == [("outer", 1, 2), ("outer", 2, 2), ("after", 1, 1)]
+
+
+def test_what_consumes_a_task_hears_of_its_own_work() -> None:
+    heard: list[memscal.Progress] = []
+    with reporting(heard.append):
+        for _ in counted("ab", "items", 2):
+            counter("own", 1)(1)
+    assert told(heard) == [("items", 1, 2), ("own", 1, 1), ("items", 2, 2), ("own", 1, 1)]
+
+
+def test_public_functions_tell_their_callback(tmp_path) -> None:
+    heard: list[memscal.Progress] = []
+    sensor = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01)
+    scan = contact_scan(load=(1.0, 2.0), film=sensor.film)
+    stress = memscal.measure_stress(scan, sensor, progress=heard.append)
+    assert told(heard) == [("loads", 1, 2), ("loads", 2, 2)]
+    heard.clear()
+    options = {"friction": (0.0, 0.2, math.inf), "loading": "total", "progress": heard.append}
+    memscal.compare(stress, sensor, **options)
+    assert set(told(heard)) == {("contacts", done, 6) for done in (2, 4, 6)}
+    heard.clear()
+    memscal.indent(FILM, SPHERE, load=[0.2, 0.7], friction=0.3, rings=24, progress=heard.append)
+    assert ("loads", 2, 2) in told(heard)
+    heard.clear()
+    scans = [memscal.simulate(seed=1, points=17), "missing.h5"]
+    results = memscal.calibrate_many(scans, progress=heard.append)
+    assert [result.passed for result in results][1:] == [False]
+    assert told(heard) == [("scans", 1, 2), ("scans", 2, 2)]
+    heard.clear()
+    memscal.calibrate(memscal.simulate(seed=1, points=17), progress=heard.append)
+    assert [one.task for one in heard] == ["uncertain inputs"] * 3
+
+
+def test_the_log_has_a_line_now_and_then(caplog, monkeypatch) -> None:
+    with caplog.at_level(logging.INFO, "memscal"):
+        list(counted("abc", "short ones", 3))
+        monkeypatch.setattr(progress, "_EVERY", 0.0)
+        list(counted("ab", "long ones", 2))
+    assert [record.name for record in caplog.records] == ["memscal"] * 2
+    assert caplog.messages[0].startswith("1 of 2 long ones, ")
+    assert caplog.messages[1] == "2 of 2 long ones"
+
+
+def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) -> None:
+    with reporting(True):
+        list(counted("ab", "<draws>", 2))
+    assert capsys.readouterr().err.endswith(f"\r{'2 of 2 <draws>':<60}\n")
+    display = pytest.importorskip("IPython.display")
+    shown: list[str] = []
+    handle = types.SimpleNamespace(update=lambda page: shown.append(page.data))
+    monkeypatch.setattr(display, "display", lambda *_, **__: handle)
+    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
+    with reporting(True):
+        list(counted("ab", "<draws>", 2))
+    assert shown[-1] == '<progress value="2.0" max="2"></progress> 2 of 2 &lt;draws&gt;'
