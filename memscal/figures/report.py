@@ -62,7 +62,7 @@ class Report:
     failed: bool = False  # or if a check failed
     leading: int = 2
     pictures: Sequence[Picture] = ()
-    checks: Sequence[QualityCheck] = ()
+    checks: Sequence[QualityCheck] | None = None
     messages: Sequence[Message] = ()
     budget: Table | None = None
     settings: Sequence[Table] = ()
@@ -79,7 +79,7 @@ def html_report(result: Result) -> str:
         "Results": _html(tables[: report.leading]),
         "Figures": html_figures(report.pictures),
         "Further results": _html(tables[report.leading :]),
-        "Quality checks": _checks(report.checks),
+        "Quality checks": _checks(report.checks or ()),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
         "Uncertainty budget": _html([report.budget] if report.budget else []),
         "What was measured on": _html(report.settings),
@@ -90,11 +90,11 @@ def html_report(result: Result) -> str:
         for heading, content in sections.items()
         if content
     )
-    failed = report.failed or not all(check.passed for check in report.checks)
-    kind, verdict = "verdict failed" if failed else "verdict", report.verdict
-    lines = "<br>\n".join(escape(verdict or _verdict(report.checks)).splitlines())
-    note = f'<p class="{kind}" role="note">{lines}</p>'
-    heading = f"<h1>{escape(report.title)}</h1>\n{note}\n"
+    failed = report.failed or not all(check.passed for check in report.checks or ())
+    kind = "verdict failed" if failed else "verdict"
+    lines = "<br>\n".join(escape(report.verdict or _verdict(report.checks)).splitlines())
+    note = f'<p class="{kind}" role="note">{lines}</p>\n' if lines else ""
+    heading = f"<h1>{escape(report.title)}</h1>\n{note}"
     page = Template(_PAGE.read_text(encoding="utf-8"))
     return page.substitute(
         title=escape(report.title), body=heading + body, program=f"memscal {__version__}"
@@ -146,15 +146,15 @@ def _image(figure: Figure, file_format: str, dpi: float) -> str:
 def report_of(result: Result) -> Report:
     """Return what the page of a result says beside its tables."""
     tables: list[Table] = result.tables()
-    checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
+    checks, messages = getattr(result, "checks", None), getattr(result, "messages", ())
     title = tables[0].title if tables else type(result).__name__
     pictures = [Picture(result.plot, title, title)] if result._figure else []
     return Report(title=title, pictures=pictures, checks=checks, messages=messages)
 
 
-def _verdict(checks: Sequence[QualityCheck]) -> str:
+def _verdict(checks: Sequence[QualityCheck] | None) -> str:
     if not checks:
-        return "No quality check was made."
+        return "" if checks is None else "No quality check was made."
     failed = [check.name.replace("_", " ") for check in checks if not check.passed]
     if not failed:
         return f"All {len(checks)} quality checks passed."

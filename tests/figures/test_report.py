@@ -222,8 +222,7 @@ def test_figures_too_large_for_a_page_become_coarser_images(monkeypatch):
 
 def test_every_result_has_a_page_of_its_own():
     contact = pressed()
-    rows = Page(contact.report()).table
-    assert rows  # a contact has no checks, files or messages
+    assert "No quality check" not in contact.report()  # for a contact has none
     restored = memscal.restore(
         sphere_scan(contact, seed=5), known_apparatus(conversion_uncertainty=0.005)
     )
