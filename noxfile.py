@@ -27,6 +27,9 @@ NOTHING_FROM_OUTSIDE = {"PYTHONPATH": "", "PYTHONNOUSERSITE": "1"}
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment in which linear algebra, here of small matrices, does not compete with itself."""
 
+# The judge of accessibility that runs in a browser, as npm names it.
+AXE = "axe-core@4.14.1"
+
 # Cores that this process may use, of which a machine can have more.
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -117,6 +120,19 @@ def judges(session: nox.Session) -> None:
     """Have other programs validate the files that the built wheel writes."""
     with outside_the_checkout(session, requirements=group("judges")):
         run_pytest(session, "-m", "judges", "tests/judges", *session.posargs)
+
+
+@nox.session
+def pages(session: nox.Session) -> None:
+    """Have a browser open, judge and print the pages that the built wheel writes."""
+    for program in ("chromium", "npm"):
+        if not shutil.which(program):
+            session.error(f"{program} is not installed: apt-get install {program}")
+    with outside_the_checkout(session, requirements=group("pages")) as copy:
+        fetch = ("npm", "install", "--silent", "--no-audit", "--no-fund", "--ignore-scripts")
+        session.run(*fetch, "--prefix", os.fspath(copy / "npm"), AXE, external=True)
+        session.env["MEMSCAL_AXE"] = os.fspath(copy / "npm/node_modules/axe-core/axe.min.js")
+        run_pytest(session, "-m", "pages", "tests/pages", *session.posargs)
 
 
 @nox.session

@@ -7,14 +7,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import (
-    FILE,
-    accept_altered_option,
-    brief_option,
-    option,
-    output_options,
-    report_option,
-)
+from memscal.cli.options import FILE, accept_altered_option, option, report_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -38,9 +31,7 @@ Examples:
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
-@brief_option
-@report_option
-@output_options
+@report_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
 ) -> int:

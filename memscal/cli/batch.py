@@ -84,17 +84,18 @@ def command(
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
     from memscal.calibration.batch import Batch
-    from memscal.formats.fleet import read_fleet
+    from memscal.formats.fleet import manifest_scans, read_fleet
     from memscal.progress import span
 
     chosen = calibration_settings(**settings)
     source, results = (Path(os.path.realpath(path)) for path in (source, results))
     batch = Batch(source, results, chosen, artifacts, shard_size)
     if report is not None and results not in Path(os.path.realpath(report)).parents:
-        out.prove_writable([report], force=force, inputs=_inputs(batch, report))
+        scans = manifest_scans(source) if report.exists() else ()
+        inputs = [source, *(batch.folder / scan.path for scan in scans)]
+        out.prove_writable([report], force=force, inputs=inputs)
     batch, start = batch.prepare(resume=resume), monotonic()
-    if report is not None:  # in the folder of results, too, which is there now
-        out.prove_writable([report], force=force)
+    out.prove_writable([report], force=force)  # in the folder of results, too, which is there now
     total = batch.count
     try:
         outcomes = list(_outcomes(batch, workers, scheduler))
@@ -122,15 +123,6 @@ def command(
     what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
     out.warn(f"{what}: memscal summary {results}")
     return CHECK_FAILED
-
-
-def _inputs(batch: Batch, report: Path) -> list[Path]:
-    """Return what a page that is there already may be, and must not replace."""
-    from memscal.formats.fleet import manifest_scans
-
-    if not report.exists():
-        return []
-    return [batch.source, *(batch.folder / scan.path for scan in manifest_scans(batch.source))]
 
 
 def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:

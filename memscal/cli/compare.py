@@ -10,15 +10,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import (
-    FILE,
-    Quantity,
-    accept_altered_option,
-    brief_option,
-    option,
-    output_options,
-    report_option,
-)
+from memscal.cli.options import FILE, Quantity, accept_altered_option, option, report_options
 from memscal.formats.files import together
 
 
@@ -121,9 +113,7 @@ Examples:
     "coefficients, maxima, effective friction, likelihood, interface."
 )
 @option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
-@brief_option
-@report_option
-@output_options
+@report_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
 ) -> int:

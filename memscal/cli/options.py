@@ -125,6 +125,8 @@ accept_altered_option = option("--accept-altered", is_flag=True)(
     "Use files although their content does not fit their digest: recorded in the output."
 )
 output_options = options_of(json_option, force_option, debug_option)
+report_options = options_of(brief_option, report_option, output_options)
+"""Those of commands that answer in a few lines and can write a report."""
 
 #: Those of memscal.model.film, which takes longer to import than help may; a test compares them.
 FILM_LAWS = ("linear", "neo-hookean", "mooney-rivlin")

@@ -8,15 +8,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import (
-    FILE,
-    Quantity,
-    accept_altered_option,
-    brief_option,
-    option,
-    output_options,
-    report_option,
-)
+from memscal.cli.options import FILE, Quantity, accept_altered_option, option, report_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -47,9 +39,7 @@ Examples:
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
-@brief_option
-@report_option
-@output_options
+@report_options
 def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: Any) -> int:
     """Restore the stress at the base of a film from a SCAN with a calibrated sensor (ARTIFACT).
 

@@ -1,8 +1,7 @@
 """Reports of results as HTML pages, each without other files, network or scripts."""
 
 import base64
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import singledispatch
 from html import escape
@@ -28,7 +27,7 @@ from memscal.model.indenter import RoundIndenter
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import KPA, MM, PER_MM, Record, by_name, estimated_quantity
+from memscal.model.quantities import KPA, MM, PER_MM, Quantity, Record, by_name, estimated_quantity
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -63,9 +62,9 @@ class Report:
     failed: bool = False  # or if a check failed
     leading: int = 2
     pictures: Sequence[Picture] = ()
-    checks: Sequence[QualityCheck] = ()
+    checks: Sequence[QualityCheck] | None = None
     messages: Sequence[Message] = ()
-    budgets: Sequence[Table] = ()
+    budget: Table | None = None
     settings: Sequence[Table] = ()
     files: Mapping[str, SourceFile | None] = field(default_factory=dict)
     process: Process | None = None
@@ -78,11 +77,11 @@ def html_report(result: Result) -> str:
     items = "\n".join(f"<li>{escape(text)}</li>" for text in marked_texts(report.messages))
     sections = {
         "Results": _html(tables[: report.leading]),
-        "Figures": _figures(report.pictures),
+        "Figures": html_figures(report.pictures),
         "Further results": _html(tables[report.leading :]),
-        "Quality checks": _checks(report.checks),
+        "Quality checks": _checks(report.checks or ()),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
-        "Uncertainty budget": _html(report.budgets),
+        "Uncertainty budget": _html([report.budget] if report.budget else []),
         "What was measured on": _html(report.settings),
         "Provenance": _html(_provenance(report)),
     }
@@ -91,11 +90,11 @@ def html_report(result: Result) -> str:
         for heading, content in sections.items()
         if content
     )
-    failed = report.failed or not all(check.passed for check in report.checks)
-    kind, verdict = "verdict failed" if failed else "verdict", report.verdict
-    lines = "<br>\n".join(escape(verdict or _verdict(report.checks)).splitlines())
-    note = f'<p class="{kind}" role="note">{lines}</p>'
-    heading = f"<h1>{escape(report.title)}</h1>\n{note}\n"
+    failed = report.failed or not all(check.passed for check in report.checks or ())
+    kind = "verdict failed" if failed else "verdict"
+    lines = "<br>\n".join(escape(report.verdict or _verdict(report.checks)).splitlines())
+    note = f'<p class="{kind}" role="note">{lines}</p>\n' if lines else ""
+    heading = f"<h1>{escape(report.title)}</h1>\n{note}"
     page = Template(_PAGE.read_text(encoding="utf-8"))
     return page.substitute(
         title=escape(report.title), body=heading + body, program=f"memscal {__version__}"
@@ -119,14 +118,17 @@ def _checks(checks: Sequence[QualityCheck]) -> str:
     return _html([Table(title, shown.head, shown.rows, shown.marked)])
 
 
-def _figures(pictures: Sequence[Picture]) -> str:
+def html_figures(pictures: Sequence[Picture]) -> str:
     """Return figures with their captions, as images that the page holds."""
     figures = [picture.draw() for picture in pictures]
     images = [_image(figure, *_FORMS[0]) for figure in figures]
-    for form in _FORMS[1:]:
-        for i in sorted(range(len(images)), key=lambda i: -len(images[i])):
-            if sum(map(len, images)) > _MOST_OF_FIGURES:
-                images[i] = min(images[i], _image(figures[i], *form), key=len)
+    coarser = {i: iter(_FORMS[1:]) for i in range(len(images))}
+    while coarser and sum(map(len, images)) > _MOST_OF_FIGURES:
+        largest = max(coarser, key=lambda i: len(images[i]))
+        if (form := next(coarser[largest], None)) is None:
+            del coarser[largest]
+        else:
+            images[largest] = min(images[largest], _image(figures[largest], *form), key=len)
     return "\n".join(
         f'<figure>\n<img alt="{escape(picture.alt)}" src="{image}">\n'
         f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
@@ -144,15 +146,15 @@ def _image(figure: Figure, file_format: str, dpi: float) -> str:
 def report_of(result: Result) -> Report:
     """Return what the page of a result says beside its tables."""
     tables: list[Table] = result.tables()
-    checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
+    checks, messages = getattr(result, "checks", None), getattr(result, "messages", ())
     title = tables[0].title if tables else type(result).__name__
     pictures = [Picture(result.plot, title, title)] if result._figure else []
     return Report(title=title, pictures=pictures, checks=checks, messages=messages)
 
 
-def _verdict(checks: Sequence[QualityCheck]) -> str:
+def _verdict(checks: Sequence[QualityCheck] | None) -> str:
     if not checks:
-        return "No quality check was made."
+        return "" if checks is None else "No quality check was made."
     failed = [check.name.replace("_", " ") for check in checks if not check.passed]
     if not failed:
         return f"All {len(checks)} quality checks passed."
@@ -177,12 +179,17 @@ def _of_calibration(result: Calibration | ApparatusFunction) -> Report:
         "the Gaussian. f: transfer function; hatched, what the scan does not resolve. Of a scan "
         "over the plane, from g: voltage, residuals and G; at several loads a row for each."
     )
+    values = dict(zip(data.parameters.names, data.parameters.values, strict=True))
+    budgets = [
+        (estimated_quantity(name).read_in(data.reading), budget, values.get(name, 0.0), "")
+        for name, budget in data.budget.items()
+    ]
     return Report(
         title=sensor_title(data),
         pictures=[Picture(result.plot, alt, caption)],
         checks=data.checks,
         messages=process.messages,
-        budgets=[_calibration_budget(data)],
+        budget=_budget(*budgets, down=True),
         settings=[_setting(data, data.load, data.reference)],
         files={"scan": process.input_scan, "reference": process.input_reference},
         process=process,
@@ -202,13 +209,18 @@ def _of_stress(stress: MeasuredStress) -> Report:
         "it; ticks at the top: the radius of the contact without friction. b: the same on a "
         "logarithmic scale, pale where the stress is not distinct from zero."
     )
-    title = f"Stress measured at the base of {_contact_words(stress.scans[0])}"
+    quantities = by_name(records.STRESS_NUMBERS.quantities)
+    budgets = [
+        (quantities[name], getattr(p, f"{name}_budget"), getattr(p, name), f"{i}: {p.label}, ")
+        for i, p in enumerate(stress.profiles, start=1)
+        for name in ("force", "maximum")
+    ]
     return Report(
-        title=title,
+        title=f"Stress measured at the base of {_contact_words(stress.scans[0])}",
         pictures=[Picture(stress.plot, alt, caption)],
         checks=stress.checks,
         messages=stress.messages,
-        budgets=[_stress_budget(stress, name) for name in ("force", "maximum")],
+        budget=_budget(*budgets),
         **_of_measurement(stress),
     )
 
@@ -225,15 +237,13 @@ def _of_restoration(restored: Restoration) -> Report:
         "stress where there is one, and the scan. b: residuals over the standard uncertainty of "
         "the noise."
     )
-    budget = restored.force_budget
-    row = _budget_row("total force (N)", budget, budget, restored.force, 1.0)
-    head = ("quantity", *_words(budget), *_TOTALS)
+    of_force = by_name(records.RESTORED)["force"], restored.force_budget, restored.force, ""
     return Report(
         title=f"Stress restored at the base of {_contact_words(restored.scan)}",
         pictures=[Picture(restored.plot, alt, caption)],
         checks=restored.checks,
         messages=restored.messages,
-        budgets=[Table(_OF_BUDGET, head, [row])],
+        budget=_budget(of_force),
         settings=[_setting(restored.scan, restored.scan.load)],
         files={"artifact": restored.apparatus.source, "scan": restored.scan.source},
     )
@@ -267,7 +277,7 @@ def _of_comparison(compared: FrictionComparison | ShearComparison) -> Report:
         for stem, draw in comparison_figures(compared).items():
             for name in (name for name in _COMPARED if stem.startswith(name)):
                 caption = _COMPARED[name].format(stem.removeprefix(name).replace("-", ", "))
-                alt = f"{caption} All loads together: {joint}."
+                alt = f"{caption.partition('.')[0]}. All loads together: {joint}."
                 pictures.append(Picture(draw, alt, caption))
     return Report(
         title=f"Friction of {_contact_words(measured.scans[0])}",
@@ -301,10 +311,7 @@ def _contact_words(scan: Scan | MeasuredScan) -> str:
 
 def _of_measurement(measured: MeasuredStress) -> dict[str, Any]:
     """Return what was measured on what, and the files and versions of it."""
-    settings: dict[str, Table] = {}
-    for scan in measured.scans:
-        table = _setting(scan)
-        settings.setdefault(table.plain(), table)
+    settings = {(table := _setting(scan)).plain(): table for scan in measured.scans}
     files = {f"scan {i}": scan.source for i, scan in enumerate(measured.scans, start=1)}
     files = {"artifact": measured.artifact, **files}
     return {"settings": [*settings.values()], "files": files, "process": measured.process}
@@ -345,57 +352,28 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
             yield prefix + quantity.words, text
 
 
-_OF_BUDGET = "Standard uncertainty by source, and its share of the variance"
-_TOTALS = ("root sum of squares", "relative standard uncertainty")
+def _budget(*rows: tuple[Quantity, Mapping[str, float], float, str], down: bool = False) -> Table:
+    """Return the shares of all sources in the uncertainty of values; ``down``: a row a source.
 
-
-def _calibration_budget(data: ApparatusData) -> Table:
-    """Return sources of uncertainty in rows, estimated quantities in columns."""
-    sources = dict.fromkeys(source for column in data.budget.values() for source in column)
-    values = dict(zip(data.parameters.names, data.parameters.values, strict=True))
-    columns = []
-    for name, budget in data.budget.items():
-        quantity = estimated_quantity(name).read_in(data.reading)
-        value = values.get(name, math.nan)
-        heading = f"{quantity.words} ({quantity.unit})"
-        columns.append(_budget_row(heading, budget, sources, value, quantity.scale))
-    first = ("source", *_words(sources), *_TOTALS)
-    head, *rows = zip(first, *columns, strict=True)
-    return Table(_OF_BUDGET, head, rows if sources else [])
-
-
-def _stress_budget(stress: MeasuredStress, name: str) -> Table:
-    """Return profiles in rows, sources of the uncertainty of their force or maximum in columns."""
-    quantity = by_name(records.STRESS_NUMBERS.quantities)[name]
-    budgets = [getattr(profile, f"{name}_budget") for profile in stress.profiles]
-    sources = dict.fromkeys(source for budget in budgets for source in budget)
-    rows = [
-        _budget_row(f"{i}: {p.label}", budget, sources, getattr(p, name), quantity.scale)
-        for i, (p, budget) in enumerate(zip(stress.profiles, budgets, strict=True), start=1)
-    ]
-    title = f"{_OF_BUDGET}: {quantity.heading}"
-    return Table(title, ("profile", *_words(sources), *_TOTALS), rows)
-
-
-def _budget_row(
-    name: str, budget: Mapping[str, float], sources: Iterable[str], value: float, scale: float
-) -> tuple[str, ...]:
-    """Return the shares of the sources, their root sum of squares, and that over the value."""
-    total = float(np.linalg.norm(list(budget.values())))
-    cells = (_share(budget.get(source), total, scale) for source in sources)
-    ratio = total / abs(value) if value else math.nan
-    relative = f"{100 * ratio:.2g}%" if math.isfinite(ratio) else "–"
-    return (name, *cells, f"{total / scale:.2g}", relative)
+    Each value has its quantity, its uncertainty by source, itself, and what it is of.
+    """
+    sources = dict.fromkeys(source for _, budget, *_ in rows for source in budget)
+    words = (source.replace("_", " ") for source in sources)
+    lines = [("source" if down else "", *words, "root sum of squares", "relative")]
+    for quantity, budget, value, of in rows:
+        total = float(np.linalg.norm(list(budget.values())))
+        cells = (_share(budget.get(source), total, quantity.scale) for source in sources)
+        relative = f"{100 * total / abs(value):.2g}%" if value else "–"
+        lines.append((of + quantity.heading, *cells, f"{total / quantity.scale:.2g}", relative))
+    head, *body = zip(*lines, strict=True) if down else lines
+    title = "Standard uncertainty by source, and its share of the variance"
+    return Table(title, head, body if sources else [])
 
 
 def _share(u: float | None, total: float, scale: float) -> str:
     if u is None:
         return "–"
     return f"{u / scale:.2g}" + (f" ({(u / total) ** 2:.0%})" if total > 0 else "")
-
-
-def _words(names: Iterable[str]) -> list[str]:
-    return [name.replace("_", " ") for name in names]
 
 
 def _provenance(report: Report) -> list[Table]:

@@ -209,31 +209,23 @@ class Table:
         """Return the table as HTML, each row headed by its first text, marked rows in bold."""
         lines = [f"<table>\n<caption>{_cell(self.title)}</caption>"]
         if any(self.head):
-            named = "".join(
-                f'<th scope="col">{_cell(cell)}</th>' if cell else "<td></td>" for cell in self.head
-            )
-            lines.append(f"<thead><tr>{named}</tr></thead>")
+            heads = (f'<th scope="col">{_cell(c)}</th>' if c else "<td></td>" for c in self.head)
+            lines.append(f"<thead><tr>{''.join(heads)}</tr></thead>")
         lines.append("<tbody>")
         for i, row in enumerate(self.rows):
             mark = ' class="failed" style="font-weight: bold"' if i in self.marked else ""
             heading = next((k for k, cell in enumerate(row) if cell), None)
-            cells = (
-                f'<th scope="row"{_long(cell)}>{_cell(cell)}</th>'
-                if k == heading
-                else f"<td{_long(cell)}>{_cell(cell)}</td>"
-                for k, cell in enumerate(row)
-            )
-            lines.append(f"<tr{mark}>{''.join(cells)}</tr>")
+            cells = ""
+            for k, cell in enumerate(row):
+                tag = 'th scope="row"' if k == heading else "td"
+                long = ' class="long"' if len(cell) > _ONE_LINE else ""
+                cells += f"<{tag}{long}>{_cell(cell)}</{tag[:2]}>"
+            lines.append(f"<tr{mark}>{cells}</tr>")
         return "\n".join([*lines, "</tbody>\n</table>"])
 
 
 def _cell(text: str) -> str:
     return escape(printable(text, _LONGEST))
-
-
-def _long(text: str) -> str:
-    """Return a class for a cell that a page may show in several lines."""
-    return ' class="long"' if len(text) > _ONE_LINE else ""
 
 
 def _parts(

@@ -63,6 +63,9 @@ def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
     ("d.png", ["design", "--figure", "d.svg", "--figure", "d.png"]),
     ("sphere.stress.h5", ["apply", "sensor.apparatus.h5", "sphere.h5"]),
     ("out.h5", ["restore", "sensor.apparatus.h5", "sphere.h5", "-o", "out.h5"]),
+    ("a.html", ["apply", "sensor.apparatus.h5", "sphere.h5", "-o", "new.h5", "--report", "a.html"]),
+    ("r.html", ["restore", "sensor.apparatus.h5", "sphere.h5", "-o", "new.h5",
+                "--report", "r.html"]),
 ])  # fmt: skip
 @pytest.mark.usefixtures("artifact", "scan")
 def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, arguments):
@@ -70,8 +73,9 @@ def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, 
     (folder / name).write_bytes(OLD)
     assert run(*arguments).exits(4, "--force").out == ""
     assert (folder / name).read_bytes() == OLD
+    assert "new.h5" not in names(folder)
     assert run(*arguments, "--force").code == 0
-    assert (folder / name).read_bytes()[:4] in (b"\x89HDF", b"\x89PNG")
+    assert (folder / name).read_bytes()[:4] in (b"\x89HDF", b"\x89PNG", b"<!DO")
 
 
 def test_an_interruption_keeps_the_old(run: Run, scan: Path, monkeypatch: Patch):

@@ -1,5 +1,7 @@
 """``memscal compare``: from files to friction; exit codes, refusals, and what it writes."""
 
+import html
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -127,10 +129,18 @@ def test_the_options_reach_the_comparison(compare: Run, made_by_hand: Give, benc
 
 
 def test_a_page_and_all_figures_are_written(compare: Run, made_by_hand: Give, folder: Path):
-    made_by_hand(comparison(lubrications=("dry",), loads=(1.37,), interface=interface_comparison()))
+    found = comparison(lubrications=("dry",), loads=(1.37,), interface=interface_comparison())
+    made_by_hand(found)
     options = ("--macroscopic", 1.6, "--interface", "--figures", "drawn", "--figure-format", "svg")
-    done = compare("--figure", "page.png", *options).exits(0)
+    done = compare("--figure", "page.png", "--report", "page.html", *options).exits(0)
     assert (folder / "page.png").read_bytes().startswith(b"\x89PNG")
+    page = (folder / "page.html").read_text(encoding="utf-8")
+    figures = ["Measured and calculated profiles, dry.", "Maximum of", "Effective", "Likelihood",
+               "Laws of the interface"]  # fmt: skip
+    captions = re.findall("<figcaption>(.*)</figcaption>", page)
+    assert [c.startswith(f) for c, f in zip(captions, figures, strict=True)] == [True] * 5
+    joint = html.escape(str(found.joint["dry"]["incremental"]))
+    assert page.count(f"All loads together: dry, incremental: {joint}") == len(captions)
     assert names(folder / "drawn") == [
         "effective-friction.svg", "friction-set-dry.svg", "interface.svg", "likelihood.svg",
         "maxima.svg", "profiles-dry.svg",
@@ -142,8 +152,9 @@ def test_nothing_is_overwritten_without_force(compare: Run, made_by_hand: Give, 
     made_by_hand()
     (folder / "drawn").mkdir()
     (folder / "drawn" / "maxima.png").write_bytes(b"mine")
-    assert compare("--figures", "drawn").code == NOT_WRITTEN
+    assert compare("--figures", "drawn", "--report", "page.html").code == NOT_WRITTEN
     assert names(folder / "drawn") == ["maxima.png"]
+    assert names(folder) == ["drawn"]
     assert (folder / "drawn" / "maxima.png").read_bytes() == b"mine"
     assert compare("--figures", "drawn", "--force").code == 0
     assert (folder / "drawn" / "maxima.png").read_bytes().startswith(b"\x89PNG")

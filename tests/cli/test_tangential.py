@@ -53,7 +53,11 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
     measured = memscal.measure_stress(made.dry, folder / "zz.apparatus.h5")
     measured.save(folder / "dry.stress.h5")
     options = ("--channel", "xz", "--friction", 0.1, "--loading", "total", "--no-cache")
-    done = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options, "--json")
+    done = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options, "--json",
+               "--report", "shear.html")  # fmt: skip
+    page = (folder / "shear.html").read_text(encoding="utf-8")
+    assert "by the shear" in page
+    assert "No quality check was made." in page
     friction = (0.0, 0.1, np.inf)
     alone = memscal.compare_shear(
         measured, folder / "xz.apparatus.h5", friction=friction, loading="total"

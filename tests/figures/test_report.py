@@ -6,9 +6,10 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from helpers.scans import as_function, known_apparatus, pressed, sphere_scan
 
 import memscal
-from memscal.figures.report import html_report
+from memscal.figures import report, style
 from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import StressSensor
 
@@ -55,9 +56,13 @@ class Page(HTMLParser):
         return [attributes for name, attributes in self.elements if name == tag]
 
 
+def page_of(data):
+    return Page(as_function(data).report())
+
+
 @pytest.fixture(name="page", scope="module")
 def page_fixture(make_apparatus):
-    return Page(html_report(make_apparatus(failed=2)))
+    return page_of(make_apparatus(failed=2))
 
 
 def test_every_element_is_closed_and_the_page_names_its_language_and_title(page):
@@ -108,14 +113,14 @@ def test_the_other_estimate_has_a_table_of_its_own(make_apparatus):
     data = make_apparatus()
     of_a = data.parameters.only(("conversion_constant",))
     other = memscal.OtherEstimate("bayesian", of_a, data.radial_profile)
-    page = Page(html_report(replace(data, other=other)))
+    page = page_of(replace(data, other=other))
     assert [row[0] for row in page.rows].count("conversion constant") == 2
 
 
 def test_the_budget_adds_up_in_squares(page):
     start = next(i for i, row in enumerate(page.rows) if row[0] == "source")
     rows = {row[0]: row[1:] for row in page.rows[start : start + 5]}
-    shares = [int(rows[name][0].split("(")[1].split()[0]) for name in ("noise", "load")]
+    shares = [int(rows[name][0].split("(")[1].removesuffix("%)")) for name in ("noise", "load")]
     assert shares == [49, 22]  # 9, 6 and 7 squared are 81, 36 and 49 of 166
     assert float(rows["root sum of squares"][0]) == pytest.approx(1.3e-7)
 
@@ -142,7 +147,7 @@ def test_hostile_strings_are_text_and_nothing_else(make_apparatus):
         failed=1, message=_HOSTILE,
     )  # fmt: skip
     object.__setattr__(data.process, "configuration", {_HOSTILE: _HOSTILE})
-    page = Page(html_report(data))
+    page = page_of(data)
     assert page.open == []
     assert not page.find("script")
     assert len(page.find("img")) == 1
@@ -151,7 +156,7 @@ def test_hostile_strings_are_text_and_nothing_else(make_apparatus):
 
 
 def test_a_calibration_without_checks_does_not_claim_that_they_passed(make_apparatus):
-    text = html_report(replace(make_apparatus(), checks=()))
+    text = as_function(replace(make_apparatus(), checks=())).report()
     assert "No quality check was made." in text
     assert "checks passed" not in text
 
@@ -166,7 +171,7 @@ def test_a_further_parameter_is_shown_with_the_unit_that_it_states(make_apparatu
     more = ParameterSet(
         (*known.names, "baseline_slope"), np.append(known.values, 0.02), covariance, units
     )
-    rows = Page(html_report(replace(data, parameters=more))).table
+    rows = page_of(replace(data, parameters=more)).table
     assert rows["baseline slope"][1] == "(0.0200 ± 0.0010) mV/mm"
 
 
@@ -174,6 +179,55 @@ def test_grouped_options_read_as_words(make_apparatus):
     data = make_apparatus()
     options = {"grid": {"spacing": "0.09 mm", "seed": None}, "options": {}}
     object.__setattr__(data.process, "configuration", options)
-    rows = Page(html_report(data)).table
+    rows = page_of(data).table
     assert rows["grid"] == ["spacing: 0.09 mm; seed: not given"]
     assert rows["options"] == ["none"]
+
+
+def test_checks_made_several_times_are_shown_once_with_the_worst(make_apparatus):
+    data = make_apparatus()
+    made = [
+        memscal.QualityCheck(f"outliers_{i}", value, 1.0, value <= 1.0, "Too many.")
+        for i, value in enumerate((0.2, 0.9, 1.5, 0.4), start=1)
+    ]
+    rows = page_of(replace(data, checks=tuple(made))).table
+    assert rows["outliers, worst of 3"] == ["0.9", "1", "", "passed", "Too many."]
+    assert rows["outliers 3"] == ["1.5", "1", "", "FAILED", "Too many."]
+    assert "outliers 1" not in rows
+
+
+def test_the_headings_of_a_row_and_of_a_column_are_never_empty():
+    table = memscal.summaries.table.Table("t", ("", "state"), [("", "all"), ("1", "dry")])
+    page = Page(table.html())
+    assert page.rows == [["", "state"], ["", "all"], ["1", "dry"]]
+    kinds = [name for name, _ in page.elements if name in ("td", "th")]
+    assert kinds == ["td", "th", "td", "th", "th", "td"]
+
+
+def test_figures_too_large_for_a_page_become_coarser_images(monkeypatch):
+    monkeypatch.setattr(report, "_MOST_OF_FIGURES", 150_000)
+    places = np.random.default_rng(1).normal(size=(2, 5000))
+
+    def draw(points):
+        with style.panels_of(3.0) as (figure, panels):
+            panels.flat[0].plot(*places[:, :points], ".")
+        return figure
+
+    pictures = [report.Picture(lambda n=n: draw(n), "a", "b") for n in (5000, 20)]
+    large, small = (image["src"] for image in Page(report.html_figures(pictures)).find("img"))
+    assert large.startswith("data:image/png;base64")
+    assert small.startswith("data:image/svg+xml;base64")
+    assert len(large) + len(small) < 150_000
+
+
+def test_every_result_has_a_page_of_its_own():
+    contact = pressed()
+    assert "No quality check" not in contact.report()  # for a contact has none
+    restored = memscal.restore(
+        sphere_scan(contact, seed=5), known_apparatus(conversion_uncertainty=0.005)
+    )
+    page = Page(restored.report())
+    assert page.open == []
+    shares = page.table["total force (N)"]
+    assert shares[-2] == f"{restored.force_uncertainty:.2g}"
+    assert page.table["sphere, radius"] == ["128.8 mm (no uncertainty stated)"]

@@ -63,8 +63,11 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
 
 def _scan(lubrication: str) -> Any:
     source = memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32)
-    indenter = SimpleNamespace(shape="sphere", radius=0.1288)
-    return SimpleNamespace(source=source, lubrication=lubrication, indenter=indenter)
+    film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    return SimpleNamespace(
+        source=source, lubrication=lubrication, indenter=memscal.Sphere(radius=0.1288), film=film,
+        sensor=memscal.StressSensor(name="array 3"),
+    )  # fmt: skip
 
 
 def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.LoadComparison:
@@ -126,7 +129,8 @@ def comparison(
     )
     measured = SimpleNamespace(
         profiles=tuple(profiles), scans=tuple(_scan(lubrication) for lubrication in lubrications),
-        checks=(), messages=(), overridden=(), noise_stated=True,
+        checks=(), messages=(), overridden=(), noise_stated=True, artifact=None,
+        process=memscal.Process(program="memscal", version="0", date=""),
     )  # fmt: skip
     given: dict[str, Any] = {
         "measured": measured, "friction": friction_grid, "loads": by_loading, "joint": joint,

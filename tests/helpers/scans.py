@@ -14,7 +14,7 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectra
-from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
+from memscal.model.apparatus import ApparatusData, ApparatusRadial, ParameterSet, TransferFunction
 from memscal.simulation.experiment import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
@@ -131,6 +131,11 @@ def known_apparatus(
         parameters=ParameterSet(names, values, covariance),
         **(contact | empty | {"sensor": SENSOR}),
     )
+    return as_function(data)
+
+
+def as_function(data: ApparatusData) -> memscal.ApparatusFunction:
+    """Return the apparatus function of what a file holds of it."""
     return memscal.ApparatusFunction(**{f.name: getattr(data, f.name) for f in fields(data)})
 
 
