@@ -22,10 +22,11 @@ from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
 from memscal.model.correlation import across, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
+from memscal.model.places import Places, places_of
 from memscal.model.plausibility import rise_of
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
-from memscal.model.scan import Places, Scan, places_of
+from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_LINES, MOST_OF_RASTER, too_large
 
 #: Channels that measure the shear along x and along y.
