@@ -31,6 +31,8 @@ from .formats.reference import write_reference as write_reference
 from .formats.scan import read_scan as read_scan
 from .formats.scan import write_scan as write_scan
 from .formats.stress import read_stress as read_stress
+from .formats.tables.scan import ImportedScan as ImportedScan
+from .formats.tables.scan import import_table as import_table
 from .friction.compare import compare as compare
 from .friction.compare import compare_shear as compare_shear
 from .friction.results import BoundedEstimate as BoundedEstimate
@@ -77,10 +79,10 @@ from .model.measured_stress import MeasuredPoints as MeasuredPoints
 from .model.measured_stress import MeasuredProfile as MeasuredProfile
 from .model.measured_stress import MeasuredScan as MeasuredScan
 from .model.measured_stress import MeasuredStress as MeasuredStress
+from .model.places import Places as Places
 from .model.provenance import Process as Process
 from .model.provenance import SourceFile as SourceFile
 from .model.scan import LoadCell as LoadCell
-from .model.scan import Places as Places
 from .model.scan import Scan as Scan
 from .model.scan import StressSensor as StressSensor
 from .model.stress import IdealReference as IdealReference

@@ -61,6 +61,10 @@ class ConvergenceError(MemscalError):
     last: object | None = None
 
 
+class UnitWarning(UserWarning):
+    """A value of a size that no set-up has: a unit was probably mistaken."""
+
+
 class OutputError(MemscalError):
     """An output that was not written; what was there before is untouched."""
 

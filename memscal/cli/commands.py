@@ -18,7 +18,7 @@ COMMANDS = {
     "compare": ("compare", "Compare measured with calculated stress: effective friction."),
     "design": ("design", "Predict the uncertainties of a scan before it is made."),
     "simulate": ("simulate", "Make a synthetic scan, or the scans of an experiment."),
-    "import": ("import_", "Convert a table (CSV) or a mesh to a scan or a reference."),
+    "import": ("import_", "Convert a table or a mesh to a scan or a reference."),
     "inspect": ("inspect", "Show what a file holds."),
     "check": ("check", "Check a file's safety, schema, digest and content."),
     "explain": ("explain", "Explain what a quality check tests, and what to do if it fails."),

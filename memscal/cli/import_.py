@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli import options as common
+from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, option, output_options, si
-from memscal.cli.output import emit, emit_json, message, prove_writable, show_messages
+from memscal.cli.output import emit, emit_json, message, show_messages
 from memscal.formats.files import together
 from memscal.model.checks import marked_texts
 from memscal.summaries.table import readable
@@ -26,7 +27,7 @@ _OF_MESHES = ("vertical", "base", "centre")
 _REFERENCE_NAMES = (*_OF_TABLES, *_SHARED, *_OF_MESHES)
 """The options that only a reference has."""
 
-_READING = ("delimiter", "decimal")
+_READING = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
 _POSITION = Quantity("mm", low=-float("inf"))
 _SIGN = click.Choice(["1", "-1"])
 
@@ -37,7 +38,8 @@ def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> Imported
     if not mesh:
         from memscal.formats.tables.reference import read_reference_table
 
-        return read_reference_table(path, **_stated(options, (*_OF_TABLES, *_READING)), **setting)
+        setting |= _stated(options, _OF_TABLES)
+        return read_reference_table(path, reading=_stated(options, _READING), **setting)
     from memscal.formats.meshes.reference_mesh import read_reference_mesh
 
     setting |= _stated(options, _OF_MESHES)
@@ -59,34 +61,49 @@ Examples:
       --repeat "load set" --repeat pass --load-scatter 2 --lubrication dry
       --indenter sphere --radius 60 --young-modulus 1.9 --poisson-ratio 0.5 --thickness 1.5
   memscal import current.csv -o scan.h5 --x x --u current
+  memscal import scan.xlsx -o scan.h5 --sheet Data --x Weg --u Spannung --noise 0.04 --missing n.a.
+  memscal import log.csv -o scan.h5 --x x --u U --load-column F --holds --figure holds.png
   memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
       --sigma S33 --sigma-unit MPa --sign -1 --load 1
   memscal import fem.vtu -o rod.h5 --format reference --r-unit mm
       --sigma S --sigma-unit MPa --load 1
 
 \b
-Columns are given by their names in the header, or by their numbers counted from 1.
+Columns are given by their names in the header, or by their numbers counted from 1. Units stand in
+the header (x [mm], x/mm) or in a row below it. Missing values are empty cells and the words
+nan, na, n/a, #n/a, nat, null, none and -. Workbooks and Parquet need the extra tables:
+pip install "memscal[tables]".
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
 _SCAN_NAMES = [
     *("x", "x_unit", "u", "u_unit", "u_sign", "y", "repeat", "branch", "u_xz"),
-    *("u_yz", "load_column", "load_unit", "load_uncertainty", "title"),
-    *("lubrication", "lubricant", "rod_friction"),
+    *(
+        "u_yz",
+        "u_errors",
+        "noise",
+        "holds",
+        "load_column",
+        "load_unit",
+        "load_uncertainty",
+        "title",
+    ),
+    *("title", "lubrication", "lubricant", "rod_friction"),
 ]
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
-_TABLE_NAMES = ["load", "delimiter", "decimal"]
+_TABLE_NAMES = ["load", *_READING]
 
 _ONLY = {
     "scan": [
-        *(*_SCAN_NAMES, "load_scatter", "position_error"),
+        *(*_SCAN_NAMES, "load_scatter", "position_error", "figures"),
         *(*_SENSOR_NAMES.values(), *_CELL_NAMES.values()),
     ],
     "reference": _REFERENCE_NAMES,
 }
-_NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "load")}
+_NEEDED = {"scan": ("x", "u"), "reference": ("sigma", "load")}
+_NEEDED_OF_MESHES = ("r_unit", "sigma_unit")
 
 
 @click.command("import", epilog=EXAMPLES)
@@ -104,7 +121,20 @@ _NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "l
     "Scan: unit of the readings, of any kind, such as mV, pA, uT, Pa, or 1 of counts.  [default: "
     "that of the column's head]"
 )
-@option("--y", metavar="COLUMN")("Scan: column of the second position, of points in a plane.")
+@option("--y", metavar="COLUMN")(
+    "Scan: column of the second position, of points in a plane, or of a line along y."
+)
+@option("--u-errors", metavar="COLUMN")("Scan: column of each reading's standard uncertainty.")
+@option("--noise", Quantity("unit of u"))(
+    "Scan: standard uncertainty of each reading, one number in the unit of the readings."
+)
+@option("--holds", is_flag=True)(
+    "Scan: the table is a log in the order of time. Holds, where the indenter presses at rest, are "
+    "found, and each is averaged with its scatter."
+)
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Scan: the log with the holds that were found."
+)
 @option("--repeat", metavar="COLUMN", multiple=True)(
     "Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
     "line, such as of the load that was set and of the pass."
@@ -174,37 +204,47 @@ _NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "l
 @option("--centre", (_POSITION, _POSITION), metavar="MM MM")(
     "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
 )
-@option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
+@option("--indenter", click.Choice(["rod", "sphere"]))("Shape of the indenter.  [default: rod]")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
 @common.rod_friction_option(common.FREE_OR_STUCK)
+@option("--sheet", metavar="NAME")("Sheet of a workbook.  [default: the first]")
+@option("--skip-rows", click.IntRange(1), metavar="N")(
+    "Lines before the header.  [default: found from the table]"
+)
+@option("--missing", metavar="WORD", multiple=True)(
+    "A word, or a number such as -9999, that means a missing value, besides those below."
+)
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
 def command(
     table: Path, output: Path, kind: str, as_json: bool, force: bool, **options: Any
 ) -> int:
-    """Convert a TABLE (CSV) to a scan or to a reference, or a mesh (VTU, VTK, XDMF) to a reference.
+    """Convert a TABLE (CSV, XLSX, Parquet) or a mesh (VTU, VTK, XDMF) to a scan or a reference.
 
-    The options state the units, the film and the indenter, which a table does not; a scan to be
-    calibrated with a reference of its own needs no film, indenter or load. Readings are kept as
-    they are. The numbers of readings, repeats, places and missing values are printed, and
+    The options state the film and the indenter, which a table does not, and units that it does not
+    state; a scan to be calibrated with a reference of its own needs no film, indenter or load.
+    Readings are kept as they are. What was read, and what was pressed on what, is printed and
     kept in the notes of the file.
     """
     from memscal.formats.meshes.mesh_files import is_mesh, with_drawn_in
 
     mesh = is_mesh(table)
-    options["repeat"] = options["repeat"] or None
+    options |= {name: options[name] or None for name in ("repeat", "missing", "figures", "holds")}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    prove_writable([output], force=force, inputs=with_drawn_in(table))
+    figures = options["figures"] or ()
+    out.prove_writable([output, *figures], force=force, inputs=with_drawn_in(table))
     with together():
         if kind == "scan":
             from memscal.formats.scan import write_scan
 
             scan = _read_scan(table, options)
-            notes = scan.notes
-            write_scan(scan.scan, output, overwrite=force)
+            notes = scan.messages
+            write_scan(scan, output, overwrite=force)
+            if scan.holds is not None:
+                out.write_files(out.rendered(scan.holds.plot, figures), force=force)
         else:
             from memscal.formats.reference import write_reference
 
@@ -226,8 +266,12 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
     """Name every option that is missing, or that belongs to something else, at once."""
     if kind == "scan" and mesh:
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
-    of_table = () if mesh or kind == "scan" else _OF_TABLES
-    missing = [name for name in (*of_table, *_NEEDED[kind]) if options[name] is None]
+    needed = list(_NEEDED[kind])
+    if kind == "reference":
+        needed += _NEEDED_OF_MESHES if mesh else _OF_TABLES
+    elif options["y"] is not None:
+        needed.remove("x")
+    missing = [name for name in needed if options[name] is None]
     if missing:
         raise click.UsageError(
             f"A {kind} needs more: add {common.named(missing)}. See the examples of "
@@ -236,8 +280,11 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
     other = "reference" if kind == "scan" else "scan"
     if misplaced := _stated(options, _ONLY[other]):
         raise click.UsageError(f"{common.named(misplaced)} belong to --format {other}.")
-    if options["rod_friction"] is not None and options["indenter"] != "rod":
+    if options["rod_friction"] is not None and options["indenter"] == "sphere":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
+    for name, of in {"figures": "holds", "shear_sign": "" if mesh else "shear"}.items():
+        if of and options[name] is not None and options[of] is None:
+            raise click.UsageError(f"{common.named([name.rstrip('s')])} belongs to --{of}.")
     unused = _stated(options, (*_OF_TABLES, *_READING) if mesh else _OF_MESHES)
     if unused and kind == "reference":
         problem = f"A {'mesh' if mesh else 'table'} has no use for {common.named(unused)}."
@@ -253,20 +300,20 @@ def _set_up(options: dict[str, Any]) -> dict[str, Any]:
     stated: dict[str, Any] = {}
     if _stated(options, [name for name in options if name.startswith((*common.FILM, *common.LAW))]):
         stated["film"] = common.film_from(options)
-    if _stated(options, ("radius", "radius_uncertainty", "rod_friction")):
-        stated["indenter"] = common.indenter_from(options["indenter"], options)
+    if _stated(options, ("indenter", "radius", "radius_uncertainty", "rod_friction")):
+        stated["indenter"] = common.indenter_from(options["indenter"] or "rod", options)
     return stated
 
 
 def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
-    from memscal.formats.tables.scan import read_scan_table
+    from memscal.formats.tables.scan import import_table
     from memscal.model.scan import LoadCell, StressSensor
 
     sensor, load_cell = (
         _stated({key: options[name] for key, name in names.items()}, [*names])
         for names in (_SENSOR_NAMES, _CELL_NAMES)
     )
-    return read_scan_table(
+    return import_table(
         path,
         **_stated(options, [*_SCAN_NAMES, *_TABLE_NAMES]),
         load_scatter=si(options["load_scatter"], -2),

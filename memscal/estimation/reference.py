@@ -18,6 +18,7 @@ from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.indenter import Rod
+from memscal.model.plausibility import require_plausible
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -91,7 +92,7 @@ def require_calibration_rod(scan: Scan, reference: BaseStress | None) -> None:
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
     if with_film_of(reference, scan).film is not None:
-        points.require_plausible(scan)
+        require_plausible(scan)
 
 
 def film_of(stress: BaseStress) -> ElasticFilm | None:

@@ -22,8 +22,8 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES, failed_check_messages
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
+from memscal.model.places import even_lattice
 from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
-from memscal.model.scan import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit

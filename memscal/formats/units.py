@@ -99,6 +99,32 @@ def reading_of(unit: str, where: str) -> Reading:
     return Reading.fitting(si, float(quantity.to(si).magnitude))
 
 
+def is_common_unit(text: str) -> bool:
+    """Whether a text is one of the units that need no look-up."""
+    return text != "" and text in _CANONICAL
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that can be worked with."""
+    try:
+        return is_common_unit(text.strip()) or _pint_quantity(text, "unit", "") is not None
+    except UnitError:
+        return False
+
+
+def same_unit(first: str, second: str) -> bool:
+    """Whether two units are the same one, however they are written."""
+    known = [_CANONICAL.get(unit.strip()) for unit in (first, second)]
+    if None not in known:
+        return len({(SI_UNITS[of], power) for of, power in filter(None, known)}) == 1
+    try:
+        one, other = (_pint_quantity(unit, "unit", "") for unit in (first, second))
+    except UnitError:
+        return False
+    alike = one.is_compatible_with(other)
+    return bool(alike and math.isclose(one.to(other.units).magnitude, 1.0, rel_tol=1e-9))
+
+
 def dimension_of(unit: str, where: str) -> str:
     """Return the dimension of a unit whose quantity is not known beforehand."""
     if canonical := _CANONICAL.get(unit.strip()):

@@ -13,7 +13,6 @@ from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
-from memscal.estimation.points import require_span
 from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
@@ -23,6 +22,7 @@ from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
+from memscal.model.plausibility import require_span
 from memscal.model.provenance import Process, accepted_alterations, timestamp
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT

@@ -26,6 +26,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
+from memscal.model.plausibility import require_span
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
@@ -52,7 +53,7 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     """Refuse a scan of several loads of a curved indenter, of many points, or without cov(G)."""
     require_covariance(apparatus)
     require_contact_size(scan, MOST_RESTORED)
-    scan_points.require_span(scan)
+    require_span(scan)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
         return

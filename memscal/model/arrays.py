@@ -1,6 +1,7 @@
 """The few checks that the dataclasses share."""
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
@@ -8,13 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.errors import InputError
+from memscal.errors import InputError, UnitWarning
 
 FloatArray = NDArray[np.float64]
 
 
 #: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.
 _SMALLEST, _LARGEST = 1e-30, 1e30
+#: Wide ranges of what films and indenters have, in SI units; a thousand times the lowest is usual.
+_SIZES = {
+    "young_modulus": ("Pa", 1e3, 1e10),
+    "thickness": ("m", 1e-6, 0.1),
+    "radius": ("m", 1e-6, 0.1),
+}
+_PREFIXES = {"m": 1e-3, "u": 1e-6, "k": 1e3, "M": 1e6, "G": 1e9}
+_SHOWN: dict[Any, Any] = {}
 
 
 def require_positive(name: str, value: float, unit: str = "") -> None:
@@ -23,6 +32,25 @@ def require_positive(name: str, value: float, unit: str = "") -> None:
         problem = f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero."
         raise InputError(problem, cure="Check the value and its unit.")
     require_size(name, value, unit)
+
+
+def warn_of_units(*records: Any) -> None:
+    """Warn of the film and the indenter of no set-up, and name the unit that was probably meant."""
+    for record in records:
+        for name, (unit, low, high) in _SIZES.items():
+            # A sphere's radius is that of its curvature: a lens has metres.
+            most = high * (1000 if getattr(record, "shape", "") == "sphere" else 1)
+            value = getattr(record, name, low)
+            if low <= value <= most:
+                continue
+            prefix = min(_PREFIXES, key=lambda p: abs(math.log(value * _PREFIXES[p] / low / 1e3)))
+            meant = value * _PREFIXES[prefix]
+            text = (
+                f"The {name.replace('_', ' ')} is {value:g} {unit}. Probably {value:g} "
+                f"{prefix}{unit} was meant, which is {meant:g} {unit}."
+            )
+            # Of one place in the code, so that each text is shown once.
+            warnings.warn_explicit(text, UnitWarning, "memscal", 1, registry=_SHOWN)
 
 
 def require_size(

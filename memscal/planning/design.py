@@ -26,13 +26,14 @@ from memscal.estimation.bayesian import supported, weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
-from memscal.estimation.points import measured_points, require_plausible
+from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
+from memscal.model.plausibility import require_plausible
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded

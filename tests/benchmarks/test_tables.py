@@ -7,7 +7,7 @@ import pytest
 from helpers.machine import show, turns
 
 from memscal.formats.scan import read_scan, write_scan
-from memscal.formats.tables.scan import read_scan_table
+from memscal.formats.tables.scan import import_table
 
 pytestmark = pytest.mark.benchmark
 
@@ -22,7 +22,7 @@ def table(folder: Path, rows: int) -> Path:
 
 def work(path: Path) -> None:
     """Import a table, write the scan and read it again."""
-    scan = read_scan_table(path, x="x", u="u", repeat="pass").scan
+    scan = import_table(path, x="x", u="u", repeat="pass")
     write_scan(scan, path.with_suffix(".h5"), overwrite=True)
     assert read_scan(path.with_suffix(".h5")).u_zz.size == int(path.stem)
 
@@ -36,7 +36,7 @@ def test_the_time_of_a_row_does_not_grow_with_their_number(tmp_path: Path) -> No
 def test_a_table_is_read_as_fast_as_by_numpy(tmp_path: Path) -> None:
     path = table(tmp_path, 200_000)
     ratio = turns(
-        lambda: read_scan_table(path, x="x", u="u", repeat="pass"),
+        lambda: import_table(path, x="x", u="u", repeat="pass"),
         lambda: np.loadtxt(path, delimiter=",", skiprows=1),
         rounds=3,
     )

@@ -20,6 +20,8 @@ from memscal.mechanics.press_rod import press_rod
 from memscal.model.checks import QualityCheck
 from memscal.simulation import rod_scan
 
+pytestmark = pytest.mark.filterwarnings("ignore::memscal.errors.UnitWarning")
+
 SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
 SCAN = memscal.simulate(film=LINEAR_FILM, seed=65)
 

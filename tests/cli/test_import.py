@@ -120,7 +120,7 @@ def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: R
     ([], ["--x", "--u"]), ([*COLUMNS, "--thickness", 1], ["--young-modulus", "--poisson-ratio"]),
     ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
     ([*COLUMNS, *SET_UP, "--shear-sign", -1], ["--shear-sign"]),
-    (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
+    (["--format", "reference"], ["--r", "--sigma", "--load"]),
 ])  # fmt: skip
 def test_all_that_is_missing_is_named(run: Run, table: Path, folder: Path, arguments, hints):
     refused = run("import", table, "-o", "scan.h5", *arguments).exits(2)

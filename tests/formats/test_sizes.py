@@ -19,10 +19,11 @@ from memscal.errors import FormatError, InputError
 from memscal.estimation import points
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.tables import text_table
-from memscal.formats.tables.scan import read_scan_table
-from memscal.formats.tables.text_table import Table, Wanted
-from memscal.model import scan as scan_module
-from memscal.model.scan import BRANCHES, places_of
+from memscal.formats.tables.scan import import_table
+from memscal.formats.tables.text_table import TextTable, Wanted
+from memscal.model import places as places_module
+from memscal.model.places import places_of
+from memscal.model.scan import BRANCHES
 
 COLUMNS = {"x": Wanted("x", "mm", "length"), "u": Wanted("u"), "n": Wanted("n", words=BRANCHES)}
 
@@ -30,7 +31,7 @@ COLUMNS = {"x": Wanted("x", "mm", "length"), "u": Wanted("u"), "n": Wanted("n", 
 def content(path: Path, names: str, decimal: str, delimiter: str) -> Any:
     """Columns and notes of a table, or the words of its error."""
     try:
-        table = Table(path, decimal=decimal, delimiter=delimiter)
+        table = TextTable(path, decimal=decimal, delimiter=delimiter)
         columns = table.columns({name: COLUMNS[name] for name in names})
         return {name: values.tolist() for name, values in columns.items()}, table.notes
     except InputError as error:
@@ -90,15 +91,17 @@ def big_table(path: Path, rows: int, wrong: int = -1) -> Path:
 
 def test_a_wrong_cell_far_down_is_named_by_its_row(tmp_path: Path):
     table = big_table(tmp_path / "t.csv", 60_000, wrong=54_320)
-    with pytest.raises(FormatError, match="column 'u', data row 54321: 'overload' is not a number"):
-        read_scan_table(table, x="x", u="u")
+    with pytest.raises(
+        FormatError, match=r"column 'u' holds what is not a number in line 54322 \('overload'\)\."
+    ):
+        import_table(table, x="x", u="u")
 
 
 IMPORT = """
 import resource, sys
 from memscal.formats.scan import write_scan
-from memscal.formats.tables.scan import read_scan_table
-found = read_scan_table(sys.argv[1], x="x", u="u").scan
+from memscal.formats.tables.scan import import_table
+found = import_table(sys.argv[1], x="x", u="u")
 write_scan(found, sys.argv[1] + ".h5")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
@@ -119,7 +122,7 @@ def test_a_million_rows_take_little_memory(tmp_path: Path):
 
 @pytest.mark.parametrize("pairs", [0, 20_000_000], ids=["rounded", "by pairs"])
 def test_places_along_a_line_are_those_along_the_same_line_in_the_plane(monkeypatch, pairs):
-    monkeypatch.setattr(scan_module, "_MOST_PAIRS", pairs)
+    monkeypatch.setattr(places_module, "_MOST_PAIRS", pairs)
     rng = np.random.default_rng(0)
     passes = np.repeat(np.arange(30), 40)
     along = np.tile(np.arange(40) * 1e-4, 30) + rng.normal(0, 1e-6, passes.size)
@@ -138,15 +141,15 @@ def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line
     """Of 40 MB of endless lines 838 MB were held: all of them were cut into cells at once."""
     path = tmp_path / "t.csv"
     path.write_text(f"{line}\n" * (40_000_000 // len(line)))
-    lines = Table._lines
+    lines = TextTable._numbered
 
-    def watched(table: Table, block: bytes) -> list[str]:
+    def watched(table: TextTable, block: bytes) -> Any:
         assert len(block) <= 3 * text_table._BLOCK
         return lines(table, block)
 
-    monkeypatch.setattr(Table, "_lines", watched)
+    monkeypatch.setattr(TextTable, "_numbered", watched)
     with pytest.raises(InputError, match=words):
-        Table(path)
+        TextTable(path)
 
 
 def test_what_is_too_large_is_refused_with_size_limit_and_cure(
@@ -154,7 +157,7 @@ def test_what_is_too_large_is_refused_with_size_limit_and_cure(
 ):
     monkeypatch.setattr(text_table, "MOST_ROWS", 100)
     with pytest.raises(InputError, match=r"has 120 lines of 2 columns, but at most 100(.|\n)*Aver"):
-        read_scan_table(big_table(tmp_path / "t.csv", 120), x="x", u="u")
+        import_table(big_table(tmp_path / "t.csv", 120), x="x", u="u")
     Image.new("L", (2049, 9)).save(tmp_path / "field.png")
     with pytest.raises(InputError, match=r"2,049 pixels along a side, but at most 2,048"):
         memscal.read_reference(tmp_path / "field.png", pixel_size=1e-6)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from memscal.errors import FormatError, InputError
 from memscal.formats.tables.reference import read_reference_table
-from memscal.formats.tables.scan import ImportedScan, read_scan_table
-from memscal.formats.tables.text_table import Table
+from memscal.formats.tables.scan import ImportedScan, import_table
+from memscal.formats.tables.text_table import TextTable
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod
 
@@ -24,7 +24,7 @@ def scan_table(path: Path, text: str, **options: Any) -> ImportedScan:
     table.write_text(text, encoding="utf-8")
     given = {"x": "x", "u": "u", "x_unit": "mm", "u_unit": "mV", "load": 1.0}
     given |= {"film": make_film(), "indenter": Rod(radius=0.25e-3), **options}
-    return read_scan_table(table, **given)
+    return import_table(table, **given)
 
 
 def rows(*columns: Any, header: str, separator: str = ",") -> str:
@@ -35,10 +35,10 @@ def rows(*columns: Any, header: str, separator: str = ",") -> str:
 
 def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
     found = scan_table(tmp_path, "x,u\n1.5,2\n-1,1\n0.25,3\n")
-    assert found.scan.kind == "line"
-    assert found.scan.x.tolist() == [1.5e-3, -1e-3, 0.25e-3]
-    assert found.scan.u_zz.tolist() == [2e-3, 1e-3, 3e-3]
-    assert any("3 readings at 3 places" in note.text for note in found.notes)
+    assert found.kind == "line"
+    assert found.x.tolist() == [1.5e-3, -1e-3, 0.25e-3]
+    assert found.u_zz.tolist() == [2e-3, 1e-3, 3e-3]
+    assert any("3 readings at 3 places" in note.text for note in found.messages)
 
 
 @pytest.mark.parametrize("text", [
@@ -47,12 +47,12 @@ def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
 ], ids=["forth and back", "mixed"])  # fmt: skip
 def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
     found = scan_table(tmp_path, text, repeat="n")
-    assert found.scan.kind == "repeats"
-    assert found.scan.x.tolist() == [0.0, 1e-3, 3e-3]
+    assert found.kind == "repeats"
+    assert found.x.tolist() == [0.0, 1e-3, 3e-3]
     np.testing.assert_allclose(
-        found.scan.u_zz, [[1e-3, 2e-3, 4e-3], [1.1e-3, 2.2e-3, 4.4e-3]], rtol=1e-12
+        found.u_zz, [[1e-3, 2e-3, 4e-3], [1.1e-3, 2.2e-3, 4.4e-3]], rtol=1e-12
     )
-    assert any("6 readings in 2 repeats at 3 places" in note.text for note in found.notes)
+    assert any("6 readings in 2 repeats at 3 places" in note.text for note in found.messages)
 
 
 @pytest.mark.parametrize("text", [
@@ -63,24 +63,24 @@ def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
 def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text):
     found = scan_table(tmp_path, text, repeat="n")
     stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
-    assert found.scan.kind == "points"
-    np.testing.assert_allclose(found.scan.x, stated[:, 0] * 1e-3, rtol=1e-12)
-    np.testing.assert_allclose(found.scan.u_zz, stated[:, 1] * 1e-3, rtol=1e-12)
-    np.testing.assert_array_equal(found.scan.passes, stated[:, 2] - 1)
-    assert any("in 2 repeats at 3 places" in note.text for note in found.notes)
+    assert found.kind == "points"
+    np.testing.assert_allclose(found.x, stated[:, 0] * 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(found.u_zz, stated[:, 1] * 1e-3, rtol=1e-12)
+    np.testing.assert_array_equal(found.passes, stated[:, 2] - 1)
+    assert any("in 2 repeats at 3 places" in note.text for note in found.messages)
 
 
 def test_what_is_missing_is_counted(tmp_path: Path):
     found = scan_table(tmp_path, "x,u,n\n0,1,1\n1,,1\n2,3,1\n0,1,2\n2,5,2\n", repeat="n")
-    texts = [note.text for note in found.notes]
-    assert "1 values of u_zz are missing (NaN)." in texts
+    texts = [note.text for note in found.messages]
+    assert "1 values of u_zz are missing (NaN), line 3." in texts
     assert "1 more would make every repeat complete." in texts
 
 
 def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path):
     found = scan_table(tmp_path, "x,u\n0,1\n1,2\n0,3\n1,4\n")
-    assert (found.scan.kind, found.scan.u_zz.tolist()) == ("line", [1e-3, 2e-3, 3e-3, 4e-3])
-    (note,) = [note.text for note in found.notes if "--repeat COLUMN" in note.text]
+    assert (found.kind, found.u_zz.tolist()) == ("line", [1e-3, 2e-3, 3e-3, 4e-3])
+    (note,) = [note.text for note in found.messages if "--repeat COLUMN" in note.text]
     assert "2 of 4 positions" in note
 
 
@@ -89,7 +89,7 @@ def test_a_line_has_no_note_of_repeats(tmp_path_factory: pytest.TempPathFactory,
     rng = np.random.default_rng(seed)
     x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
     found = scan_table(tmp_path_factory.mktemp("t"), rows(x.tolist(), [1.0] * 33, header="x,u"))
-    assert not any("--repeat COLUMN" in note.text for note in found.notes)
+    assert not any("--repeat COLUMN" in note.text for note in found.messages)
 
 
 @pytest.mark.parametrize("numbered", [True, False])
@@ -107,9 +107,9 @@ def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path: Path, n
     columns = x.tolist(), y.tolist(), rng.normal(size=96).tolist(), repeat.tolist()
     text = rows(*columns, header="x,y,u,n")
     found = scan_table(tmp_path, text, y="y", repeat="n" if numbered else None)
-    assert (found.scan.kind, found.scan.u_zz.shape) == ("points", (96,))
-    np.testing.assert_allclose(found.scan.y, y * 1e-3, rtol=1e-12)
-    (note,) = [note.text for note in found.notes if "96 readings" in note.text]
+    assert (found.kind, found.u_zz.shape) == ("points", (96,))
+    np.testing.assert_allclose(found.y, y * 1e-3, rtol=1e-12)
+    (note,) = [note.text for note in found.messages if "96 readings" in note.text]
     assert ("in 3 repeats" in note) == numbered
     if numbered or noise in (0.0, 0.02):
         assert "at 32 places" in note
@@ -143,25 +143,25 @@ def test_readings_of_any_unit_state_it_in_their_head(tmp_path: Path, unit, si, f
     text = f"x,{head.format(unit)}\n0,1\n1,2\n"
     found = scan_table(tmp_path, text, u_unit=None, film=None, indenter=None, load=None)
     if factor is not None:
-        assert found.scan.unit == si
-        np.testing.assert_allclose(found.scan.u_zz, [factor, 2 * factor], rtol=1e-15)
+        assert found.unit == si
+        np.testing.assert_allclose(found.u_zz, [factor, 2 * factor], rtol=1e-15)
     else:
-        np.testing.assert_allclose(found.scan.u_zz, [1e-3, 2e-3], rtol=1e-15)
-    assert (found.scan.film, found.scan.indenter, found.scan.load) == (None, None, None)
+        np.testing.assert_allclose(found.u_zz, [1e-3, 2e-3], rtol=1e-15)
+    assert (found.film, found.indenter, found.load) == (None, None, None)
 
 
 def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Path):
     text = "x,u,f\n0,1,990\n1,2,1000\n2,2,1030\n"
     found = scan_table(tmp_path, text, load=None, load_column="f", load_unit="mN")
-    assert found.scan.load == 1.0
-    np.testing.assert_allclose(found.scan.normal_load, [0.99, 1.0, 1.03])
-    assert scan_table(tmp_path, text, load=None).scan.load is None
+    assert found.load == 1.0
+    np.testing.assert_allclose(found.normal_load, [0.99, 1.0, 1.03])
+    assert scan_table(tmp_path, text, load=None).load is None
 
 
 def test_rows_without_a_position_are_left_out_and_counted_and_a_header_may_be(tmp_path: Path):
     found = scan_table(tmp_path, "0,9,1\n,7,7\n1,8,\n", x="1", u=3)
-    np.testing.assert_array_equal(found.scan.u_zz, [1e-3, np.nan])
-    assert any("1 rows without a position" in note.text for note in found.notes)
+    np.testing.assert_array_equal(found.u_zz, [1e-3, np.nan])
+    assert any("1 rows without a position" in note.text for note in found.messages)
 
 
 @pytest.mark.parametrize(("text", "decimal"), [
@@ -173,15 +173,17 @@ def test_rows_without_a_position_are_left_out_and_counted_and_a_header_may_be(tm
 ], ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"])  # fmt: skip
 def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, decimal):
     found = scan_table(tmp_path, text)
-    assert found.scan.x.tolist() == [0.5e-3, 1.5e-3]
-    assert found.scan.u_zz.tolist() == [1.25e-3, 2.5e-3]
-    assert Table(tmp_path / "table.csv").decimal == decimal
+    assert found.x.tolist() == [0.5e-3, 1.5e-3]
+    assert found.u_zz.tolist() == [1.25e-3, 2.5e-3]
+    assert TextTable(tmp_path / "table.csv").decimal == decimal
 
 
 def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
-    with pytest.raises(FormatError, match=r"column 'u', data row 2: 'overload'"):
+    with pytest.raises(FormatError, match=r"column 'u' holds .* line 3 \('overload'\)\."):
         scan_table(tmp_path, "x,u\n0,1\n1,overload\n")
-    with pytest.raises(FormatError, match=r"row 1: 'down' is not a number or approach or retreat"):
+    with pytest.raises(
+        FormatError, match=r"not a number or approach or retreat in line 2 \('down'"
+    ):
         scan_table(tmp_path, "x,u,b\n0,1,down\n1,2,approach\n", branch="b")
 
 
@@ -280,9 +282,9 @@ def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path: Path):
 
 def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
     found = scan_table(tmp_path, "x,u,s\n0,-1,5\n1,-2,6\n", u_sign=-1, u_xz="s")
-    assert found.scan.u_zz.tolist() == [1e-3, 2e-3]
-    assert found.scan.channels["u_xz"].tolist() == [5e-3, 6e-3]
-    assert "The sign of u_zz was changed." in found.scan.notes
+    assert found.u_zz.tolist() == [1e-3, 2e-3]
+    assert found.channels["u_xz"].tolist() == [5e-3, 6e-3]
+    assert "The sign of u_zz was changed." in found.notes
     with pytest.raises(InputError, match="Give 1 or -1"):
         scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_sign=2)
 
@@ -290,11 +292,11 @@ def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
 def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
     head = "# SYNTHETIC: made up\x1b[2J\n%  rod 3\n#\n" + "# " + "z" * 5000 + "\n" + "# more\n" * 40
     found = scan_table(tmp_path, head + "x,u\n0,1\n# within the table\n1,2\n")
-    lines = found.scan.notes.splitlines()
-    assert lines == marked_texts(found.notes)
-    assert found.scan.source.sha256 in lines[0]
+    lines = found.notes.splitlines()
+    assert lines == marked_texts(found.messages)
+    assert found.source.sha256 in lines[0]
     assert "The table says: SYNTHETIC: made up[2J" in lines
     assert "The table says: rod 3" in lines
-    assert "24 more lines of comment were left out." in lines
-    assert "within the table" not in found.scan.notes
+    assert "24 more lines above the table were left out." in lines
+    assert "within the table" not in found.notes
     assert max(map(len, lines)) < 400

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.tables.text_table import Table, Wanted
+from memscal.formats.tables.sheets import open_table
+from memscal.formats.tables.text_table import Wanted
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
@@ -166,21 +167,23 @@ def read_reference_table(
     *,
     r: Column,
     sigma: Column,
-    r_unit: str,
-    sigma_unit: str,
+    r_unit: str | None = None,
+    sigma_unit: str | None = None,
     sign: int = 1,
     shear: Column | None = None,
     shear_sign: int = 1,
-    delimiter: str | None = None,
-    decimal: str | None = None,
+    reading: Mapping[str, Any] | None = None,
     **stated: Any,
 ) -> ImportedProfile:
     """Read the stress at the base of the film from a table; ``stated`` are the profile's fields."""
     # sign is -1 where compression is negative, and turns the normal stress; shear_sign is -1 where
-    # the shear is S13 with axis 3 from the base to the surface.
+    # the shear is S13 with axis 3 from the base to the surface. Units are by default those of the
+    # columns' heads; reading holds the options of open_table.
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
-    table = Table(path, delimiter=delimiter, decimal=decimal)
+    table = open_table(path, **(reading or {}))
+    r_unit = table.unit_of(r, r_unit, "r_unit (--r-unit)")
+    sigma_unit = table.unit_of(sigma, sigma_unit, "sigma_unit (--sigma-unit)")
     wanted = {"r": Wanted(r, r_unit, "length"), "sigma_zz": Wanted(sigma, sigma_unit, "stress")}
     if shear is not None:
         wanted["sigma_rz"] = Wanted(shear, sigma_unit, "stress")
@@ -190,7 +193,7 @@ def read_reference_table(
         columns["sigma_rz"] = shear_sign * columns["sigma_rz"]
     samples = Samples(
         columns=columns,
-        source=table.source,
+        source=table.source or SourceFile("the table", ""),
         notes=import_notes(table.notes),
         kind="table",
         item="data row",

@@ -1,25 +1,34 @@
 """Scans from tables with one row per reading."""
 
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
 from memscal.formats.tables.reference import require_sign
-from memscal.formats.tables.text_table import Table, Wanted
-from memscal.formats.units import reading_of
+from memscal.formats.tables.sheets import open_table
+from memscal.formats.tables.text_table import Wanted
+from memscal.formats.units import reading_of, to_si
 from memscal.model.checks import Message, import_notes, marked_texts
+from memscal.model.holds import find_holds
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.notation import Reading, format_measured
+from memscal.model.places import places_of
+from memscal.model.plausibility import require_plausible, require_span
 from memscal.model.quantities import dimension_in
-from memscal.model.scan import BRANCHES, Scan, branch_numbers, places_of
+from memscal.model.records import FILM, LOAD, ROUND_INDENTER
+from memscal.model.result import Result
+from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers
 
 Column = str | int
 Columns = dict[str, NDArray[Any]]
 
+#: Options that name columns, besides x and u.
+_ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "u_xz", "u_yz")
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
 #: so large a share of them was probably repeated.
 _CLOSE, _MANY = 0.1, 0.25
@@ -27,107 +36,225 @@ _CLOSE, _MANY = 0.1, 0.25
 _MIXED = 0.3
 
 
-@dataclass(frozen=True, eq=False)
-class ImportedScan:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ImportedScan(Scan):
     """A scan that was read from a table, and what was done on the way."""
 
-    scan: Scan
-    notes: tuple[Message, ...]
+    messages: tuple[Message, ...] = ()
+    holds: Result | None = None
 
 
-def read_scan_table(
-    path: str | os.PathLike[str],
-    *,
-    x: Column,
-    u: Column,
-    x_unit: str | None = None,
-    u_unit: str | None = None,
-    load: float | None = None,
-    y: Column | None = None,
-    repeat: Column | Sequence[Column] | None = None,
-    branch: Column | None = None,
-    u_xz: Column | None = None,
-    u_yz: Column | None = None,
-    load_column: Column | None = None,
-    load_unit: str = "N",
-    load_scatter: float | None = None,
-    x_error: float | None = None,
-    u_sign: int = 1,
-    delimiter: str | None = None,
-    decimal: str | None = None,
-    **stated: Any,
-) -> ImportedScan:
-    """Read a scan from a table with one row per reading; ``stated`` are further fields of it."""
-    # Columns are names, or numbers counted from 1; x_unit holds for y too, u_unit for all channels;
-    # by default they are those of the columns' heads (x/mm). load_scatter, relative, and x_error,
-    # in m, are independent from point to point.
+def import_table(
+    source: Any, *, u: Column, x: Column | None = None, y: Column | None = None,
+    x_unit: str | None = None, u_unit: str | None = None,
+    u_errors: Column | None = None, noise: float | None = None,
+    load: float | None = None, load_column: Column | None = None, load_unit: str | None = None,
+    load_scatter: float | None = None, x_error: float | None = None,
+    repeat: Column | Sequence[Column] | None = None, branch: Column | None = None,
+    u_xz: Column | None = None, u_yz: Column | None = None, u_sign: int = 1, holds: bool = False,
+    sheet: str | None = None, skip_rows: int = 0, missing: Sequence[str] = (),
+    delimiter: str | None = None, decimal: str | None = None, **stated: Any,
+) -> ImportedScan:  # fmt: skip
+    """Read a scan from a table with one row for each reading.
+
+    The header is found below what precedes it.  Units stand in the heads (``x/mm``, ``x [mm]``,
+    ``U (µV)``) or in a row below the header; an option that contradicts them is refused.  Film and
+    indenter, where both are stated, are held against the positions.
+
+    Parameters
+    ----------
+    source : path, data frame or mapping of str to array
+        Text (CSV; UTF-8, UTF-16 or Latin-1), .xlsx, Parquet, or columns in memory.
+    x, y, u : str or int
+        Columns of the positions and of the normal channel's readings, by name, or by number from
+        1.  Of positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.
+    x_unit, u_unit : str, optional
+        Units of ``x`` and ``y``, and of all channels, where the table states none.
+    u_errors, noise : str or int, float
+        Column of the standard uncertainty of each reading, or one number in the unit of ``u``.
+    load, load_column, load_unit : float, str or int, str
+        Nominal load in N, by default the median of its column; the column's unit, by default N.
+    load_scatter, x_error : float, optional
+        Standard uncertainties of the loads, relative, and of the positions, in m, both
+        independent from point to point.
+    repeat : str or int, or several
+        Columns that number the passes; each combination of several is one.
+    branch, u_xz, u_yz : str or int, optional
+        Columns of the branch (approach, retreat), and of the tangential channels.
+    u_sign : int
+        -1 where the voltage falls when the indenter presses.
+    holds : bool
+        The table is a log in the order of time: holds are found, and each is averaged.
+    sheet, skip_rows, missing, delimiter, decimal
+        Sheet of a workbook; lines before the header; words, or numbers as text, that mean a
+        missing value; what separates cells; decimal mark.
+    **stated
+        Further fields of :class:`memscal.Scan`: ``film``, ``indenter``, ``sensor``, ``title`` ...
+
+    Returns
+    -------
+    ImportedScan
+        The scan, with ``messages`` (also in ``notes``) and ``holds``, which has a ``plot()``.
+
+    Raises
+    ------
+    InputError
+        If cells are no numbers (the first five lines are named), units are missing or contradict,
+        an option has no effect, or no such film is scanned by such steps.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> table = {"x [um]": [-8e3, -4e3, 0, 4e3, 8e3], "U (mV)": [0.1, 0.4, 2.0, 0.4, 0.1]}
+    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> scan = memscal.import_table(
+    ...     table, x="x", u="U", load=1.0, film=film, indenter=memscal.Rod(radius=0.25e-3)
+    ... )
+    >>> scan
+    <ImportedScan: line, 5 points, x from -8 to 8 mm, load 1 N>
+    """
     require_sign("sign of the voltage", u_sign)
-    table = Table(path, delimiter=delimiter, decimal=decimal)
-    u_unit = table.unit_of(u, u_unit, "u_unit (--u-unit)")
-    x_unit = table.unit_of(x, x_unit, "x_unit (--x-unit)")
+    no_load = load is None and load_column is None
+    for useless, name in (
+        (load_unit and load_column is None, "load_unit (--load-unit), that of a column of loads,"),
+        (no_load and stated.get("load_uncertainty") is not None, "load_uncertainty"),
+        (noise is not None and (u_errors is not None or holds), "noise (--noise)"),
+        (u_errors is not None and holds, "u_errors (--u-errors)"),
+    ):
+        if useless:
+            why = "Loads (--load) are in N; readings state one uncertainty, or holds find it."
+            raise InputError(f"{name} has no effect here.", why=why, cure="Leave it out.")
+    if x is None and y is None:
+        raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
+    table = open_table(
+        source, sheet=sheet, skip_rows=skip_rows, missing=tuple(missing), delimiter=delimiter,
+        decimal=decimal,
+    )  # fmt: skip
+    of_u = u_unit, "u_unit (--u-unit)"
+    u_unit = table.unit_of(u, *of_u)
     reading = reading_of(u_unit, table.where(u))
-    of_unit = dimension_in("voltage", reading)
-    of_quantities = {
-        "u_zz": (u, u_unit, of_unit),
-        "u_xz": (u_xz, u_unit, of_unit),
-        "u_yz": (u_yz, u_unit, of_unit),
-        "normal_load": (load_column, load_unit, "force"),
-        "x": (x, x_unit, "length"),
-        "y": (y, x_unit, "length"),
-    }
+    volts = dimension_in("voltage", reading)
     wanted = {
-        name: Wanted(column, unit, dimension)
-        for name, (column, unit, dimension) in of_quantities.items()
+        name: Wanted(column, table.unit_of(column, *unit), dimension)
+        for name, column, dimension, *unit in (
+            ("u_zz", u, volts, *of_u), ("u_xz", u_xz, volts, *of_u, u_unit),
+            ("u_yz", u_yz, volts, *of_u, u_unit), ("u_zz_errors", u_errors, volts, *of_u, u_unit),
+            ("normal_load", load_column, "force", load_unit, "load_unit (--load-unit)", "N"),
+            ("x", x, "length", x_unit, "x_unit (--x-unit)"),
+            ("y", y, "length", x_unit, "x_unit (--x-unit)"),
+        )
         if column is not None
-    }
+    }  # fmt: skip
+    units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items())
     numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
     wanted |= {f"repeat {i}": Wanted(c, words=BRANCHES) for i, c in enumerate(numbering)}
     if branch is not None:
         wanted["branch"] = Wanted(branch, words=BRANCHES)
     columns: Columns = table.columns(wanted)
-    notes = [*table.notes]
+    notes = [*table.notes, f"Units: {units}."]
     if u_sign < 0:
         columns["u_zz"] *= -1
         notes.append("The sign of u_zz was changed.")
-    if reading.si != "V":
-        notes.append(f"The readings are in {u_unit}.")
-    if load is None and "normal_load" in columns:
-        load = float(np.nanmedian(columns["normal_load"]))
-        notes.append(f"The nominal load is the median of the column: {load:g} N.")
-    if load_scatter is not None and "normal_load" not in columns:
-        if load is None:
-            problem = "The scatter of the loads is given, but no load."
-            raise InputError(problem, cure="Give the load in N, or its column.")
-        columns["normal_load"] = np.full(columns["u_zz"].shape, load)
+    if noise is not None:
+        u_noise = float(to_si(noise, u_unit, volts, "noise"))
+        columns["u_zz_errors"] = np.full(columns["u_zz"].shape, u_noise)
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
     if branch is not None:
         columns["branch"] = branch_numbers(table.where(branch), np.nan_to_num(columns["branch"]))
-    columns = _placed(columns, notes)
-    notes += _counted(columns)
+    if x is None:
+        columns["x"] = np.zeros(columns["y"].size)
+    found = find_holds(columns, table.all_lines(), reading) if holds else None
+    if found is not None:
+        notes += found.notes
+        columns = dict(found.mean)
+        if found.u_errors.all():  # readings of few digits may not scatter
+            columns["u_zz_errors"] = found.u_errors
+    columns = _placed(columns, notes, (lambda _: "of holds") if found else table.lines)
+    stated |= {"load": load, "unit": reading.si, "source": table.source, "holds": found}
+    scan = _scan_of(columns, notes, reading, load_scatter, x_error, stated)
+    if scan.film is not None:
+        (require_plausible if isinstance(scan.indenter, Rod) else require_span)(scan)
+    return scan
+
+
+def _scan_of(
+    columns: Columns, notes: list[str], reading: Reading, load_scatter: float | None,
+    x_error: float | None, stated: dict[str, Any],
+) -> ImportedScan:  # fmt: skip
+    """Return the scan of columns without gaps in their positions, and add to the notes."""
+    if stated["load"] is None and "normal_load" in columns:
+        stated["load"] = float(np.nanmedian(columns["normal_load"]))
+        notes.append(f"The nominal load is the median of the column: {stated['load']:g} N.")
+    if load_scatter is not None and "normal_load" not in columns:
+        if stated["load"] is None:
+            problem = "The scatter of the loads is given, but no load."
+            raise InputError(problem, cure="Give the load in N, or its column.")
+        columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
+    stated = {"direction": _direction(columns, notes), **stated}
+    notes += [*_counted(columns), *_set_up_in_words(SimpleNamespace(**stated))]
+    errors = columns.get("u_zz_errors")
+    u = None if errors is None else f"{reading.text(float(np.nanmedian(errors)))} (median)"
+    notes.append(f"Standard uncertainty of each reading: {u or 'not stated'}.")
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
         indenter = stated.get("indenter")
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), indenter)
     columns = _as_rows(columns)
-    loads = columns.get("normal_load")
-    scan = Scan(
-        x=columns["x"],
-        y=columns.get("y"),
-        repeat=columns.get("repeat"),
-        branch=columns.get("branch"),
-        x_errors=None if x_error is None else np.full(columns["x"].size, x_error),
-        u_zz=columns["u_zz"],
-        normal_load=loads,
-        normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
-        channels={name: columns[name] for name in ("u_xz", "u_yz") if name in columns},
-        load=load,
-        unit=reading.si,
-        notes="\n".join(marked_texts(messages)),
-        source=table.source,
-        **stated,
-    )
-    return ImportedScan(scan, tuple(messages))
+    channels: Columns = {n: columns.pop(n) for n in ("u_xz", "u_yz") if n in columns}
+    if load_scatter is not None:
+        columns["normal_load_errors"] = load_scatter * columns["normal_load"]
+    if x_error is not None:
+        columns["x_errors"] = np.full(columns["x"].size, x_error)
+    texts = "\n".join(marked_texts(messages))
+    told = {"channels": channels, "notes": texts, "messages": tuple(messages)}
+    fields: dict[str, Any] = {**columns, **stated, **told}
+    return ImportedScan(**fields)
+
+
+def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
+    """Return a scan of arrays like ``u``, of which some options are; a row of ``u`` is a pass."""
+    readings = np.asarray(u, dtype=np.float64)
+    given = {name: options.pop(name) for name in _ARRAYS if options.get(name) is not None}
+    if readings.ndim == 2 and not given.keys() & {"y", "repeat"}:
+        given["repeat"] = np.arange(len(readings))[:, None]
+    columns = {"u": readings, "x": x, **given}
+    try:
+        table = {n: np.broadcast_to(v, readings.shape).ravel() for n, v in columns.items()}
+    except ValueError as error:
+        problem = f"An array does not have the shape of u, {readings.shape}: {error}."
+        raise InputError(problem, cure="Give one value for each reading.") from error
+    named: dict[str, Any] = {name: name for name in table}
+    return import_table(table, **named, **{"x_unit": "m", "u_unit": "V", **options})
+
+
+def _set_up_in_words(stated: Any) -> Iterator[str]:
+    """Yield what was pressed on what, with each uncertainty, as it was taken."""
+    film, indenter = (getattr(stated, name, None) for name in ("film", "indenter"))
+    shape = "indenter" if indenter is None else indenter.shape
+    for name, owner, record in (
+        (shape, indenter, ROUND_INDENTER), ("load", stated, LOAD), ("film", film, FILM),
+    ):  # fmt: skip
+        words = []
+        for q in (q for q in record.quantities if not q.name.endswith("_uncertainty")):
+            value, u = (getattr(owner, key, None) for key in (q.name, f"{q.name}_uncertainty"))
+            if isinstance(value, int | float) and np.isfinite(value):
+                value = format_measured(value / q.scale, u and u / q.scale, q.unit)
+            words += [f"{q.words} {value}"] if value not in (None, "") else []
+        yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
+
+
+def _direction(columns: Columns, notes: list[str]) -> str:
+    """Return the axis of a line; points of two axes that spread along one become one."""
+    x, y = (float(np.ptp(columns[name])) if name in columns else 0.0 for name in ("x", "y"))
+    if "y" not in columns or min(x, y) > LINE * max(x, y):
+        return "x"
+    along, across = ("y", "x") if y > x else ("x", "y")
+    across_mm = min(x, y) * 1e3
+    notes.append(f"The points are a line along {along}: {across} stays within {across_mm:.4g} mm.")
+    columns["x"] = columns.pop("y") if along == "y" else columns["x"]
+    columns.pop("y", None)
+    return along
 
 
 def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> NDArray[Any]:
@@ -148,14 +275,18 @@ def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> N
     return lines
 
 
-def _placed(columns: Columns, notes: list[str]) -> Columns:
+def _placed(columns: Columns, notes: list[str], of_rows: Callable[[Any], str]) -> Columns:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
     stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
     finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
+    for name, values in columns.items():
+        if (rows := np.flatnonzero(finite & np.isnan(values))).size:
+            notes.append(f"{rows.size} values of {name} are missing (NaN), {of_rows(rows)}.")
     if not finite.all():
-        notes.append(f"{int((~finite).sum())} rows without a position were left out.")
+        rows = np.flatnonzero(~finite)
+        notes.append(f"{rows.size} rows without a position were left out, {of_rows(rows)}.")
         columns = {name: values[finite] for name, values in columns.items()}
     if "repeat" in columns:
         columns["repeat"] = np.unique(columns["repeat"], return_inverse=True)[1]
@@ -180,9 +311,6 @@ def _counted(columns: Columns) -> list[str]:
         counts = [int((columns["branch"] == number).sum()) for number in (1, 2, 0)]
         words = "{} readings on approach, {} on retreat, {} of neither branch."
         notes.append(words.format(*counts))
-    for name, values in columns.items():
-        if missing := int(np.isnan(values).sum()):
-            notes.append(f"{missing} values of {name} are missing (NaN).")
     full = number * places.count - x.size
     if number > 1 and full > 0:
         notes.append(f"{full} more would make every repeat complete.")

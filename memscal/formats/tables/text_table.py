@@ -1,24 +1,26 @@
-"""Tables of numbers as text, whose delimiter, decimal mark and header are detected."""
+"""Tables of numbers: columns by name or number, and text whose dialect and head are found."""
 
+import codecs
 import csv
 import hashlib
-import itertools
 import os
 import re
-from collections.abc import Iterator, Mapping
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence, Set
+from itertools import zip_longest
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError, placed
 from memscal.formats.files import read_pieces
-from memscal.formats.units import to_si
+from memscal.formats.units import is_common_unit, is_unit, same_unit, to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Profile
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
-from memscal.model.scan import BRANCHES
 from memscal.model.sizes import (
     MOST_COLUMNS,
     MOST_HDF5_BYTES,
@@ -29,17 +31,22 @@ from memscal.model.sizes import (
 
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
-# A name and its unit: x/mm, x (mm) or x [mm].
-_HEAD = re.compile(r"([^/(\[]+?)\s*(?:/(.+)|\((.+)\)|\[(.+)\])")
-_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
-_MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT = 80, 20, 300
+#: A name and its unit: x (mm) or x [mm], and x/mm.
+_HEADS = (re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"), re.compile(r"([^/]+?)\s*/(.+)"))
+#: Cells that mean a missing value, in capital or small letters.
+MISSING = ("", "-", "nan", "na", "n/a", "#n/a", "<na>", "nat", "null", "none")
+_MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT, _NAMED = 80, 20, 300, 5
 #: Lines from which delimiter, decimal mark and header are found; bytes that hold them, and bytes
 #: that are then cut into cells at once.
 _SAMPLE, _FIRST, _BLOCK = 250, 2**16, 2**22
+#: Rows that tell which columns hold numbers: the last ones, for a preamble stands above them.
+_LAST = 50
 #: What may stand in a block that needs no care: no quote and no sign of a comment.
 _PLAIN = bytes({9, 10, *range(32, 127)} - {*b'"#%'})
 
 Rows = list[tuple[str, ...]]
+Numbered = list[tuple[int, str]]
+Lines = range | list[int] | NDArray[np.int32]
 
 
 class Wanted(NamedTuple):
@@ -51,47 +58,24 @@ class Wanted(NamedTuple):
     words: Mapping[str, float] = MappingProxyType({})
 
 
-class Table:
-    """A delimited text file whose head was read; its columns are read once, in blocks.
+class NamedColumns:
+    """Columns of numbers whose heads may state units; they are read once, part by part."""
 
-    ``#`` or ``%`` begin a comment. The first line is the header where a cell of it is no number.
-    """
+    names: tuple[str, ...] = ()
+    source: SourceFile | None = None
+    notes: tuple[str, ...] = ()
+    decimal: str | None = None
+    #: What a row is called in messages.
+    _row = "row"
 
-    source: SourceFile
-    notes: list[str]
-
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        delimiter: str | None = None,
-        decimal: str | None = None,
-    ) -> None:
-        self._path, self._name = path, os.path.basename(os.fspath(path))
-        self._digest, self._latin, self._width = hashlib.sha256(), False, 0
-        self._blocks = self._whole_lines()
-        head, lines = b"", list[str]()
-        # A head of a few endless lines, or of comments alone, is looked at no further than this.
-        while len(lines) < _SAMPLE and len(head) <= _BLOCK and (block := next(self._blocks, b"")):
-            head += block
-            written = self._lines(head)
-            lines = [line for line in written if not _is_comment(line)]
-        if not lines:
-            cure = "Give a table with one row per reading."
-            raise FormatError(f"{self._name} holds no table.", cure=cure)
-        self._comments = _head_comments(written)
-        self._delimiter = delimiter or _find_delimiter(lines)
-        rows = self._rows(lines)
-        numbers = _MISSING | {*BRANCHES}
-        headed = not all(_NUMBER.fullmatch(cell) or cell.lower() in numbers for cell in rows[0])
-        header = rows[0] if headed else tuple(str(i + 1) for i in range(self._width))
-        self.names = tuple(printable(cell, _MAX_NAME) for cell in header)
-        self._first = rows[1:] if headed else rows
-        if not self._first:
-            cure = "Give a table with rows."
-            raise FormatError(f"{self._name} has a header, but no rows.", cure=cure)
-        self.decimal = decimal or _find_decimal(self._first, self._delimiter)
-        self._marks = bytes.maketrans(self.decimal.encode()[:1] + b"dD", b".EE")
+    def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
+        self._name, self._unit_row = name, tuple[str, ...]()
+        self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
+        self._sentinels = [float(w.replace(",", ".")) for w in missing if _NUMBER.fullmatch(w)]
+        # Cells that are no numbers, by column: how many, and the first of them with their lines.
+        self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
+        # First row of each part, and the lines of its rows.
+        self._lines_of: list[tuple[int, Lines]] = []
 
     def columns(self, wanted: Mapping[str, Wanted]) -> dict[str, FloatArray]:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
@@ -99,73 +83,253 @@ class Table:
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
         room, count = self._room(len(wanted)), 0
         values = [np.empty(room) for _ in wanted]
-        for part in self._parts([*wanted.values()]):
-            if count + part[0].size > room:
+        for lines, part in self._parts([*wanted.values()]):
+            if count + len(lines) > room:
                 cure = "Import it when it is complete."
                 raise FormatError(f"{self._name} grew while it was read.", cure=cure)
+            self._lines_of.append((count, lines))
             for column, numbers in zip(values, part, strict=True):
-                column[count : count + numbers.size] = numbers
-            count += part[0].size
-        self.source = SourceFile(self._name, self._digest.hexdigest())
-        mark = "comma" if self.decimal == "," else "point"
-        apart = f"separated by a {_DELIMITERS.get(self._delimiter, repr(self._delimiter))}"
-        self.notes = [
-            f"Imported from {self._name} (sha256 {self.source.sha256}).",
-            *["The table is not UTF-8; it was read as Latin-1."] * self._latin,
-            *self._comments,
-            f"Read {count} rows of {self._width} columns {apart}, with a decimal {mark}.",
-        ]
+                if self._sentinels:
+                    numbers = np.where(np.isin(numbers, self._sentinels), np.nan, numbers)
+                column[count : count + len(lines)] = numbers
+            count += len(lines)
+        self._refuse_wrong([*wanted.values()])
+        self._describe(count)
         return {
             name: to_si(values.pop(0)[:count], item.unit, item.dimension, self.where(item.column))
             for name, item in wanted.items()
         }
 
-    def unit_of(self, column_name: str | int, unit: str | None, option: str) -> str:
-        """Return the unit of a column: the one given, or that of its head."""
-        head = _HEAD.fullmatch(self.names[self._index(column_name)])
-        if stated := unit or (head and next(filter(None, head.groups()[1:]))):
-            return stated.strip()
+    def unit_of(
+        self, column: str | int, unit: str | None, option: str, default: str | None = None
+    ) -> str:
+        """Return the unit of a column: of its head, of the row of units, or the one given."""
+        index = self._index(column)
+        stated = self._unit_row[index] if index < len(self._unit_row) else ""
+        stated = stated or next((u for u in _cut(self.names[index])[1:] if is_unit(u)), "")
+        if unit and stated and not same_unit(unit, stated):
+            problem = f"{self.where(column)} states the unit {stated!r}, but {option} is {unit!r}."
+            cure = "Leave the option out to take the unit of the table, or correct the table."
+            raise InputError(problem, why="One of them is wrong.", cure=cure)
+        if chosen := unit or stated or default:
+            return chosen.strip()
         cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
-        raise InputError(f"{self.where(column_name)} states no unit.", cure=cure)
+        raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
 
-    def where(self, column_name: str | int) -> str:
+    def where(self, column: str | int) -> str:
         """Return file and column as messages name them."""
-        return f"{self._name}: column {column_name!r}"
+        return f"{self._name}: column {column!r}"
 
-    def _index(self, column_name: str | int) -> int:
-        if isinstance(column_name, str) and column_name in self.names:
-            if self.names.count(column_name) > 1:
-                problem = f"{self._name} has several columns named {column_name!r}."
+    def lines(self, rows: Sequence[int]) -> str:
+        """Name the lines of the file in which rows stand: the first five, and how many more."""
+        starts = [start for start, _ in self._lines_of]
+        parts = [(row, self._lines_of[bisect_right(starts, row) - 1]) for row in rows[:_NAMED]]
+        numbers = [str(lines[row - start]) for row, (start, lines) in parts]
+        more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
+        return f"{self._row}{'s' if len(rows) > 1 else ''} {', '.join(numbers)}{more}"
+
+    def all_lines(self) -> NDArray[Any]:
+        """Return the line of the file of each row, (n,)."""
+        return np.concatenate([np.asarray(lines) for _, lines in self._lines_of])
+
+    def _index(self, column: str | int) -> int:
+        if isinstance(column, str) and column in self.names:
+            if self.names.count(column) > 1:
+                problem = f"{self._name} has several columns named {column!r}."
                 raise InputError(problem, cure="Give the number of the column, counted from 1.")
-            return self.names.index(column_name)
-        heads = [match and match[1] for match in map(_HEAD.fullmatch, self.names)]
-        if heads.count(str(column_name)) == 1:
-            return heads.index(str(column_name))
-        number = int(column_name) if isinstance(column_name, int) or column_name.isdecimal() else 0
+            return self.names.index(column)
+        heads = [_cut(name)[0] for name in self.names]
+        if heads.count(str(column)) == 1:
+            return heads.index(str(column))
+        number = int(column) if isinstance(column, int) or column.isdecimal() else 0
         if not 1 <= number <= len(self.names):
             raise InputError(
-                f"{self._name} has no column {column_name!r}.",
+                f"{self._name} has no column {column!r}.",
                 why="Its columns are: " + ", ".join(self.names) + ".",
                 cure="Give one of these names, or a number counted from 1.",
             )
         return number - 1
 
+    def _most(self, columns: int) -> int:
+        """Return how many rows of some columns are taken."""
+        # A scan has up to three arrays more than columns, and its file must be read again.
+        return min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
+
     def _room(self, columns: int) -> int:
         """Return for how many rows there must be room; refuse a table of too many."""
-        # A scan has up to three arrays more than columns, and its file must be read again.
-        most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
-        pieces = read_pieces(self._path, limit=MOST_TABLE_BYTES)
-        lines = sum(piece.count(b"\n") or piece.count(b"\r") for piece in pieces)
+        raise NotImplementedError
+
+    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
+        """Yield the lines and the columns of one part after another."""
+        raise NotImplementedError
+
+    def _describe(self, count: int) -> None:
+        """State source and notes when all is read."""
+
+    def _numbers(self, cells: Sequence[str], lines: Lines, item: Wanted) -> FloatArray:
+        """Return cells of a column as numbers; those that are none are kept for the message."""
+        try:
+            return np.fromiter(map(float, cells), np.float64, len(cells))
+        except ValueError:
+            pairs = zip(cells, lines, strict=True)
+            return np.array([self._number(cell, line, item) for cell, line in pairs])
+
+    def _number(self, cell: str, line: int, item: Wanted) -> float:
+        word = cell.lower()
+        if word in item.words:
+            return item.words[word]
+        if word in self._missing:
+            return float("nan")
+        text = cell.replace(",", ".") if self.decimal == "," else cell
+        try:
+            return float(text.replace("D", "E").replace("d", "e"))
+        except ValueError:
+            lines, cells = self._wrong.setdefault(item.column, ([], []))
+            lines.append(line)
+            cells += [printable(cell, _MAX_NAME)] if len(cells) < _NAMED else []
+            return float("nan")
+
+    def _refuse_wrong(self, wanted: list[Wanted]) -> None:
+        for item in wanted:
+            if item.column not in self._wrong:
+                continue
+            lines, cells = self._wrong[item.column]
+            named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
+            more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
+            raise FormatError(
+                f"{self.where(item.column)} holds what is not "
+                f"{' or '.join(['a number', *item.words])} in {self._row} {named}{more}.",
+                cure="Correct or remove these lines; name a word that means a missing value "
+                "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
+                "stand before the header (--skip-rows N).",
+            )
+
+
+def _cut(name: str) -> tuple[str, ...]:
+    """Return the name of a column and, if there is one, its unit."""
+    return next((m.groups() for m in (head.fullmatch(name) for head in _HEADS) if m), (name,))
+
+
+class Sheet(NamedTuple):
+    """A sheet of a workbook as text: tabs between cells, a line for each row."""
+
+    name: str
+    text: bytes
+    sha256: str
+
+
+class TextTable(NamedColumns):
+    """A delimited text whose head was read; its columns are read once, in blocks.
+
+    ``#`` or ``%`` begin a comment. What stands above the header is kept in the notes.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        delimiter: str | None = None,
+        decimal: str | None = None,
+        missing: Sequence[str] = (),
+        skip_rows: int = 0,
+        sheet: Sheet | None = None,
+    ) -> None:
+        super().__init__(os.path.basename(os.fspath(path)), missing)
+        self._path, self._sheet, self._row = path, sheet, "row" if sheet else "line"
+        self._digest, self._latin, self._width, self._line = hashlib.sha256(), False, 0, 1
+        self._blocks = self._whole_lines()
+        head, written, lines = b"", Numbered(), Numbered()
+        # A head of a few endless lines, or of comments alone, is looked at no further than this.
+        while len(lines) < _SAMPLE and len(head) <= _BLOCK and (block := next(self._blocks, b"")):
+            head, self._line = head + block, 1
+            written = self._numbered(head)
+            lines = [(n, s) for n, s in written if n > skip_rows and not _is_comment(s)]
+        if not lines:
+            cure = "Give a table with one row per reading."
+            raise FormatError(f"{self._name} holds no table.", cure=cure)
+        self._delimiter = delimiter or ("\t" if sheet else _find_delimiter([s for _, s in lines]))
+        self._find_head([(n, s) for n, s in written if n > skip_rows], lines)
+        self._said = [s for n, s in written if n < self._header[0]]
+        self.decimal = decimal or find_decimal(self._first[0], self._delimiter)
+        self._marks = bytes.maketrans(self.decimal.encode()[:1] + b"dD", b".EE")
+
+    def _find_head(self, written: Numbered, lines: Numbered) -> None:
+        """Find the first row of numbers, and the header and the row of units above it."""
+        rows, places = self._rows(lines)
+        if (start := _first_of_numbers(rows, self._missing)) is None:
+            cure = "Give a table with rows of numbers."
+            raise FormatError(f"{self._name} has no row of numbers.", cure=cure)
+        above = [(places[i], rows[i]) for i in range(start) if any(rows[i])]
+        if not above:  # numpy.savetxt writes the header as a comment
+            comments = [(n, s.lstrip(" \t#%")) for n, s in written if n < places[start]]
+            found = [(n, self._rows([(n, s)])[0]) for n, s in comments if s]
+            above = [(n, cut[0]) for n, cut in found if len(cut[0]) == len(rows[start])]
+        self._header, names = (places[start], False), tuple[str, ...]()
+        if above and _filled(above[-1][1]) >= min(2, len(rows[start])):
+            line, names = above.pop()
+            title, cells = above[-1] if above else (0, ())
+            named = title == line - 1 and _filled(cells) >= _filled(names)
+            bare = [cell.strip("()[]- ") for cell in names]
+            if named and not any(map(_is_number, cells)) and any(map(is_common_unit, bare)):
+                units = tuple(unit if unit and is_unit(unit) else "" for unit in bare)
+                if 2 * _filled(units) >= _filled(bare):
+                    self._unit_row, line, names = units, title, cells
+            self._header = line, bool(names)
+        heads = [*names, *[""] * (self._width - len(names))]
+        self.names = tuple(printable(c, _MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
+        self._first = rows[start:], places[start:]
+
+    def _describe(self, count: int) -> None:
+        sha256 = self._sheet.sha256 if self._sheet else self._digest.hexdigest()
+        self.source = SourceFile(self._name, sha256)
+        mark = "comma" if self.decimal == "," else "point"
+        apart = f"separated by a {_DELIMITERS.get(self._delimiter, repr(self._delimiter))}"
+        sheet = f"of the sheet {self._sheet.name!r}" if self._sheet else ""
+        apart = sheet or f"{apart}, with a decimal {mark}"
+        line, headed = self._header
+        units = ", a row of units below it" if self._unit_row else ""
+        self.notes = (
+            f"Imported from {self._name} (sha256 {sha256}).",
+            *["The table is not UTF-8; it was read as Latin-1."] * self._latin,
+            *self._sayings(),
+            *[f"The header is {self._row} {line}{units}."] * (headed and line > bool(not units)),
+            f"Read {count} rows of {self._width} columns {apart}.",
+        )
+
+    def _sayings(self) -> Iterator[str]:
+        """Yield what is written above the table: it may say that the data are synthetic."""
+        texts = (s.strip(f' \t#%"{self._delimiter}').replace("\t", " ") for s in self._said)
+        said = [printable(text, _MAX_COMMENT).strip() for text in texts]
+        yield from (f"The table says: {text}" for text in said[:_MAX_COMMENTS] if text)
+        if len(said) > _MAX_COMMENTS:
+            yield f"{len(said) - _MAX_COMMENTS} more lines above the table were left out."
+
+    def _room(self, columns: int) -> int:
+        most = self._most(columns)
+        lines = sum(piece.count(b"\n") or piece.count(b"\r") for piece in self._raw())
         if lines > most:
             cure = "Average neighbouring readings, or cut the table into several."
             raise too_large(self._name, lines, most, f"lines of {columns} columns", cure=cure)
         return 2 * lines + _SAMPLE  # some may have other ends; room that stays empty is no memory
 
+    def _raw(self) -> Iterator[bytes]:
+        if self._sheet:
+            return iter([self._sheet.text])
+        return read_pieces(self._path, limit=MOST_TABLE_BYTES)
+
+    def _pieces(self) -> Iterator[bytes]:
+        """Yield the text piece by piece; UTF-16, which its mark tells, as UTF-8."""
+        decode: codecs.IncrementalDecoder | None = None
+        for number, piece in enumerate(filter(None, self._raw())):
+            self._digest.update(piece)
+            if not number and piece.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+                decode = codecs.getincrementaldecoder("utf-16")("replace")
+            yield decode.decode(piece).encode() if decode else piece
+
     def _whole_lines(self) -> Iterator[bytes]:
         """Yield a few lines, then blocks of whole lines."""
         rest, size = b"", _FIRST
-        for piece in read_pieces(self._path, limit=MOST_TABLE_BYTES):
-            self._digest.update(piece)
+        for piece in self._pieces():
             rest += piece
             while len(rest) > size:
                 if end := rest.rfind(b"\n", 0, size) + 1 or rest.rfind(b"\r", 0, size) + 1:
@@ -177,136 +341,137 @@ class Table:
         if rest:
             yield rest
 
-    def _parts(self, wanted: list[Wanted]) -> Iterator[list[FloatArray]]:
-        """Yield the columns of one block after another."""
+    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
         indices = [self._index(item.column) for item in wanted]
-        yield self._numbers(self._first, indices, wanted, 0)
-        count = len(self._first)
+        yield self._part(*self._first, indices, wanted)
         for block in self._blocks:
-            if (numbers := self._plain_numbers(block, indices)) is None:
-                rows = self._rows([s for s in self._lines(block) if not _is_comment(s)])
-                numbers = self._numbers(rows, indices, wanted, count)
-            yield numbers
-            count += numbers[0].size
+            if numbers := self._plain_numbers(block, indices):
+                first, self._line = self._line, self._line + numbers[0].size
+                yield range(first, self._line), numbers
+            else:
+                lines = [entry for entry in self._numbered(block) if not _is_comment(entry[1])]
+                yield self._part(*self._rows(lines), indices, wanted)
 
-    def _plain_numbers(self, block: bytes, indices: list[int]) -> list[FloatArray] | None:
+    def _part(
+        self, rows: Rows, lines: list[int], indices: list[int], wanted: list[Wanted]
+    ) -> tuple[Lines, list[FloatArray]]:
+        cells = [[row[i] if i < len(row) else "" for row in rows] for i in indices]
+        numbers = [self._numbers(c, lines, item) for c, item in zip(cells, wanted, strict=True)]
+        return np.array(lines, dtype=np.int32), numbers
+
+    def _plain_numbers(self, block: bytes, indices: list[int]) -> list[FloatArray]:
         """Return columns of a block of bare numbers in rows of one width; of others, nothing."""
-        block = block.replace(b"\r\n", b"\n")
+        block = block.replace(b"\r\n", b"\n").rstrip(b"\n") + b"\n"
         if self._delimiter not in _DELIMITERS or block.translate(None, _PLAIN):
-            return None
-        block = block.rstrip(b"\n").translate(self._marks) + b"\n"
-        if self._delimiter == " ":
-            while b"  " in block:
-                block = block.replace(b"  ", b" ")
-            block = block.replace(b" \n", b"\n").replace(b"\n ", b"\n").lstrip(b" ")
-        delimiter = self._delimiter.encode()
-        width, count = block.count(delimiter, 0, block.find(b"\n")) + 1, block.count(b"\n")
+            return []
+        lines, mark = block.translate(self._marks).splitlines(), self._delimiter.encode()
+        spaces = self._delimiter == " "
+        width = len(lines[0].split(None if spaces else mark))
         # The ends of the cells, as they follow each other in equal rows.
-        ends = block.translate(None, _PLAIN.translate(None, delimiter + b"\n"))
-        if max(indices) >= width or ends != (delimiter * (width - 1) + b"\n") * count:
-            return None
-        cells = block[:-1].replace(b"\n", delimiter).split(delimiter)
-        if b"" in cells:
-            if width == 1 or delimiter == b"\t":  # of a blank line, perhaps
-                return None
-            cells = [cell or b"nan" for cell in cells]
-        self._width = max(self._width, width)
+        ends = block.translate(None, _PLAIN.translate(None, mark + b"\n"))
+        equal = spaces or ends == (mark * (width - 1) + b"\n") * len(lines)
+        if max(indices) >= width or not equal:
+            return []
         try:
-            return [np.fromiter(map(float, cells[i::width]), np.float64, count) for i in indices]
+            chosen: Any = {} if spaces else {"delimiter": self._delimiter, "usecols": indices}
+            numbers = np.loadtxt(lines, ndmin=2, comments=None, **chosen)
         except ValueError:
-            return None
+            return []
+        self._width = max(self._width, width)
+        columns = numbers.T[indices] if spaces else numbers.T
+        return [*columns] if len(numbers) == len(lines) else []
 
-    def _lines(self, block: bytes) -> list[str]:
-        """Return the lines that are not blank."""
+    def _numbered(self, block: bytes) -> Numbered:
+        """Return the lines that are not blank, with their numbers in the file."""
         if b"\0" in block:
             raise FormatError(f"{self._name} is not a text file.", cure="Give a table as CSV.")
         try:
             text = block.decode("latin-1" if self._latin else "utf-8-sig")
         except UnicodeDecodeError:
             self._latin, text = True, block.decode("latin-1")
-        return [line for line in text.splitlines() if line.strip()]
+        lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        first, self._line = self._line, self._line + len(lines) - 1
+        return [(number, line) for number, line in enumerate(lines, first) if line.strip()]
 
-    def _rows(self, lines: list[str]) -> Rows:
-        rows = [line.split() for line in lines] if self._delimiter == " " else []
-        try:
-            rows = rows or [*csv.reader(lines, delimiter=self._delimiter, skipinitialspace=True)]
-        except (csv.Error, TypeError) as error:
-            raise FormatError(f"{self._name} cannot be cut into columns: {error}.") from error
+    def _rows(self, lines: Numbered) -> tuple[Rows, list[int]]:
+        """Cut lines into cells; return them with the numbers of their lines."""
+        if self._delimiter == " ":
+            rows, places = [line.split() for _, line in lines], [number for number, _ in lines]
+        else:
+            try:
+                reader = csv.reader(
+                    (line for _, line in lines), delimiter=self._delimiter, skipinitialspace=True
+                )
+                cut = [(row, lines[reader.line_num - 1][0]) for row in reader]
+            except (csv.Error, TypeError) as error:
+                raise FormatError(f"{self._name} cannot be cut into columns: {error}.") from error
+            rows, places = [row for row, _ in cut], [number for _, number in cut]
         self._width = max(self._width, *map(len, rows), 0)
         if self._width > MOST_COLUMNS:
             cure = "Leave out columns."
             raise too_large(self._name, self._width, MOST_COLUMNS, "columns", cure=cure)
-        return [tuple(map(str.strip, row)) for row in rows]
-
-    def _numbers(
-        self, rows: Rows, indices: list[int], wanted: list[Wanted], start: int
-    ) -> list[FloatArray]:
-        """Return columns of rows, before which ``start`` rows stand."""
-        columns = []
-        for i, item in zip(indices, wanted, strict=True):
-            cells = [row[i] if i < len(row) else "" for row in rows]
-            try:
-                numbers = [*map(float, cells)]
-            except ValueError:
-                numbers = [self._number(cell, start + k, item) for k, cell in enumerate(cells)]
-            columns.append(np.array(numbers, dtype=np.float64))
-        return columns
-
-    def _number(self, cell: str, k: int, item: Wanted) -> float:
-        if cell.lower() in item.words:
-            return item.words[cell.lower()]
-        if cell.lower() in _MISSING:
-            return float("nan")
-        text = cell.replace(self.decimal, ".") if self.decimal != "." else cell
-        try:
-            return float(text.replace("D", "E").replace("d", "e"))
-        except ValueError as error:
-            raise FormatError(
-                f"{self.where(item.column)}, data row {k + 1}: {printable(cell, _MAX_NAME)!r} "
-                f"is not {' or '.join(['a number', *item.words])}.",
-                cure="Correct or remove this row, or state the decimal mark.",
-            ) from error
+        return [tuple(map(str.strip, row)) for row in rows], places
 
 
 def _is_comment(line: str) -> bool:
     return line.lstrip()[0] in "#%"
 
 
-def _head_comments(lines: list[str]) -> list[str]:
-    """Return what is written above the table: it may say that the data are synthetic."""
-    head = itertools.takewhile(_is_comment, lines)
-    shown = [printable(line.lstrip(" \t#%"), _MAX_COMMENT).strip() for line in head]
-    notes = [f"The table says: {line}" for line in shown[:_MAX_COMMENTS] if line]
-    if len(shown) > _MAX_COMMENTS:
-        notes.append(f"{len(shown) - _MAX_COMMENTS} more lines of comment were left out.")
-    return notes
+def _filled(cells: Sequence[str]) -> int:
+    return sum(map(bool, cells))
+
+
+def _is_number(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell) is not None
+
+
+def _first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
+    """Return the first row of a table, below preamble, header and units; none without numbers."""
+    counts = [sum(map(_is_number, row)) for row in rows]
+    if not (most := min(2, max(counts, default=0))):
+        return None
+    dense = [row for row, count in zip(rows, counts, strict=True) if count >= most][-_LAST:]
+    numeric = []
+    for i, cells in enumerate(zip_longest(*dense, fillvalue="")):
+        stated = [_is_number(cell) for cell in cells if cell.lower() not in missing]
+        numeric += [i] if 2 * sum(stated) >= len(stated) > 0 else []
+    of_numbers = [[row[i] for i in numeric if i < len(row)] for row in rows]
+    good = [all(_is_number(c) or c.lower() in missing for c in cells) for cells in of_numbers]
+    some = [any(map(_is_number, cells)) for cells in of_numbers]
+    both = [a and b for a, b in zip(good, some, strict=True)]
+    start = both.index(True) if any(both) else some.index(True)
+    while start and some[start - 1]:  # a row with a wrong cell, which is refused later
+        start -= 1
+    return start
 
 
 def _find_delimiter(lines: list[str]) -> str:
-    """Take the delimiter that cuts the most lines into equally many pieces."""
-    sample = lines[:50]
+    """Take the delimiter that cuts the most lines into equally many pieces, of numbers."""
     best, score = " ", 0.0
     for delimiter in _DELIMITERS:
-        widths = [len(line.split(None if delimiter == " " else delimiter)) for line in sample]
+        rows = [line.split(None if delimiter == " " else delimiter) for line in lines[-_LAST:]]
+        widths = [len(row) for row in rows]
         common = max(set(widths), key=widths.count)
-        if common > 1 and widths.count(common) > score:
-            best, score = delimiter, widths.count(common)
+        cells = [c.strip(' "') for row in rows if len(row) == common for c in row]
+        found = widths.count(common) * (0.1 + sum(map(_is_number, cells)) / len(cells))
+        if common > 1 and found > score:
+            best, score = delimiter, found
     return best
 
 
-def _find_decimal(rows: Rows, delimiter: str) -> str:
+def find_decimal(rows: Rows, delimiter: str = "") -> str:
     """A comma is the decimal mark only where cells hold one comma each and no point."""
     if delimiter == ",":
         return "."
-    cells = [c for row in rows[:200] for c in row if _NUMBER.fullmatch(c)]
+    cells = [c for row in rows[:200] for c in row if _is_number(c)]
     return "," if any("," in c for c in cells) and not any("." in c for c in cells) else "."
 
 
 def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
-    table = Table(path)
+    table = TextTable(path)
     units = {1: r_unit, 2: z_unit}
     columns = table.columns({str(i): Wanted(i, unit, "length") for i, unit in units.items()})
-    with placed(table.source.file_name):
+    with placed(os.path.basename(os.fspath(path))):
         # What a microscope calls zero is anywhere.
         return Profile(r=columns["1"], z=columns["2"] - columns["2"].min())

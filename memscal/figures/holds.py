@@ -1,0 +1,43 @@
+"""Figure of a log: the holds that were found in it, and the readings that they give."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from memscal.figures.style import COLOURS, marker_size, panels_of
+from memscal.model.holds import Holds
+from memscal.model.quantities import MM
+
+#: Of a longer log so many rows are drawn, evenly.
+_MOST_ROWS = 20_000
+
+
+def holds_figure(holds: Holds) -> Figure:
+    """Draw position, load and reading over the lines of the file, and readings over position."""
+    reading = holds.reading
+    names = {"x": ("x (mm)", MM), "y": ("y (mm)", MM), "normal_load": ("load (N)", 1.0)}
+    names["u_zz"] = (f"reading ({reading.unit})", reading.scale)
+    shown = [name for name in names if name in holds.log and np.ptp(holds.log[name]) > 0]
+    along = "y" if np.ptp(holds.mean.get("y", 0.0)) > np.ptp(holds.mean["x"]) else "x"
+    chosen = np.arange(0, holds.line.size, -(-holds.line.size // _MOST_ROWS))
+    first, last = holds.line[holds.first], holds.line[holds.stop - 1]
+    with panels_of(1.6 * (len(shown) + 1.4), len(shown) + 1) as (figure, panels):
+        for axes, name in zip(panels, shown, strict=False):
+            label, scale = names[name]
+            axes.plot(holds.line[chosen], holds.log[name][chosen] / scale, color="0.6", lw=0.7)
+            axes.hlines(
+                holds.mean[name] / scale, first, last, color=COLOURS["gaussian"], lw=2.5, zorder=3
+            )
+            axes.set_ylabel(label)
+            axes.sharex(panels[0])
+        panels[0].set_title(
+            f"{first.size} holds (thick) in {holds.line.size} rows of the log", loc="left"
+        )
+        panels[-2].set_xlabel("line of the file")
+        axes, (label, scale) = panels[-1], names["u_zz"]
+        axes.errorbar(
+            holds.mean[along] / MM, holds.mean["u_zz"] / scale, 2 * holds.u_errors / scale,
+            fmt="o", ms=marker_size(first.size), color=COLOURS["measured"], lw=0.8, zorder=3,
+        )  # fmt: skip
+        axes.set(xlabel=f"{along} (mm)", ylabel=label)
+        axes.set_title("mean of each hold ± 2 standard uncertainties (k = 2)", loc="left")
+    return figure

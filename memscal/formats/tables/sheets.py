@@ -1,0 +1,203 @@
+"""Tables that are no text: sheets of a workbook, Parquet files, and columns in memory.
+
+A workbook is a zip file of XML: what it inflates to, and how many elements that holds, is known
+before openpyxl sees it.
+"""
+
+import hashlib
+import io
+import re
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
+from pathlib import PurePath
+from typing import Any, TypeVar
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError, UnsafeFileError
+from memscal.formats.files import read_bytes
+from memscal.formats.tables.text_table import (
+    Lines,
+    NamedColumns,
+    Sheet,
+    TextTable,
+    Wanted,
+    find_decimal,
+)
+from memscal.model.arrays import FloatArray
+from memscal.model.notation import printable
+from memscal.model.provenance import SourceFile
+from memscal.model.sizes import MOST_ELEMENTS, MOST_FILE_BYTES, too_large
+
+_KINDS = dict.fromkeys((".xlsx", ".xlsm"), "workbook") | dict.fromkeys(
+    (".parquet", ".pq"), "Parquet"
+)
+_OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
+#: Options of reading by the kinds of tables that have a use for them.
+_USES = {"delimiter": ("text",), "skip_rows": ("text", "workbook"), "sheet": ("workbook",)}
+_Read = TypeVar("_Read")
+_PIECE, _MAX_NAME, _MAX_REASON = 2**16, 80, 300
+
+
+def open_table(source: Any, **reading: Any) -> NamedColumns:
+    """Open a table of any kind: a path, or columns in memory (a mapping, a data frame)."""
+    reading = {name: value for name, value in reading.items() if value}
+    path = isinstance(source, str) or hasattr(source, "__fspath__")
+    ending = PurePath(source).suffix.lower() if path else ""
+    kind = _KINDS.get(ending, "text") if path else "table in memory"
+    if useless := [name for name in reading if kind not in _USES.get(name, (kind,))]:
+        named = ", ".join(f"{name} (--{name.replace('_', '-')})" for name in useless)
+        raise InputError(f"{named} has no effect on a {kind}.", cure="Leave it out.")
+    if ending in _OTHERS:
+        problem = f"{source} is a workbook of a kind that is not read."
+        raise FormatError(problem, cure="Save it as .xlsx or as CSV.")
+    if kind == "text":
+        return TextTable(source, **reading)
+    if not path:
+        return _columns_in_memory(source, **reading)
+    name, data = PurePath(source).name, read_bytes(source)
+    library = {"workbook": "openpyxl", "Parquet": "pyarrow.parquet"}[kind]
+    try:
+        reader = import_module(library)
+    except ModuleNotFoundError as error:
+        problem = f"A {kind} is read by {library.partition('.')[0]}, which is not installed."
+        cure = 'Install it with the extra "tables": pip install "memscal[tables]"'
+        raise InputError(problem, cure=cure) from error
+    read: Callable[..., NamedColumns] = _sheet_table if kind == "workbook" else _parquet_table
+    return _guarded(name, lambda: read(reader, name, data, **reading))
+
+
+def _guarded(name: str, read: Callable[[], _Read]) -> _Read:
+    """Return what a library reads; say of which file it was if it cannot."""
+    try:
+        return read()
+    except InputError:
+        raise
+    except Exception as error:  # a library raises what it happens to meet
+        why = f"Its reader says: {type(error).__name__}: {printable(error, _MAX_REASON)}."
+        raise FormatError(f"{name} cannot be read.", why=why, cure="Save it as CSV.") from error
+
+
+def _sheet_table(
+    openpyxl: Any, name: str, data: bytes, *, sheet: str | None = None, **reading: Any
+) -> TextTable:
+    """Return a sheet of a workbook, by default the first, as text."""
+    plain = _inflated(data, name)
+    book = openpyxl.load_workbook(plain, read_only=True, data_only=True, keep_links=False)
+    if sheet is not None and sheet not in book.sheetnames:
+        why = f"Its sheets are: {', '.join(book.sheetnames)}."
+        raise InputError(f"{name} has no sheet {sheet!r}.", why=why, cure="Give one of them.")
+    chosen = book[sheet] if sheet else book.worksheets[0]
+    chosen.reset_dimensions()  # which may claim billions of cells
+    text, cells = io.BytesIO(), 0
+    for row in chosen.iter_rows(values_only=True):
+        cells += max(len(row), 1)
+        if cells > MOST_ELEMENTS:
+            raise too_large(name, cells, MOST_ELEMENTS, "cells", cure="Save it as CSV.")
+        text.write("\t".join(map(_cell, row)).encode() + b"\n")
+    content = Sheet(chosen.title, text.getvalue(), hashlib.sha256(data).hexdigest())
+    return TextTable(name, sheet=content, **reading)
+
+
+def _inflated(data: bytes, name: str) -> io.BytesIO:
+    """Return the XML of a workbook unpacked, if it is neither too large nor of another kind."""
+    plain, total, elements = io.BytesIO(), 0, 0
+    with zipfile.ZipFile(io.BytesIO(data)) as packed, zipfile.ZipFile(plain, "w") as unpacked:
+        # Others are pictures and programs.
+        for entry in (e for e in packed.infolist() if e.filename.endswith((".xml", ".rels"))):
+            pieces = []
+            with packed.open(entry) as member:
+                while piece := member.read(_PIECE):
+                    pieces.append(piece)
+                    total, elements = total + len(piece), elements + piece.count(b"<")
+                    for size, most, of in (
+                        (total, MOST_FILE_BYTES, "bytes when it is unpacked"),
+                        (elements, 2 * MOST_ELEMENTS, "tags of XML (four for a cell)"),
+                    ):
+                        if size > most:
+                            kind, cure = UnsafeFileError, "Save the sheet as CSV."
+                            raise too_large(name, size, most, of, cure=cure, error=kind)
+            xml = b"".join(pieces)
+            # Entities multiply, and other encodings hide them.
+            encoding = re.search(rb"encoding\s*=\s*[\"']([^\"']*)", xml[:200])
+            if b"\0" in xml or b"<!" in xml or (encoding and encoding[1].lower() != b"utf-8"):
+                part = f"{name}: {printable(entry.filename, _MAX_NAME)}"
+                problem = f"{part} has declarations or an encoding that no workbook has."
+                raise UnsafeFileError(problem, cure="Save the sheet as CSV.")
+            unpacked.writestr(entry.filename, xml)
+    return plain
+
+
+def _cell(value: Any) -> str:
+    """Return a cell as text; that of a text cell is quoted, so that it is no comment."""
+    if isinstance(value, int | float):
+        return repr(value)
+    return "" if value is None else '"' + " ".join(str(value).split()).replace('"', '""') + '"'
+
+
+class FrameTable(NamedColumns):
+    """Columns that another library holds or reads, each by ``column(index)``."""
+
+    def __init__(
+        self, name: str, names: Sequence[Any], rows: int, column: Callable[[int], Any], *,
+        units: Sequence[str] = (), source: SourceFile | None = None,
+        decimal: str | None = None, missing: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        super().__init__(name, missing)
+        self.names = tuple(printable(head, _MAX_NAME) for head in names)
+        self.source, self.decimal, self._unit_row = source, decimal, tuple(units)
+        self._rows, self._column = rows, column
+
+    def _room(self, columns: int) -> int:
+        if self._rows > (most := self._most(columns)):
+            of, cure = f"rows of {columns} columns", "Average neighbouring readings."
+            raise too_large(self._name, self._rows, most, of, cure=cure)
+        return self._rows
+
+    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
+        lines = range(1, self._rows + 1)
+        yield lines, [self._converted(item, lines) for item in wanted]
+
+    def _converted(self, item: Wanted, lines: Lines) -> FloatArray:
+        index = self._index(item.column)
+        values = _guarded(self._name, lambda: np.asarray(self._column(index)))
+        if values.shape != (self._rows,):
+            problem = f"{self.where(item.column)} has shape {values.shape} in {self._rows} rows."
+            raise InputError(problem, cure="Give one value for each row.")
+        if values.dtype.kind in "iufb":
+            return values.astype(np.float64)
+        cells = ["" if value is None else str(value).strip() for value in values.tolist()]
+        self.decimal = self.decimal or find_decimal([(cell,) for cell in cells])
+        return self._numbers(cells, lines, item)
+
+    def _describe(self, count: int) -> None:
+        sha256 = f" (sha256 {self.source.sha256})" if self.source else ""
+        origin = f"Imported from {self._name}{sha256}."
+        self.notes = origin, f"Read {count} rows of {len(self.names)} columns."
+
+
+def _columns_in_memory(frame: Any, **reading: Any) -> FrameTable:
+    """Return a mapping of columns, or a data frame of any library, as a table."""
+    keys = list(frame if isinstance(frame, Mapping) else getattr(frame, "columns", ()))
+    if not keys:
+        cure = "Give a path, a data frame with columns, or a mapping of names to arrays."
+        raise InputError(f"A {type(frame).__name__} is no table with columns.", cure=cure)
+    rows = np.size(frame[keys[0]])
+    return FrameTable("a table in memory", keys, rows, lambda i: frame[keys[i]], **reading)
+
+
+def _parquet_table(parquet: Any, name: str, data: bytes, **reading: Any) -> FrameTable:
+    """Return a Parquet file as a table; its fields may state units in their metadata."""
+    file = parquet.ParquetFile(io.BytesIO(data))
+    heads = file.schema_arrow
+    units = [
+        ((head.metadata or {}).get(b"units") or b"").decode("utf-8", "replace") for head in heads
+    ]
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+
+    def column(index: int) -> Any:
+        return file.read(columns=[heads[index].name]).column(0)
+
+    rows = file.metadata.num_rows
+    return FrameTable(name, heads.names, rows, column, units=units, source=source, **reading)
