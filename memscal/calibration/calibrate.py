@@ -82,6 +82,8 @@ def assemble(
         "grid": dict(solution.choice.reasons),
         "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
     }
+    if scan.direction == "y":
+        record["direction"] = "y"
     if max(solution.owners) > 0:
         # Repeats that are fitted as scans have the source of the scan that they belong to.
         of_scans = dict(zip(solution.owners, solution.scans, strict=True))

@@ -8,12 +8,19 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from memscal.errors import InputError
-from memscal.figures.style import COLOURS, legend_above, panels_of
+from memscal.figures.style import (
+    ALONG_RADIUS,
+    COLOURS,
+    EXPANDED,
+    legend_above,
+    on_axis,
+    panels_of,
+)
 from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.planning.design import Design, varied_designs
 
 #: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
-_WIDTHS, _BANDS = 4.0, 2.0
+_WIDTHS, _BANDS, _FINE = 4.0, 2.0, 401
 #: Factors on the planned number at which the third panel is evaluated.
 _FACTORS = np.geomspace(0.25, 4.0, 9)
 #: No variation has more positions than this, unless the plan itself does.
@@ -42,31 +49,31 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
 
 
 def _draw_radial(axes: Axes, planned: Design) -> None:
-    shown = planned.r <= _WIDTHS * planned.parameters["gaussian_sigma"]
-    r, g, error = (a[shown] for a in (planned.r / MM, planned.g / PER_MM2, planned.g_errors))
-    error = error / PER_MM2
+    r = np.linspace(0.0, _WIDTHS * planned.parameters["gaussian_sigma"], _FINE)
+    g, error = on_axis(planned.r, np.stack([planned.g, EXPANDED * planned.g_errors]), r) / PER_MM2
+    r, assumed = r / MM, planned.plan.kernel.radial(r) / PER_MM2
     colour = COLOURS["deconvolved"]
-    axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="k = 1")
+    axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="±2u")
     axes.plot(r, g, color=colour, label="G expected")
-    assumed = planned.plan.kernel.radial(r * MM) / PER_MM2
     axes.plot(r, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set(xlim=(0, r[-1]), xlabel="radius (mm)", ylabel="G (1/mm²)")
+    axes.set(xlim=(0, r[-1]), xlabel=ALONG_RADIUS, ylabel="$G_{zz}$ (1/mm$^2$)")
     legend_above(axes, columns=2)
 
 
 def _draw_transfer(axes: Axes, planned: Design) -> None:
     resolved = planned.resolved_wavenumber
-    shown = planned.k <= _BANDS * resolved
-    k, transfer, error = (a[shown] for a in (planned.k, planned.transfer, planned.transfer_errors))
+    k = np.linspace(0.0, min(_BANDS * resolved, planned.k[-1]), _FINE)
+    samples = np.stack([planned.transfer, EXPANDED * planned.transfer_errors])
+    transfer, error = on_axis(planned.k, samples, k)
     k = k / PER_MM
     colour = COLOURS["deconvolved"]
     axes.axvspan(0, resolved / PER_MM, color=COLOURS["window"], alpha=0.12, lw=0)
     axes.axvline(resolved / PER_MM, color=COLOURS["window"], ls=":", label="resolved")
     axes.fill_between(k, transfer - error, transfer + error, color=colour, alpha=0.25, lw=0)
-    axes.plot(k, transfer, color=colour, label="|transform of G|")
+    axes.plot(k, transfer, color=colour, label="modulus for G")
     axes.set_xlim(0, k[-1])
-    axes.set(xlabel="wavenumber (rad/mm)", ylabel="transfer function", ylim=(0, None))
+    axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)", ylim=(0, None))
     legend_above(axes)
 
 
@@ -78,11 +85,11 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
         share = np.array([varied.relative_uncertainty(name) for varied in designs])
         noise = [varied.budget[name]["noise"] / abs(varied.parameters[name]) for varied in designs]
         shown: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
-        axes.plot(along, 100 * share, label=symbol, **shown)
-        axes.plot(along, 100 * np.array(noise), ls="--", mfc="none", **shown)
+        axes.plot(along, 100 * EXPANDED * share, label=symbol, **shown)
+        axes.plot(along, 100 * EXPANDED * np.array(noise), ls="--", mfc="none", **shown)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
     axes.axvline(getattr(planned.plan, vary) / scale, color=COLOURS["muted"], ls=":", lw=0.8)
-    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty (%)")
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty, 2u (%)")
     # 0.5 and 20 in place of powers of ten: the axes span a decade or two.
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -23,7 +23,7 @@ def fleet_figure(fleet: FleetResults) -> Figure:
     power = power_of_ten(fleet.conversion_constant)
     power = 0 if -2 <= power <= 3 else power
     unit = f"$10^{{{power}}}$ {fleet.unit}" if power else fleet.unit
-    with panels_of(5.6, 2, 2) as (figure, panels):
+    with panels_of(5.6, 2, 2, note="") as (figure, panels):
         label = f"conversion constant $A$ ({unit})"
         _distribution(panels[0, 0], fleet.conversion_constant / 10.0**power, label)
         _distribution(panels[0, 1], fleet.gaussian_sigma, r"Gaussian width $\sigma$ (mm)")

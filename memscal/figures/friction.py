@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 from memscal.errors import InputError
 from memscal.figures import friction_profiles as profiles
 from memscal.figures.friction_profiles import friction_name, friction_position, lubricated_words
-from memscal.figures.style import COLOURS, legend_above, panels_of
+from memscal.figures.style import (
+    COLOURS,
+    COVERAGE_NOTE,
+    EXPANDED,
+    legend_above,
+    load_looks,
+    mark,
+    panels_of,
+)
 from memscal.friction.family import bounded
 from memscal.friction.results import (
     BoundedEstimate,
@@ -30,6 +38,10 @@ _UM = 1e-6
 _MIDDLE = 3e-6
 _TICKS = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, np.inf)
 _COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
+_RISE = r"$-2\,\ln(p/p_{max})$"
+_INTERVALS = "95 % by profile likelihood, about k = 2"
+_INTERVAL_NOTE = f"Intervals of friction coefficients and lengths: {_INTERVALS}."
+_BOTH_NOTE = f"{COVERAGE_NOTE} Intervals of friction coefficients: {_INTERVALS}."
 
 
 def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
@@ -43,7 +55,8 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
         raise InputError("There is no law of the interface to draw.", cure=cure)
     slip = laws.tangential
     implied = None if slip is None else slip.implied
-    with panels_of(3.0, 1, 2 if implied is None else 3) as (figure, panels):
+    columns = 2 if implied is None else 3
+    with panels_of(3.0, 1, columns, note=_INTERVAL_NOTE) as (figure, panels):
         _draw_lengths(panels[0], laws.by_direction)
         _draw_marginal_likelihoods(panels[1], laws.by_direction)
         if slip is not None and implied is not None:
@@ -60,7 +73,7 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(list(bounded(np.array(_TICKS) * _UM, _MIDDLE)), names)
-    axes.set(xlim=(-0.02, 1.02), xlabel="length (um)", ylabel=r"$\chi^2 - \chi^2_{min}$")
+    axes.set(xlim=(-0.02, 1.02), xlabel="length (µm)", ylabel=_RISE)
     legend_above(axes, columns=1)
 
 
@@ -78,7 +91,7 @@ def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison
     axes.yaxis.set_ticks(list(range(height)), names)
     axes.set_ylim(height - 0.5, -0.5)
     axes.axvline(0.0, color="0.6", lw=0.6)
-    axes.set_xlabel("ln of marginal likelihood over the best")
+    axes.set_xlabel("ln of marginal likelihood\nover the best")
 
 
 def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:
@@ -128,16 +141,19 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
         measured = [p for p in comparison.loads[loading] if p.lubrication == lubrication]
-        values = [(at_load.load, at_load.ratio, at_load.ratio_uncertainty) for at_load in measured]
-        x, ratio, u = zip(*values, strict=True)
-        look = profiles.mark(lubrication, COLOURS["measured"])
+        values = [(p.load, p.ratio, EXPANDED * p.ratio_uncertainty) for p in measured]
+        x, ratio, bars = zip(*values, strict=True)
+        look = mark(lubrication, COLOURS["measured"])
         look |= {"ms": 4, "mew": 0.8, "ls": "none", "elinewidth": 0.8, "capsize": 2}
-        axes.errorbar(x, ratio, u, zorder=3, label=lubricated_words(lubrication), **look)
+        axes.errorbar(x, ratio, bars, zorder=3, label=lubricated_words(lubrication), **look)
     last = loads[-1]
     # Room at the right for the curves' names.
     axes.set_xlim(0.0, last + _ROOM * max(last - loads[0], 0.2 * last))
     _name_ends(axes, last, ends)
-    axes.set(xlabel="load (N)", ylabel=r"$S_{max}/p^0_{max}$")
+    axes.set(
+        xlabel="load (N)",
+        ylabel="largest blurred stress\nover frictionless, $S_{max}/p^0_{max}$ (1)",
+    )
     words = f"{loading} loading" if loading else "as given"
     axes.annotate(words, (0.03, 0.96), xycoords="axes fraction", va="top", fontsize=7)
     legend_above(axes, columns=3)
@@ -162,14 +178,29 @@ def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
 
 
 def comparison_figure(
-    comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
+    comparison: FrictionComparison,
+    *,
+    name: str = "",
+    lubrication: str | None = None,
+    loading: str | None = None,
 ) -> Figure:
-    """Draw a comparison on one page; by default of the first lubrication and loading."""
+    """Draw a comparison on one page, or its figure of a name that ``--figures`` gives to a file.
+
+    The page is by default of the first lubrication and loading.
+    """
+    if name:
+        figures = comparison_figures(comparison)
+        if name not in figures:
+            problem = f"The comparison has no figure {name!r}."
+            raise InputError(problem, cure=f"Choose from {', '.join(figures)}.")
+        return figures[name]()
     loads = profiles.chosen(comparison, loading, lubrication)
-    with panels_of(5.6, 2, 2) as (figure, panels):
+    with panels_of(5.6, 2, 2, note=_BOTH_NOTE) as (figure, panels):
         profiles.draw_profiles(panels[0, 0], comparison, loads)
         _draw_maxima(panels[0, 1], comparison, loads[0].loading)
-        profiles.draw_residuals(panels[1, 0], comparison, loads, 0)
+        best, _ = profiles.fitted_friction(comparison, loads)
+        profiles.draw_residuals(panels[1, 0], comparison, loads, best)
+        profiles.share_limits([panels[1, 0]])
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
         draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)
@@ -206,7 +237,7 @@ _HIGHEST = 12.0
 
 def effective_friction_figure(comparison: FrictionComparison) -> Figure:
     """Draw the effective friction coefficient against the load, with intervals."""
-    return _panels(comparison, draw_effective, 2.7)
+    return _panels(comparison, draw_effective, 2.7, _BOTH_NOTE)
 
 
 def draw_effective(
@@ -217,7 +248,7 @@ def draw_effective(
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
             reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
-            look = profiles.mark(at_load.lubrication, COLOURS[colour])
+            look = mark(at_load.lubrication, COLOURS[colour])
             _draw_reading(axes, reading, x, words if i == 0 else "", look)
     joint, grey = comparison.joint[loads[0].lubrication][loads[0].loading], COLOURS["muted"]
     low, top = _ends(joint)
@@ -227,9 +258,10 @@ def draw_effective(
     if comparison.macroscopic is not None:
         value, u = comparison.macroscopic
         place = float(friction_position(value))
-        axes.axhline(place, color=grey, lw=0.8, ls="--", label="macroscopic")
+        axes.axhline(place, color=grey, lw=0.8, ls="--", label="macroscopic" + ", ±2u" * bool(u))
         if u:
-            low, high = friction_position([max(value - 1.96 * u, 0.0), value + 1.96 * u])
+            spread = EXPANDED * u
+            low, high = friction_position([max(value - spread, 0.0), value + spread])
             axes.axhspan(low, high, color=grey, alpha=0.15, lw=0)
     profiles.friction_axis(axes, "y")
     axes.set(xlim=(0, loads[-1].load + 0.08 * span), xlabel="load (N)")
@@ -265,11 +297,12 @@ def _panels(
     comparison: FrictionComparison,
     draw: Callable[[Axes, FrictionComparison, Sequence[LoadComparison]], None],
     height: float,
+    note: str,
 ) -> Figure:
     """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
     lubrications = list(comparison.joint)
     rows, columns = len(lubrications), len(comparison.loadings)
-    shared = {"sharex": True, "sharey": True, "squeeze": False}
+    shared: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "note": note}
     with panels_of(0.6 + height * rows, rows, columns, **shared) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
@@ -297,13 +330,13 @@ def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
 
 def likelihood_figure(comparison: FrictionComparison) -> Figure:
     """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
-    return _panels(comparison, _draw_likelihood, 2.4)
+    return _panels(comparison, _draw_likelihood, 2.4, _INTERVAL_NOTE)
 
 
 def _draw_likelihood(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
-    looks = profiles.load_looks(comparison)
+    looks = load_looks(profile.load for profile in comparison.measured.profiles)
     joint = comparison.joint[loads[0].lubrication][loads[0].loading]
     curves = [(at_load.by_profile, *looks[at_load.load], 1.0) for at_load in loads]
     for reading, colour, label, width in (*curves, (joint, COLOURS["measured"], "all loads", 1.8)):
@@ -311,7 +344,7 @@ def _draw_likelihood(
         axes.plot(place, _rise(reading), color=colour, lw=width, label=label)
     draw_levels(axes)
     profiles.friction_axis(axes, "x")
-    axes.set_ylabel(r"$-2\,\ln(p/p_{max})$")
+    axes.set_ylabel(_RISE)
 
 
 def draw_levels(axes: Axes) -> None:

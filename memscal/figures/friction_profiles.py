@@ -11,19 +11,22 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panels_of, shades
+from memscal.figures.style import (
+    ALONG_RADIUS,
+    COLOURS,
+    EXPANDED,
+    legend_above,
+    load_looks,
+    mark,
+    on_axis,
+    panels_of,
+)
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
 
-#: Loads up to this multiple of another one look alike.
-_ALIKE = 1.05
-#: Radii closer than this, in m, count as one.
-_CLOSE = 1e-6
 _TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
-#: Marker and filling of a lubrication.
-_LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
 
 
 def friction_position(friction: ArrayLike) -> FloatArray:
@@ -46,31 +49,8 @@ def friction_name(friction: float) -> str:
 
 def friction_colours(friction: ArrayLike) -> list[str]:
     """Return colours of friction coefficients, by their place between 0 and infinity."""
-    shades = mpl.colormaps["plasma"](0.92 * (1.0 - friction_position(friction)))
+    shades = mpl.colormaps["plasma"](0.8 * (1.0 - friction_position(friction)))
     return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
-
-
-def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
-    """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
-    groups: list[list[float]] = []
-    for load in sorted({profile.load for profile in comparison.measured.profiles}):
-        if groups and load <= _ALIKE * groups[-1][0]:
-            groups[-1].append(load)
-        else:
-            groups.append([load])
-    colours = shades(len(groups), 0.2)
-    names = [f"{np.mean(group):.3g} N" for group in groups]
-    return {
-        load: (colour, name)
-        for group, colour, name in zip(groups, colours, names, strict=True)
-        for load in group
-    }
-
-
-def mark(lubrication: str, colour: str) -> dict[str, Any]:
-    """Return marker and colours of points by their lubrication, distinct in grey print."""
-    marker, filled = _LUBRICATIONS.get(lubrication, _LUBRICATIONS[""])
-    return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}
 
 
 def lubricated_words(lubrication: str) -> str:
@@ -97,24 +77,28 @@ def chosen(
     return sorted(loads, key=lambda at_load: at_load.load)
 
 
-def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
-    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones."""
-    from scipy.interpolate import CubicSpline
-
-    kept, last = [], -np.inf
-    for i, radius in enumerate(r):
-        if radius - last > _CLOSE:
-            kept.append(i)
-            last = radius
-    inner, samples = r[kept], values[:, kept]
-    start = 1 if inner[0] < _CLOSE else 0
-    mirrored = np.concatenate([-inner[start:][::-1], inner])
-    both = np.concatenate([samples[:, start:][:, ::-1], samples], axis=1)
-    return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
+def fitted_friction(
+    comparison: FrictionComparison, loads: Sequence[LoadComparison]
+) -> tuple[float, str]:
+    """Return the most likely coefficient of all loads together, and its name."""
+    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
+    words = "most likely" if joint.value is None else "fitted to all loads"
+    return joint.best, rf"$\mu_e$ = {friction_name(joint.best)} ({words})"
 
 
-#: Coverage factor of the grey band, and of points distinct from zero.
-EXPANDED = 2.0
+def calculated_at(
+    comparison: FrictionComparison, at_load: LoadComparison, friction: float
+) -> FloatArray:
+    """Return the calculated blurred stress (n,), in Pa, at any coefficient within those solved."""
+    from scipy.interpolate import PchipInterpolator
+
+    places, calculated = friction_position(comparison.friction), at_load.calculated
+    if places.size == 1:
+        return np.asarray(calculated[0])
+    # As the family interpolates: past the friction of full stick nothing changes.
+    return np.asarray(PchipInterpolator(places, calculated)(friction_position(friction)))
+
+
 #: How strongly points are drawn that are not distinct from zero.
 _PALE = 0.25
 _LEAST_LIMIT = 3.5
@@ -126,12 +110,12 @@ def _draw_points(
 ) -> None:
     """Draw the measured points; on a logarithmic scale those below 2u are pale or left out."""
     profile = at_load.profile
-    r, s, u = profile.r / MM, profile.s_zz / KPA, profile.s_zz_errors / KPA
-    clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
+    r, s, bars = profile.r / MM, profile.s_zz / KPA, EXPANDED * profile.s_zz_errors / KPA
+    clear = s > bars if logarithmic else np.ones(s.size, dtype=bool)
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
             look = mark(at_load.lubrication, colour) | _BARS | {"alpha": alpha}
-            axes.errorbar(r[shown], s[shown], u[shown], label=label or "_points", **look)
+            axes.errorbar(r[shown], s[shown], bars[shown], label=label or "_points", **look)
 
 
 def share_limits(panels: Sequence[Axes]) -> None:
@@ -163,7 +147,7 @@ def profile_figure(
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
-            draw_residuals(axes, comparison, loads, index)
+            draw_residuals(axes, comparison, loads, float(comparison.friction[index]))
         share_limits(panels[1])
     return figure
 
@@ -175,31 +159,34 @@ def draw_profiles(
     *,
     logarithmic: bool = False,
 ) -> None:
-    """Draw measured points with their uncertainties, and the calculated limits through them."""
-    looks = load_looks(comparison)
+    """Draw measured points, calculated curves of the fitted coefficient, and their limits."""
+    looks = load_looks(profile.load for profile in comparison.measured.profiles)
+    best, fitted = fitted_friction(comparison, loads)
+    ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
+    styles = {"-": fitted, ":": rf"$\mu$ = {ends[0]}", "--": rf"$\mu$ = {ends[1]}"}
     for at_load in loads:
         colour, name = looks[at_load.load]
         r = np.linspace(0.0, at_load.profile.r[-1], _FINE)
-        limits = on_axis(at_load.profile.r, at_load.calculated[[0, -1]], r) / KPA
-        axes.plot(r / MM, limits[0], color=colour, lw=1.0)
-        axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
+        shown = np.stack([calculated_at(comparison, at_load, best), *at_load.calculated[[0, -1]]])
+        curves = on_axis(at_load.profile.r, shown, r) / KPA
+        for curve, ls in zip(curves, styles, strict=True):
+            axes.plot(r / MM, curve, color=colour, lw=1.0 if ls == "-" else 0.8, ls=ls)
         _draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
         axes.set_yscale("log")
         axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
-        for ls, index in (("-", 0), ("--", -1)):
-            label = rf"$G*\sigma_{{zz}}$, $\mu$ = {friction_name(comparison.friction[index])}"
+        for ls, label in styles.items():
             axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
     else:
         axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
         axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
-        ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
         lines = [lubricated_words(loads[0].lubrication)]
         lines += [f"{loads[0].loading} loading"] if loads[0].loading else []
-        lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
+        words = zip(("solid", "dotted", "dashed"), styles.values(), strict=True)
+        lines += [f"{line}: {label}" for line, label in words]
         _note(axes, "\n".join(lines), (0.97, 0.95))
-    axes.set_ylabel("stress at the base (kPa)")
+    axes.set_ylabel("blurred stress $S_{zz}$ (kPa)")
     legend_above(axes, columns=4 if not logarithmic else 2)
 
 
@@ -209,23 +196,29 @@ def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
 
 
 def draw_residuals(
-    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], index: int
+    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], friction: float
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    looks = load_looks(comparison)
-    _plot_residuals(axes, loads, index, [looks[at_load.load][0] for at_load in loads])
-    axes.set_xlabel("distance from the centre (mm)")
-    axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(comparison.friction[index])}}})/u$")
+    looks = load_looks(profile.load for profile in comparison.measured.profiles)
+    colours = [looks[at_load.load][0] for at_load in loads]
+    _plot_residuals(axes, comparison, loads, friction, colours)
+    axes.set_xlabel(ALONG_RADIUS)
+    axes.set_ylabel(rf"residual / $u$, $\mu$ = {friction_name(friction)}")
 
 
 def _plot_residuals(
-    axes: Axes, loads: Sequence[LoadComparison], index: int, colours: Sequence[str]
+    axes: Axes,
+    comparison: FrictionComparison,
+    loads: Sequence[LoadComparison],
+    friction: float,
+    colours: Sequence[str],
 ) -> None:
     axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     for at_load, colour in zip(loads, colours, strict=True):
         profile, look = at_load.profile, mark(at_load.lubrication, colour)
-        z = (profile.s_zz - at_load.calculated[index]) / profile.s_zz_errors
+        calculated = calculated_at(comparison, at_load, friction)
+        z = (profile.s_zz - calculated) / profile.s_zz_errors
         axes.plot(profile.r / MM, z, ls="none", ms=2.5, mew=0.6, **look)
 
 
@@ -236,29 +229,32 @@ def friction_set_figure(
     loads = chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
-    with house_style():
-        figure = new_figure(5.0)
-        rows = (1.5, 1.5, 1.0)
-        panels = figure.subplots(3, len(loads), height_ratios=rows, sharex="col", squeeze=False)
+    shared: dict[str, Any] = {"sharex": "col", "squeeze": False, "height_ratios": (1.5, 1.5, 1.0)}
+    with panels_of(5.0, 3, len(loads), **shared) as (figure, panels):
         for column, at_load in zip(panels.T, loads, strict=True):
             frictionless = at_load.calculated[0]
             column[0].set_title(f"{at_load.load:.3g} N", fontsize=8)
             _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
             column[0].set_ylim(bottom=0)
             _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
-            best = int(np.argmin(at_load.deviance))
-            _plot_residuals(column[2], [at_load], best, [COLOURS["measured"]])
-            name = friction_name(comparison.friction[best])
-            _note(column[2], rf"most likely: $\mu$ = {name}", (0.96, 0.9))
+            best = at_load.by_profile.best
+            _plot_residuals(column[2], comparison, [at_load], best, [COLOURS["measured"]])
+            words = "fitted" if at_load.by_profile.value is not None else "most likely"
+            _note(column[2], rf"{words}: $\mu_e$ = {friction_name(best)}", (0.96, 0.93))
         share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:
             axes.set_ylim(min(low), max(high))
-        words = ("stress (kPa)", "beyond frictionless\n(% of its maximum)", "residual / $u$")
-        for axes, label in zip(panels[:, 0], words, strict=True):
+        of_rows = (
+            "blurred stress\n$S_{zz}$ (kPa)",
+            "beyond frictionless\n(% of its maximum)",
+            "residual / $u$",
+        )
+        for axes, label in zip(panels[:, 0], of_rows, strict=True):
             axes.set_ylabel(label)
         figure.align_ylabels(panels[:, 0])
-        figure.supxlabel("distance from the centre (mm)", fontsize=8)
+        for axes in panels[2]:
+            axes.set_xlabel("$r$ (mm)" if len(loads) > 2 else ALONG_RADIUS)
         _legend_of_friction(figure, comparison, loads[0])
     return figure
 
@@ -284,7 +280,7 @@ def _draw_set(
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    stress, errors = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
+    stress, errors = (profile.s_zz - less) / unit, EXPANDED * profile.s_zz_errors / unit
     axes.errorbar(profile.r / MM, stress, errors, label="_points", **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
 

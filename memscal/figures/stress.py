@@ -1,8 +1,7 @@
 """Figures of measured stress, of restored stress, and of contacts."""
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,85 +10,64 @@ from matplotlib.lines import Line2D
 
 from memscal.errors import InputError
 from memscal.figures import style
-from memscal.figures.style import COLOURS
+from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED
 from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
-_MEASURED_STRESS_EXPANDED = 1.96
 _DECADES = 1e-3
-#: Okabe and Ito's colours once more, one for each load, from the smallest up.
-_LOADS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#7B3F8C", "#6B6B6B")
-_SAME_LOAD = 0.05
 
 
 def measured_stress_figure(measured: MeasuredStress) -> Figure:
     """Draw the measured profiles of all loads against the distance from the centre."""
     with style.panels_of(3.6, 1, 2) as (figure, panels):
-        scales = ("linear scale", "logarithmic scale, three decades")
+        looks = style.load_looks(profile.load for profile in measured.profiles)
+        scales = ("linear scale", "logarithmic scale; pale: less than 2u")
         for axes, scale in zip(panels, scales, strict=True):
             axes.set_title(scale, fontsize=8, loc="left")
-            for profile, colour in _coloured(measured):
-                _draw(axes, profile, colour, logarithmic=axes is panels[1])
-            axes.set_xlabel("distance from the centre (mm)")
-            axes.set_ylabel(r"measured stress $S_{zz}$ (kPa)")
+            for profile in measured.profiles:
+                _draw(axes, profile, looks[profile.load][0], logarithmic=axes is panels[1])
+            axes.set(xlabel=ALONG_RADIUS, ylabel="blurred stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
         panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         panels[1].set_yscale("log")
         panels[1].set_ylim(_DECADES * top, 1.6 * top)
         panels[1].yaxis.set_major_formatter("{x:g}")
-        _legend(figure, measured)
+        _legend(figure, measured, dict(looks.values()))
     return figure
-
-
-def _coloured(measured: MeasuredStress) -> Iterator[tuple[MeasuredProfile, str]]:
-    levels: list[float] = []
-    for load in sorted(profile.load for profile in measured.profiles):
-        if not levels or load > levels[-1] * (1 + _SAME_LOAD):
-            levels.append(load)
-    for profile in measured.profiles:
-        level = int(np.argmin(np.abs(np.log(np.array(levels) / profile.load))))
-        yield profile, _LOADS[level % len(_LOADS)]
 
 
 def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: bool) -> None:
     """Draw a profile; if ``logarithmic``, points not distinct from zero are pale, without bars."""
-    lubricated = profile.lubrication == "lubricated"
+    dashes = "--" if profile.lubrication == "lubricated" else "-"
     (line,) = axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, color=colour, lw=0.8)
-    line.set(ls="--" if lubricated else "-", alpha=0.7)
-    bars = _MEASURED_STRESS_EXPANDED * profile.s_zz_errors
+    line.set(ls=dashes, alpha=0.7)
+    bars = EXPANDED * profile.s_zz_errors
     shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
-    marker, face = ("s", "white") if lubricated else ("o", colour)
-    look: dict[str, Any] = {"marker": marker, "ls": "none", "color": colour, "mew": 0.7}
-    look |= {"ms": 2.6, "mfc": face}
+    look = style.mark(profile.lubrication, colour) | {"ls": "none", "mew": 0.7, "ms": 2.6}
     r, stress = profile.r / MM, profile.s_zz / KPA
     axes.errorbar(r[shown], stress[shown], yerr=bars[shown] / KPA, elinewidth=0.6, **look)
     if not shown.all():
         axes.plot(r[~shown], stress[~shown], alpha=0.3, **look)
     radius = profile.contact_radius / MM
-    axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=":" if lubricated else "-")
+    axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
 
-def _legend(figure: Figure, measured: MeasuredStress) -> None:
+def _legend(figure: Figure, measured: MeasuredStress, colours: dict[str, str]) -> None:
     """Name loads by colour and states by mark, once for both panels."""
-    handles, seen = [], set()
-    for profile, colour in sorted(_coloured(measured), key=lambda pair: pair[0].load):
-        if colour not in seen:
-            seen.add(colour)
-            handles.append(Line2D([], [], color=colour, lw=2.0, label=f"{profile.load:.3g} N"))
+    handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
-        marker, face, ls = ("s", "white", "--") if state == "lubricated" else ("o", "0.2", "-")
-        handle = Line2D([], [], color="0.2", lw=0.8, marker=marker, ms=3.2, mfc=face, ls=ls)
-        handle.set_label(f"{state or 'measured'}, ±1.96u")
+        handle = Line2D([], [], lw=0.8, ms=3.2, **style.mark(state, "0.2"))
+        handle.set_linestyle("--" if state == "lubricated" else "-")
+        handle.set_label(f"{state or 'measured'}, ±2u")
         handles.append(handle)
     radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
     handles.append(radius)
     figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 7))
 
 
-_RESTORATION_EXPANDED = 2.0
 _LEAST_LIMIT = 3.5
 
 
@@ -105,12 +83,13 @@ def restoration_figure(restored: Restoration, compared: StressComparison | None 
 def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison | None) -> None:
     r = restored.r / MM
     stress = restored.sigma_zz / KPA
-    band = _RESTORATION_EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
+    band = EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
     blue = COLOURS["deconvolved"]
     axes.fill_between(r, stress - band, stress + band, color=blue, alpha=0.25, lw=0)
     axes.plot(r, stress, color=blue, label=r"restored $\sigma_{zz}$, ±2u")
     blurred = restored.blurred_stress(restored.r) / KPA
-    axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.", label=r"blurred again, $G*\sigma$")
+    axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.")
+    axes.lines[-1].set_label(r"blurred again, $S_{zz} = G*\sigma_{zz}$")
     if compared is not None:
         label = "expected"
         if isinstance(compared.stress, Contact):
@@ -121,11 +100,11 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison |
     size = 1.2 if many else 0.8 * style.marker_size(restored.points.u.size)
     (points,) = axes.plot(restored.distance / MM, restored.measured_stress / KPA, "o")
     points.set(color=COLOURS["measured"], ms=size, mfc="none", mew=0.6)
-    points.set(label="scan, $S_{zz} = U/A$", rasterized=many)
+    points.set(label="scan, blurred stress $S_{zz} = U/A$", rasterized=many)
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
     axes.set_xlim(0, max(r[-1], float(restored.distance.max()) / MM))
-    axes.set_xlabel("distance from the centre (mm)")
-    axes.set_ylabel("stress at the base (kPa)", labelpad=8)
+    axes.set_xlabel(ALONG_RADIUS)
+    axes.set_ylabel(r"stress $\sigma_{zz}$ at the base, blurred stress $S_{zz}$ (kPa)")
     style.legend_above(axes, columns=2, points=restored.points.u.size)
 
 
@@ -134,8 +113,9 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     z = restored.residual / restored.noise
     limit = max(_LEAST_LIMIT, min(1.1 * float(np.abs(z).max()), 8.0))
     ordinary = np.abs(z) <= limit
-    side = np.where(restored.points.free[0, 0], restored.points.x, restored.points.y) / MM
-    axes.axhspan(-_RESTORATION_EXPANDED, _RESTORATION_EXPANDED, color="0.92", lw=0)
+    along = "x" if restored.points.free[0, 0] else "y"
+    side = getattr(restored.points, along) / MM
+    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     size = style.marker_size(z.size)
     label = f"scan: rms {float(np.sqrt(np.mean(z**2))):.2f}"
@@ -143,7 +123,7 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     edge = 0.93 * limit * np.sign(z[~ordinary])
     axes.plot(side[~ordinary], edge, "^", color=COLOURS["failed"], ms=4, label="_beyond the axis")
     axes.set_ylim(-limit, limit)
-    axes.set(xlabel="position (mm)", ylabel="residual / $u$")
+    axes.set(xlabel=f"position ${along}$ (mm)", ylabel="residual / $u$")
     style.legend_above(axes, columns=1)
 
 
@@ -156,14 +136,15 @@ _SHOWN_MEANS = 3.0
 _NAMED = 6
 
 
-def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
+def contact_figure(
+    contacts: Contact | Sequence[Contact], *, beside: Sequence[Contact] = ()
+) -> Figure:
     """Draw pressure and shear of one contact or several; of several, load against depth, too."""
-    if isinstance(contacts, Contact):
-        contacts = [contacts]
+    contacts = [*([contacts] if isinstance(contacts, Contact) else contacts), *beside]
     if not contacts:
         raise InputError("There is no contact to draw.")
     several = len(contacts) > 1
-    with style.panels_of(2.9, 1, 3 if several else 2) as (figure, panels):
+    with style.panels_of(2.9, 1, 3 if several else 2, note="") as (figure, panels):
         colours = style.shades(len(contacts), 0.15)
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
@@ -174,7 +155,7 @@ def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
             panels[2].scatter(depth, load, c=list(colours), s=14, zorder=3)
             panels[2].set_ylim(bottom=0)
             panels[2].set_xlim(left=min(0.0, 1.05 * float(depth.min())))
-            panels[2].set(xlabel="depth (um)", ylabel="load (N)")
+            panels[2].set(xlabel="depth (µm)", ylabel="load (N)")
     return figure
 
 
@@ -200,7 +181,7 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
         label = "stick radius"
         axes.plot([], [], color="0.4", marker="o", ms=3, mfc="none", ls="none", label=label)
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set(xlim=(0, r[-1] / MM), xlabel="radius (mm)", ylabel="at the interface (kPa)")
+    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the interface (kPa)")
     style.legend_above(axes, columns=2)
 
 
@@ -210,8 +191,8 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
     for contact, colour in zip(contacts, colours, strict=True):
         axes.plot(r / MM, contact.base_stress(r) / KPA, color=colour)
         axes.plot(r / MM, contact.base_shear(r) / KPA, color=colour, ls="--")
-    axes.plot([], [], color="0.4", label="pressure")
-    axes.plot([], [], color="0.4", ls="--", label="shear, outward")
+    axes.plot([], [], color="0.4", label=r"normal, $\sigma_{zz}$")
+    axes.plot([], [], color="0.4", ls="--", label=r"shear, outward, $\sigma_{rz}$")
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set(xlim=(0, r[-1] / MM), xlabel="radius (mm)", ylabel="at the base (kPa)")
+    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the base (kPa)")
     style.legend_above(axes, columns=1)

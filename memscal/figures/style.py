@@ -1,6 +1,7 @@
 """Style of all figures: type, colours, layout, and the bytes of a figure's file."""
 
 import io
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,15 +17,26 @@ from matplotlib.font_manager import findfont, get_font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
+from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.model.apparatus import ApparatusData
+from memscal.model.arrays import FloatArray
 
 
 def channel_indices(data: ApparatusData) -> str:
     """Return the indices of the stress that a sensor's channel measures: zz, xz or yz."""
     return data.sensor.channel if data.sensor.channel in TANGENTIAL else "zz"
 
+
+EXPANDED = 2.0
+"""Coverage factor of every error bar, band and limit in every figure."""
+
+COVERAGE_NOTE = f"Error bars and bands: expanded uncertainty U = {EXPANDED:g}u (k = {EXPANDED:g})."
+"""What a figure with uncertainties states below its panels."""
+
+ALONG_RADIUS = "distance from the axis $r$ (mm)"
+"""Label of the axis along which profiles are drawn."""
 
 FIGURE_WIDTH = 7.2
 """Width in inches of a figure across two columns of a journal."""
@@ -43,6 +55,15 @@ COLOURS = {
 SCATTER_THRESHOLD = 400
 """Above this many points dots are drawn in place of error bars."""
 
+#: Room in inches for the line below the panels.
+_NOTE_HEIGHT = 0.2
+#: Loads up to this multiple of another one look alike.
+_ALIKE = 1.05
+#: Radii closer than this, in m, count as one.
+_CLOSE = 1e-6
+#: Marker and filling of a lubrication.
+_LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
+
 _STYLE = Path(__file__).with_name("house.mplstyle")
 
 
@@ -57,37 +78,48 @@ def house_style() -> Iterator[None]:
 
 
 def drawable(text: str) -> str:
-    """Return the text with a mark for each character that the font cannot draw."""
+    """Return the text in the font's characters, a mark for each other one; with µm for um."""
+    text = re.sub(r"\bum\b", "µm", text)
     font = get_font(findfont("DejaVu Sans"))
     return "".join(c if font.get_char_index(ord(c)) else "\ufffd" for c in text)
 
 
-def new_figure(height: float) -> Figure:
-    """Return an empty figure of the usual width, with a canvas and no window."""
-    layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, wspace=0.04, hspace=0.02)
-    figure = Figure(figsize=(FIGURE_WIDTH, height), layout=layout)
+def new_figure(height: float, note: str = "") -> Figure:
+    """Return an empty figure of the usual width and a height in inches, a note at its bottom."""
+    room = _NOTE_HEIGHT if note else 0.0
+    share = room / (height + room)
+    layout = ConstrainedLayoutEngine(
+        w_pad=0.05, h_pad=0.04, wspace=0.04, hspace=0.02, rect=(0.0, share, 1.0, 1.0 - share)
+    )
+    figure = Figure(figsize=(FIGURE_WIDTH, height + room), layout=layout)
     FigureCanvasAgg(figure)
+    if note:
+        line = figure.text(0.01, 0.3 * share, note, color=COLOURS["muted"], fontsize=7)
+        line.set_in_layout(False)
     return figure
 
 
 @contextmanager
 def panels_of(
-    height: float, rows: int = 1, columns: int = 1, **layout: Any
+    height: float, rows: int = 1, columns: int = 1, note: str = COVERAGE_NOTE, **layout: Any
 ) -> Iterator[tuple[Figure, NDArray[Any]]]:
-    """Yield a figure of a height in inches and its panels, in the house's style, with letters."""
+    """Yield a figure of a height in inches and its panels, in the house's style, with letters.
+
+    The note stands below the panels.
+    """
     with house_style():
-        figure = new_figure(height)
+        figure = new_figure(height, note)
         panels = np.asarray(figure.subplots(rows, columns, **layout))
-        yield figure, panels
         panel_letters(panels.flat)
+        yield figure, panels
 
 
 def panel_letters(panels: Iterable[Axes]) -> None:
     """Put each panel's letter at the upper left, outside the frame and clear of all data."""
     place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
     for axes, letter in zip(panels, ascii_lowercase, strict=False):
-        label = axes.annotate(letter, (0.0, 1.0), (-30, 4), **place)
-        label.set(fontweight="bold", fontsize=10, in_layout=False)
+        label = axes.annotate(letter, (0.0, 1.0), (-5, 6), **place)
+        label.set(fontweight="bold", fontsize=10, horizontalalignment="right")
 
 
 def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
@@ -112,6 +144,39 @@ def shades(count: int, first: float) -> list[str]:
         return [COLOURS["deconvolved"]]
     colours = mpl.colormaps["viridis_r"](np.linspace(first, 1.0, count))
     return [mpl.colors.to_hex(colour) for colour in colours]
+
+
+def load_looks(loads: Iterable[float]) -> dict[float, tuple[str, str]]:
+    """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
+    groups: list[list[float]] = []
+    for load in sorted(set(loads)):
+        if groups and load <= _ALIKE * groups[-1][0]:
+            groups[-1].append(load)
+        else:
+            groups.append([load])
+    colours = shades(len(groups), 0.2)
+    names = [f"{np.mean(group):.3g} N" for group in groups]
+    return {
+        load: (colour, name)
+        for group, colour, name in zip(groups, colours, names, strict=True)
+        for load in group
+    }
+
+
+def mark(lubrication: str, colour: str) -> dict[str, Any]:
+    """Return marker and colours of points by their lubrication, distinct in grey print."""
+    marker, filled = _LUBRICATIONS.get(lubrication, _LUBRICATIONS[""])
+    return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}
+
+
+def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
+    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones."""
+    kept, last = [], -np.inf
+    for i, radius in enumerate(r):
+        if radius - last > _CLOSE:
+            kept.append(i)
+            last = radius
+    return np.asarray(radial_spline(r[kept], values[:, kept].T)(fine)).T
 
 
 def marker_size(points: int) -> float:

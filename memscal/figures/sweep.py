@@ -27,7 +27,7 @@ def sweep_figure(sweep: Sweep) -> Figure:
         (r"$\sigma$ of deconvolved $G$ (mm)", *widths, MM),
         ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
     )
-    with panels_of(6.6, 3, sharex=True) as (figure, panels):
+    with panels_of(6.6, 3, note="", sharex=True) as (figure, panels):
         for axes, (label, exact, draws, scale) in zip(panels, rows, strict=True):
             _draw_row(axes, sweep.amplitude, exact / scale, draws / scale)
             axes.set_ylabel(label)

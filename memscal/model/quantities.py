@@ -248,8 +248,8 @@ def parameter_quantity(parameters: ParameterSet, name: str) -> Quantity:
     return estimated_quantity(name, parameters.units[parameters.names.index(name)])
 
 
-def measured_text(parameters: ParameterSet, name: str) -> str:
-    """Return one parameter as text with its standard uncertainty and unit."""
+def measured_text(parameters: ParameterSet, name: str, coverage: float = 1.0) -> str:
+    """Return one parameter as text with its uncertainty, k times the standard one, and unit."""
     shown = parameter_quantity(parameters, name)
-    uncertainty = parameters.uncertainty(name)
+    uncertainty = coverage * parameters.uncertainty(name)
     return format_measured(parameters[name] / shown.scale, uncertainty / shown.scale, shown.unit)

@@ -1,13 +1,13 @@
 """Calibrations made of Gaussians, whose convolutions and transforms have closed forms."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from helpers.builders import make_artifact
+from helpers.builders import make_artifact, scan_points
 from matplotlib.figure import Figure
 
 from memscal import ApparatusRadial, Reconvolution, TransferFunction
@@ -56,6 +56,17 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
     )  # fmt: skip
 
 
+def at_loads(scan: Reconvolution, loads: Sequence[float]) -> Reconvolution:
+    """Return the points at each of several loads (N), with voltages in proportion."""
+    if not len(loads):
+        return scan
+    n = scan.x.size
+    load = np.repeat(loads, n) * (1 + 5e-3 * np.tile(np.linspace(-1, 1, n), len(loads)))
+    scan = scan_points(scan, np.tile(np.arange(n), len(loads)))
+    named = {n: getattr(scan, n) * load for n in ("u_zz", "u_zz_predicted", "u_zz_gaussian")}
+    return replace(scan, **named, load=load, background=np.zeros(load.size))
+
+
 def radial_profile(error: float, ripple: float) -> ApparatusRadial:
     """Return G(r) with a standard uncertainty of a share of its maximum, and a ripple."""
     r = np.linspace(0.0, 8e-3, 321)
@@ -77,7 +88,7 @@ def build(
     kind: str = "line", points: int = 65, *, noise: float = 0.005, seed: int = 1,
     error: float = 0.03, ripple: float = 0.0, failed: int = 0, sensor: StressSensor | None = None,
     meaning: str = "The scan is not explained to within its noise.",
-    message: str = "1 outlier was down-weighted at x = 2.25 mm.",
+    message: str = "1 outlier was down-weighted at x = 2.25 mm.", loads: Sequence[float] = (),
 ) -> ApparatusData:  # fmt: skip
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
@@ -101,7 +112,7 @@ def build(
         plane=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
         radial_profile=radial_profile(error, ripple),
         transfer=transfer_function(3.7e3),
-        reconvolution=reconvolution(kind, points, noise, seed),
+        reconvolution=at_loads(reconvolution(kind, points, noise, seed), loads),
         parameters=ParameterSet(tuple(values), numbers, np.diag(spreads**2)),
         checks=tuple(
             QualityCheck(name, 1.7 if i < failed else 0.41, 1.0, i >= failed, meaning)

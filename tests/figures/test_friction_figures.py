@@ -15,11 +15,9 @@ from memscal.figures.friction import effective_friction_figure, likelihood_figur
 from memscal.figures.friction_profiles import (
     friction_position,
     friction_set_figure,
-    load_looks,
-    on_axis,
     profile_figure,
 )
-from memscal.figures.style import render_figure
+from memscal.figures.style import load_looks, on_axis, render_figure
 from memscal.friction.results import FrictionComparison
 
 
@@ -29,7 +27,7 @@ def found() -> FrictionComparison:
 
 
 def bars(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Abscissae, values and uncertainties of the error bars in a panel."""
+    """Abscissae, values and expanded uncertainties of the error bars in a panel."""
     drawn = []
     for points, _, (stems,) in axes.containers:
         x, y = points.get_data()
@@ -38,22 +36,22 @@ def bars(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return drawn
 
 
-def test_profiles_are_drawn_with_their_standard_uncertainties(found: FrictionComparison):
+def test_profiles_are_drawn_with_their_expanded_uncertainties(found: FrictionComparison):
     figure = profile_figure(found, lubrication="lubricated")
     profiles = found.measured.profiles[len(LOADS) :]
     for (r, s, u), profile in zip(bars(figure.axes[0]), profiles, strict=True):
         np.testing.assert_allclose(r, profile.r * 1e3)
         np.testing.assert_allclose(s, profile.s_zz * 1e-3)
-        np.testing.assert_allclose(u, profile.s_zz_errors * 1e-3)
+        np.testing.assert_allclose(u, 2e-3 * profile.s_zz_errors)
 
 
-def test_limits_of_friction_pass_through_the_calculated_profiles(found: FrictionComparison):
-    axes = profile_figure(found).axes[0]
-    solid = [
-        line for line in axes.lines if line.get_ls() == "-" and np.size(line.get_xdata()) > 100
-    ]
-    dashed = [line for line in axes.lines if line.get_ls() == "--"]
-    for lines, friction in ((solid, 0.0), (dashed, math.inf)):
+def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found: FrictionComparison):
+    axes = of_friction.comparison_figure(found).axes[0]
+    best = found.joint["dry"]["incremental"].value
+    for ls, friction in (("-", best), (":", 0.0), ("--", math.inf)):
+        lines = [
+            line for line in axes.lines if line.get_ls() == ls and np.size(line.get_xdata()) > 99
+        ]
         assert len(lines) == len(LOADS)
         for line, load in zip(lines, LOADS, strict=True):
             expected = stress(np.asarray(line.get_xdata()) * 1e-3, load, friction, "incremental")
@@ -73,6 +71,20 @@ def test_every_residual_is_within_its_panel(found: FrictionComparison):
             expected = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
             np.testing.assert_allclose(z, expected)
             assert np.all((z > low) & (z < high))
+
+
+def test_residuals_of_the_page_are_those_of_the_fitted_coefficient(found: FrictionComparison):
+    axes = of_friction.comparison_figure(found).axes[2]
+    drawn = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_marker() == "o"]
+    best = found.joint["dry"]["incremental"].value
+    for z, one in zip(drawn, found.loads["incremental"], strict=False):
+        expected = stress(one.profile.r, one.load, best, "incremental")
+        # The stress is interpolated between the coefficients that were calculated.
+        close = 2e-3 * expected.max() / one.profile.s_zz_errors.min()
+        np.testing.assert_allclose(
+            z, (one.profile.s_zz - expected) / one.profile.s_zz_errors, atol=close
+        )
+    assert f"{best:.3g}" in axes.get_ylabel()
 
 
 def test_a_logarithmic_scale_shows_every_stress_of_three_decades(found: FrictionComparison):
@@ -107,7 +119,7 @@ def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionC
         ((_, change, u),) = bars(axes)
         measured = one.profile.s_zz - one.calculated[0]
         np.testing.assert_allclose(change, 100 * measured / one.p0_max)
-        np.testing.assert_allclose(u, 100 * one.profile.s_zz_errors / one.p0_max)
+        np.testing.assert_allclose(u, 200 * one.profile.s_zz_errors / one.p0_max)
 
 
 def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest():
@@ -127,7 +139,7 @@ def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: Friction
         of_dry = [one for one in loads if one.lubrication == "dry"]
         np.testing.assert_allclose(dry[0], [one.load for one in of_dry])
         np.testing.assert_allclose(dry[1], [one.ratio for one in of_dry])
-        np.testing.assert_allclose(dry[2], [one.ratio_uncertainty for one in of_dry])
+        np.testing.assert_allclose(dry[2], [2 * one.ratio_uncertainty for one in of_dry])
         assert np.all(lubricated[1] < dry[1])
         (sticking,) = (line for line in axes.lines if line.get_gid() == "mu=inf")
         np.testing.assert_allclose(
@@ -170,7 +182,7 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
 
 
 def test_loads_that_were_recorded_look_as_their_neighbours():
-    looks = load_looks(comparison(loads=(1.36, 1.37, 2.75), lubrications=("dry",)))
+    looks = load_looks((1.36, 1.37, 2.75))
     assert looks[1.36] == looks[1.37]
     assert looks[1.37] != looks[2.75]
     assert looks[2.75][1] == "2.75 N"

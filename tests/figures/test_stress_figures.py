@@ -36,12 +36,12 @@ def test_both_panels_show_every_point(stress: MeasuredStress):
         np.testing.assert_allclose(points(axes), wanted)
 
 
-def test_the_bars_are_those_of_95_percent(stress: MeasuredStress):
+def test_the_bars_are_two_standard_uncertainties(stress: MeasuredStress):
     bars = measured_stress_figure(stress).axes[0].collections
     assert len(bars) == len(stress.profiles)
     for bar, profile in zip(bars, stress.profiles, strict=True):
         lengths = [segment[1, 1] - segment[0, 1] for segment in bar.get_segments()]
-        np.testing.assert_allclose(lengths, 2 * 1.96 * profile.s_zz_errors * 1e-3)
+        np.testing.assert_allclose(lengths, 4 * profile.s_zz_errors * 1e-3)
 
 
 def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress):

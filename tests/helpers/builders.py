@@ -7,7 +7,13 @@ import numpy as np
 
 import memscal
 from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
-from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial, ParameterSet
+from memscal.model.apparatus import (
+    ApparatusData,
+    ApparatusField,
+    ApparatusRadial,
+    ParameterSet,
+    Reconvolution,
+)
 from memscal.model.checks import Message, QualityCheck
 
 SIGMA = 561e-6
@@ -128,3 +134,8 @@ def make_artifact(**changes: Any) -> ApparatusData:
         budget=budget,
     )
     return replace(data, **changes)
+
+
+def scan_points(scan: Reconvolution, chosen: Any) -> Reconvolution:
+    """Return the points with these numbers."""
+    return replace(scan, **{n: v[chosen] for n, v in vars(scan).items() if v is not None})

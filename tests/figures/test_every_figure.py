@@ -1,0 +1,158 @@
+"""Every figure keeps the same rules of words, units and layout, and an SVG holds them as text."""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from functools import cache
+from itertools import combinations, starmap
+
+import numpy as np
+import pytest
+from helpers.friction_results import comparison, interface_comparison
+from helpers.paper import FILM, SPHERE
+from helpers.scans import known_apparatus, measured, pressed, sphere_scan
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+import memscal
+from memscal.calibration.sweep import Sweep
+from memscal.cli.compare import figure_stems
+from memscal.figures.calibration import calibration_figure
+from memscal.figures.style import render_figure
+from memscal.model.fleet import FleetResults
+
+STATES = ("dry", "lubricated")
+OF_A_COMPARISON = ["", *figure_stems(STATES, interface=True)]
+WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
+
+
+@cache
+def compared() -> memscal.FrictionComparison:
+    return comparison(lubrications=STATES, interface=interface_comparison())
+
+
+def swept() -> Sweep:
+    draws = 1e-7 + 1e-10 * np.random.default_rng(1).normal(size=(5, 6))
+    one = np.linspace(1.0, 1.01, 5)
+    return Sweep(
+        amplitude=np.logspace(-1, 1, 5), conversion_constant=1e-7 * one,
+        gaussian_sigma_deconvolved=5e-4 * one, relative_rms=5e-3 * one,
+        seed_conversion_constant=draws, seed_gaussian_sigma=5e3 * draws, seed_relative_rms=draws,
+    )  # fmt: skip
+
+
+def fleet() -> FleetResults:
+    values = 1e-4 * (1 + 0.01 * np.random.default_rng(1).normal(size=60))
+    x, y = np.divmod(np.arange(60.0), 8)
+    return FleetResults(
+        paths=[f"{i}.h5" for i in range(60)], conversion_constant=values, unit="mV/Pa",
+        conversion_constant_errors=0.01 * values, gaussian_sigma=5e3 * values,
+        gaussian_sigma_errors=50 * values, wafer_x=x, wafer_y=y,
+        failed={3: ("symmetry",)}, errors={7: ("InputError", "The scan has no point.")},
+    )  # fmt: skip
+
+
+FIGURES: dict[str, Callable[..., Figure]] = {
+    "line": lambda make: calibration_figure(make("line")),
+    "failed": lambda make: calibration_figure(make(failed=1, meaning="They are 31 um apart.")),
+    "raster": lambda make: calibration_figure(make("radii", 25)),
+    "loads": lambda make: calibration_figure(make(loads=(0.5, 1.0, 2.0), points=33)),
+    "stress": lambda _: measured(lubrication="dry").plot(),
+    "restoration": lambda _: memscal.restore(
+        sphere_scan(pressed(), seed=1), known_apparatus(), expected=pressed()
+    ).plot(),
+    "contacts": lambda _: contacts()[0].plot(beside=contacts()[1:]),
+    "design": lambda _: memscal.design(step=0.5e-3, repeats=2).plot(),
+    "sweep": lambda _: swept().plot(),
+    "fleet": lambda _: fleet().plot(),
+    "laws": lambda _: interface_comparison().plot(),
+} | {
+    f"comparison {name}".strip(): lambda _, name=name: compared().plot(name=name)
+    for name in OF_A_COMPARISON
+}  # fmt: skip
+
+
+def contacts() -> list[memscal.Contact]:
+    return memscal.indent(FILM, SPHERE, load=[0.34, 2.75], friction=0.2)
+
+
+@pytest.fixture(name="figure", scope="module", params=FIGURES)
+def figure_fixture(request, make_apparatus) -> Figure:
+    figure = FIGURES[request.param](make_apparatus)
+    figure.set_label(request.param)
+    figure.draw_without_rendering()
+    return figure
+
+
+def shown_texts(figure: Figure) -> Iterator[Text]:
+    """Texts that are drawn: not the ticks beyond an axis, not what is empty or hidden."""
+    yield from figure.texts
+    for legend in figure.legends:
+        yield from (*legend.get_texts(), legend.get_title())
+    axes: list[Axes] = [each for each in figure.axes if each.axison]
+    axes += [child for each in axes for child in each.child_axes]
+    for each in axes:
+        yield from (each.title, each._left_title, each._right_title, *each.texts)
+        yield from each.get_legend().get_texts() if each.get_legend() else ()
+        for axis in (each.xaxis, each.yaxis):
+            yield axis.label
+            if axis.get_visible():
+                ticks = axis._update_ticks()
+                yield from (t.label1 for t in ticks if t.label1.get_visible())
+                yield from (t.label2 for t in ticks if t.label2.get_visible())
+
+
+def words(figure: Figure) -> list[Text]:
+    return [t for t in shown_texts(figure) if t.get_visible() and t.get_text().strip()]
+
+
+def test_uncertainties_have_one_coverage_factor_which_is_stated(figure: Figure):
+    said = " ".join(text.get_text() for text in words(figure))
+    expected = 0 if figure.get_label() in WITHOUT_UNCERTAINTIES else 1
+    assert min(said.count("k = 2"), 1) == expected
+    assert "1.96" not in said
+    assert "k = 1" not in said
+    assert expected or "±" not in said
+    assert set(re.findall(r"±(\S*)u\b", said)) <= {"2"}
+
+
+def test_units_and_names_of_stresses_are_the_same_everywhere(figure: Figure):
+    for text in (each.get_text() for each in words(figure)):
+        assert not re.search(r"\bum\b|mm\^?\{?[-−⁻]|mm\^2 ?-", text), text
+        if "G_" in text and "(" in text:
+            assert "(1/mm$^2$)" in text
+        # Stress at the base is sigma; what the sensor makes of it is the blurred stress S.
+        if re.search(r"S_\{zz\}|S_\{max\}", text) and "(" in text:
+            assert "blurred" in text
+        if "at the base" in text:
+            assert figure.get_label() in ("contacts", "restoration")
+
+
+def test_no_text_lies_on_another_or_leaves_the_page(figure: Figure):
+    renderer = figure.canvas.get_renderer()
+    boxes = [(each, each.get_window_extent(renderer)) for each in words(figure)]
+    page = figure.bbox.padded(1)
+    outside = [t.get_text() for t, box in boxes if not page.contains(*box.min)]
+    outside += [t.get_text() for t, box in boxes if not page.contains(*box.max)]
+    assert outside == []
+
+    def overlap(one: tuple[Text, Bbox], other: tuple[Text, Bbox]) -> list[str]:
+        common = Bbox.intersection(one[1], other[1])
+        # Boxes have room for ascenders: letters that are a pixel into it do not touch.
+        touching = common is not None and min(common.width, common.height) > 1.5
+        return [one[0].get_text(), other[0].get_text()] if touching else []
+
+    assert [pair for pair in starmap(overlap, combinations(boxes, 2)) if pair] == []
+
+
+def test_an_svg_holds_the_words_as_text(figure: Figure):
+    root = ET.fromstring(render_figure(figure, "svg"))
+    written = "".join(
+        "".join(each.itertext()) for each in root.iter("{http://www.w3.org/2000/svg}text")
+    )
+    plain = [t.get_text() for t in words(figure) if not re.search(r"[$\n]", t.get_text())]
+    assert plain
+    assert [text for text in plain if text not in written] == []
+    assert "DejaVu Sans" in ET.tostring(root, encoding="unicode")
