@@ -81,7 +81,7 @@ _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
     "scan": [
-        *(*_SCAN_NAMES, "load_scatter", "position_error"),
+        *(*_SCAN_NAMES, "load_scatter", "position_error", "laboratory"),
         *(*_SENSOR_NAMES.values(), *_CELL_NAMES.values()),
     ],
     "reference": _REFERENCE_NAMES,
@@ -144,6 +144,7 @@ _NEEDED = {"scan": ("x", "u"), "reference": ("r_unit", "sigma", "sigma_unit", "l
 )
 @option("--load-cell-serial", metavar="TEXT")("Scan: serial number of the load cell.")
 @option("--title", metavar="TEXT")("Scan: title.")
+@common.laboratory_option("Scan: ")
 @option("--r", metavar="COLUMN")("Reference: column of the radius.")
 @option("--r-unit", metavar="UNIT")(
     "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
@@ -197,14 +198,16 @@ def command(
     options["repeat"] = options["repeat"] or None
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    prove_writable([output], force=force, inputs=with_drawn_in(table))
+    laboratory = options["laboratory"]
+    inputs = [*with_drawn_in(table), *([laboratory] if laboratory else [])]
+    prove_writable([output], force=force, inputs=inputs)
     with together():
         if kind == "scan":
             from memscal.formats.scan import write_scan
 
             scan = _read_scan(table, options)
             notes = scan.notes
-            write_scan(scan.scan, output, overwrite=force)
+            write_scan(common.with_laboratory(laboratory, scan.scan), output, overwrite=force)
         else:
             from memscal.formats.reference import write_reference
 
@@ -260,7 +263,7 @@ def _set_up(options: dict[str, Any]) -> dict[str, Any]:
 
 def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     from memscal.formats.tables.scan import read_scan_table
-    from memscal.model.scan import LoadCell, StressSensor
+    from memscal.model.instrument import LoadCell, StressSensor
 
     sensor, load_cell = (
         _stated({key: options[name] for key, name in names.items()}, [*names])

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from memscal.axisymmetry.kernels import RadialKernel
     from memscal.model.film import ElasticFilm
     from memscal.model.indenter import RoundIndenter
+    from memscal.model.scan import Scan
 
     _Number = click.ParamType[float]
 else:  # generic since click 8.2 only
@@ -102,6 +103,21 @@ def options_of(*options: _Adder) -> _Adder:
         return command
 
     return add
+
+
+def laboratory_option(subject: str = "") -> _Adder:
+    """Return the option of a laboratory's file."""
+    about = "Laboratory's file (lab.toml): sensor, load cell, stage, operator, temperature, times."
+    return option("--lab laboratory", FILE, metavar="lab.toml")(subject + about)
+
+
+def with_laboratory(path: Path | None, scan: Scan) -> Scan:
+    """Return a scan with what a laboratory's file adds to it, where there is one."""
+    if path is None:
+        return scan
+    from memscal.formats.laboratory import read_laboratory
+
+    return read_laboratory(path).of_scan(scan)
 
 
 json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")

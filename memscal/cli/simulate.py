@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -208,6 +209,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Whether the scan states the film's law and the rod's friction."
 )
 @option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
+@common.laboratory_option()
 @_sphere_options
 @output_options
 def command(
@@ -224,7 +226,8 @@ def command(
     if experiment == "sphere":
         return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
     output = output or Path("synthetic_scan.h5")
-    prove_writable([output], force=force)
+    laboratory = options["laboratory"]
+    prove_writable([output], force=force, inputs=[laboratory] if laboratory else [])
 
     from memscal.formats.scan import write_scan
     from memscal.simulation.rod_scan import simulate
@@ -237,6 +240,7 @@ def command(
         raster=options["raster"],
         **_shared_settings(options),
     )
+    scan = _of_laboratory(laboratory, scan, load_cell=True)
     with together():
         write_scan(scan, output, overwrite=force)
         if as_json:
@@ -271,6 +275,19 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
             raise click.UsageError(problem)
 
 
+def _of_laboratory(laboratory: Path | None, scan: Scan, *, load_cell: bool) -> Scan:
+    """Return a scan of the sensor, and on request of the load cell, that a laboratory's file has."""
+    if laboratory is None:
+        return scan
+    from memscal.model.instrument import LoadCell
+
+    bare = replace(scan, sensor=replace(scan.sensor, name=""), load_cell=LoadCell())
+    stated = common.with_laboratory(laboratory, bare)
+    name = stated.sensor.name or scan.sensor.name
+    kept = stated.load_cell if load_cell else scan.load_cell
+    return replace(stated, sensor=replace(stated.sensor, name=name), load_cell=kept)
+
+
 def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
     from memscal.formats.scan import ensure_folder_writable, write_scans
     from memscal.simulation.experiment import simulate_experiment
@@ -290,7 +307,12 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
         thickness_factor=options["thickness_factor"],
         **settings,
     )
-    scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
+    # A load cell that is named alike in two scans has one common error.
+    given = {"load_cell": options["one_load_cell"]}
+    scans = {
+        folder / f"{name}.h5": _of_laboratory(options["laboratory"], scan, **given)
+        for name, scan in made.scans.items()
+    }
     with together(folder):
         write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
         if as_json:
