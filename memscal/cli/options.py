@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -117,7 +118,20 @@ def with_laboratory(path: Path | None, scan: Scan) -> Scan:
         return scan
     from memscal.formats.laboratory import read_laboratory
 
-    return read_laboratory(path).of_scan(scan)
+    return replace(scan, **read_laboratory(path).additions(scan))
+
+
+def accept_no_other_suffix(suffixes: Sequence[str]) -> Callable[..., Any]:
+    """Return a callback that refuses names of outputs without one of these suffixes."""
+
+    def check(ctx: click.Context, param: click.Parameter, paths: Sequence[Path]) -> Sequence[Path]:
+        for path in paths:
+            if path.suffix.lower() not in suffixes:
+                problem = f"{str(path)!r} does not end in {', '.join(suffixes)}"
+                raise click.BadParameter(f"{problem}: the suffix chooses the form.", ctx, param)
+        return paths
+
+    return check
 
 
 json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")

@@ -276,7 +276,7 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
 
 
 def _of_laboratory(laboratory: Path | None, scan: Scan, *, load_cell: bool) -> Scan:
-    """Return a scan of the sensor, and on request of the load cell, that a laboratory's file has."""
+    """Return a scan of the sensor (and load cell, on request) that a laboratory's file states."""
     if laboratory is None:
         return scan
     from memscal.model.instrument import LoadCell

@@ -9,18 +9,17 @@ from dataclasses import dataclass, replace
 from datetime import date, datetime
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from memscal.errors import FormatError, InputError
 from memscal.formats.files import read_bytes
 from memscal.formats.units import to_si
-from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
+from memscal.model.apparatus import ApparatusData
 from memscal.model.quantities import ESTIMATED
 from memscal.model.scan import Scan
 
 _LONGEST = 1 << 20
 _CELSIUS, _FREEZING = ("degC", "°C"), 273.15
-_Part = TypeVar("_Part", StressSensor, Equipment, LoadCell, User)
 
 RULES = ("simple acceptance", "guarded acceptance")
 """Decision rules: whether a value must lie within its tolerance, or clear of its limits."""
@@ -127,49 +126,38 @@ class LaboratoryFile:
         found = (item for item in self.equipment if item.get("kind") == kind)
         return {_NAMES.get(k, k): v for k, v in next(found, {}).items() if k != "kind"}
 
-    def completed(
-        self, sensor: StressSensor, load_cell: LoadCell, stage: Equipment
-    ) -> tuple[StressSensor, LoadCell, Equipment]:
-        """Return these with what the file adds; what it states otherwise is refused."""
-        of_sensor = {_NAMES.get(k, k): v for k, v in self.sections.get("sensor", {}).items()}
-        if (t := self.stated("conditions", "temperature")) is not None:
-            of_sensor |= {"temperature": t.value, "temperature_uncertainty": t.uncertainty}
-        return (
-            self._joined(sensor, of_sensor, "sensor"),
-            self._joined(load_cell, self.instrument("load cell"), "load cell"),
-            self._joined(stage, self.instrument("stage"), "stage"),
-        )
+    def additions(self, of: Scan | ApparatusData) -> dict[str, Any]:
+        """Return instruments, user and times with what the file adds; a contradiction is refused.
 
-    def of_scan(self, scan: Scan) -> Scan:
-        """Return a scan with what the file adds to it; the customer stays in the file."""
-        sensor, load_cell, stage = self.completed(scan.sensor, scan.load_cell, scan.stage)
-        laboratory, operator = self.stated("laboratory", "name"), self.stated("person", "operator")
-        user = {"name": operator or "", "affiliation": laboratory or ""}
+        The customer, and who authorises, stay in the file.
+        """
+        sensor = {_NAMES.get(k, k): v for k, v in self.sections.get("sensor", {}).items()}
+        if (temperature := self.stated("conditions", "temperature")) is not None:
+            sensor |= {"temperature": temperature.value}
+            sensor |= {"temperature_uncertainty": temperature.uncertainty}
+        user = {"name": self.stated("person", "operator")}
+        user |= {"affiliation": self.stated("laboratory", "name")}
         times = {key: self.stated("conditions", key) for key in ("start_time", "end_time")}
-        return replace(
-            scan,
-            sensor=sensor,
-            load_cell=load_cell,
-            stage=stage,
-            user=self._joined(scan.user, user, "user"),
-            **{key: text for key, text in times.items() if text and not getattr(scan, key)},
-        )
+        added = {
+            "sensor": self._added(of.sensor, sensor, "sensor"),
+            "load_cell": self._added(of.load_cell, self.instrument("load cell"), "load cell"),
+            "stage": self._added(of.stage, self.instrument("stage"), "stage"),
+            "user": self._added(of.user, user, "user"),
+        }
+        parts = {name: replace(getattr(of, name), **values) for name, values in added.items()}
+        return parts | self._added(of, times, "measurement")
 
-    def _joined(self, part: _Part, stated: Mapping[str, Any], subject: str) -> _Part:
-        changes = {}
-        for name, value in stated.items():
-            held = getattr(part, name)
-            if held not in ("", None) and value not in ("", None) and held != value:
-                words = name.replace("_", " ")
+    def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> dict[str, Any]:
+        added = {name: value for name, value in stated.items() if value not in ("", None)}
+        for name in [name for name in added if getattr(part, name) not in ("", None)]:
+            if (held := getattr(part, name)) != added.pop(name):
                 raise InputError(
-                    f"The {words} of the {subject} is {value!r} in {self.name}, but {held!r} in "
-                    "what it is to belong to.",
-                    why="A certificate, or a scan, is of one sensor and one set of instruments.",
+                    f"The {name.replace('_', ' ')} of the {subject} is {stated[name]!r} in "
+                    f"{self.name}, but {held!r} in the scan or artifact.",
+                    why="Both describe one measurement.",
                     cure="Correct one of them, or leave it out of the laboratory's file.",
                 )
-            if held in ("", None):
-                changes[name] = value
-        return replace(part, **changes)
+        return added
 
 
 def read_laboratory(path: str | os.PathLike[str]) -> LaboratoryFile:
