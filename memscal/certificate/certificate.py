@@ -13,13 +13,7 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.formats.artifact import artifact_tree
 from memscal.formats.hdf5.writer import tree_to_bytes
-from memscal.formats.laboratory import (
-    RULES,
-    LaboratoryFile,
-    Measured,
-    missing_keys,
-    missing_of_equipment,
-)
+from memscal.formats.laboratory import KINDS, RULES, LaboratoryFile, Measured, missing_keys
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.provenance import timestamp
@@ -36,9 +30,9 @@ _OF_SENSOR = (
     *("gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area"),
     *("ellipticity", "ellipticity_diagonal"),
 )
+SYNTHETIC = "SYNTHETIC DATA: NOTHING WAS MEASURED"
 _LEAST_OF_G, _MOST_RADII = 0.01, 12
-_DIGITS_OF_NUMBER = 10
-_MOST_EMBEDDED = 4_000_000
+_DIGITS_OF_NUMBER, _MOST_EMBEDDED = 10, 4_000_000
 
 
 @dataclass(frozen=True)
@@ -57,10 +51,10 @@ class CertifiedValue:
 
 @dataclass(frozen=True)
 class Conformity:
-    """Whether a value conforms with its tolerance interval, by a decision rule; in SI units."""
+    """Whether a value conforms with its tolerance, by a decision rule; -inf or inf: no limit."""
 
     of: CertifiedValue
-    lower: float  # -inf and inf where there is no such limit
+    lower: float
     upper: float
     guard_band: float
 
@@ -76,15 +70,14 @@ class Conformity:
 
     @property
     def probability(self) -> float:
-        r"""Conformance probability of a normal distribution (JCGM 106:2012, 7.2.2, 7.3).
+        r"""Conformance probability of a normal distribution (JCGM 106:2012, 7.3).
 
         :math:`p_c = \Phi((T_U - y)/u) - \Phi((T_L - y)/u)`.
         """
-        limits = np.array([self.lower, self.upper]) - self.of.value
+        low, high = np.array([self.lower, self.upper]) - self.of.value
         if not self.of.uncertainty > 0:
-            return float(limits[0] <= 0 <= limits[1])
-        low, high = ndtr(limits / self.of.uncertainty)
-        return float(high - low)
+            return float(low <= 0 <= high)
+        return float(ndtr(high / self.of.uncertainty) - ndtr(low / self.of.uncertainty))
 
 
 @dataclass(frozen=True)
@@ -114,7 +107,7 @@ class Certificate:
     covariance: FloatArray  # of the values, in SI units
     profile: CertifiedProfile
     conformity: tuple[Conformity, ...]
-    artifact: bytes  # of the artifact in its compact form; empty if that is too large
+    artifact: bytes  # the artifact in its compact form; empty if that is too large
 
     @property
     def correlation(self) -> FloatArray:
@@ -129,6 +122,24 @@ class Certificate:
         return any(message.kind == "synthetic" for message in self.apparatus.process.messages)
 
     @property
+    def warnings(self) -> list[str]:
+        """What must be said first: that data are synthetic, and checks that failed."""
+        failed = [c.name.replace("_", " ") for c in self.apparatus.checks if not c.passed]
+        synthetic = f"{SYNTHETIC}. This shows the form of a certificate and certifies nothing."
+        text = f"Quality checks of the calibration that failed: {', '.join(failed)}."
+        return [synthetic] * self.synthetic + [text] * bool(failed)
+
+    @property
+    def accreditation(self) -> str:
+        """What the laboratory states of its accreditation, in a sentence."""
+        if stated := self.sections["laboratory"].get("accreditation"):
+            return f"Accreditation, as the laboratory states it: {stated}."
+        return (
+            "This is no accredited certificate: the laboratory states no accreditation for this "
+            "calibration."
+        )
+
+    @property
     def decision(self) -> str:
         """The decision rule in words."""
         stated = self.sections.get("decision", {})
@@ -141,7 +152,7 @@ class Certificate:
 
 
 def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certificate:
-    """Return the contents of a certificate; refuse one that lacks what is mandatory, by name.
+    """Return the contents of a certificate.
 
     Raises
     ------
@@ -151,32 +162,25 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
     """
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
-    missing = [*missing_keys(sections)]
-    for i, item in enumerate(equipment, 1):
-        missing += missing_of_equipment(i, item)
-    if not any(item.get("kind") == "load cell" for item in equipment):
-        missing.append('[[equipment]] kind = "load cell" (what gave the load)')
-    if missing:
+    if missing := [*missing_keys(sections, equipment)]:
         raise InputError(
             f"The certificate lacks {len(missing)} mandatory fields: {'; '.join(missing)}.",
             why="A certificate states who calibrated what for whom, with what and when (ISO/IEC "
             "17025:2017, 7.8.2 and 7.8.4).",
             cure=f"State them in {laboratory.name}, or in the scan (memscal import --lab).",
         )
-    _require_dates(sections["conditions"], laboratory.name)
-    names = [name for name in _OF_SENSOR if name in apparatus.parameters]
-    parameters = apparatus.parameters.only(names)
+    _require_dates(sections["conditions"])
+    parameters = apparatus.parameters
+    parameters = parameters.only([name for name in _OF_SENSOR if name in parameters])
     values = tuple(
-        CertifiedValue(
-            parameter_quantity(parameters, name), parameters[name], parameters.uncertainty(name)
-        )
-        for name in names
+        CertifiedValue(parameter_quantity(parameters, n), parameters[n], parameters.uncertainty(n))
+        for n in parameters.names
     )
     artifact = tree_to_bytes(artifact_tree(apparatus.compact()))
     derived = apparatus.content_digest[:_DIGITS_OF_NUMBER].upper()
-    of_laboratory = sections["laboratory"]
+    stated = sections["laboratory"]
     return Certificate(
-        number=of_laboratory.get("number") or of_laboratory.get("prefix", "") + derived,
+        number=stated.get("number") or stated.get("prefix", "") + derived,
         issued=timestamp()[:10],
         sections=sections,
         equipment=equipment,
@@ -195,68 +199,57 @@ def _completed(
     """Return sections and equipment of the laboratory's file, with what the artifact states."""
     held = laboratory.additions(apparatus)
     sections = {name: dict(section) for name, section in laboratory.sections.items()}
-    sensor, times = held["sensor"], [held.get(k, getattr(apparatus, k)) for k in _TIMES]
-    sections["sensor"] = {
-        **{name: getattr(sensor, name) for name in ("name", "model", "manufacturer", "channel")},
-        "serial": sensor.serial_number,
-    }
-    conditions = sections.setdefault("conditions", {})
-    conditions |= dict(zip(_TIMES, times, strict=True))
+    sensor, conditions = held["sensor"], sections.setdefault("conditions", {})
+    names = ("name", "model", "manufacturer", "channel")
+    sections["sensor"] = {name: getattr(sensor, name) for name in names}
+    sections["sensor"]["serial"] = sensor.serial_number
+    for key in ("start_time", "end_time"):
+        conditions[key] = held.get(key) or getattr(apparatus, key)
     if sensor.temperature is not None:
         measured = Measured(sensor.temperature, sensor.temperature_uncertainty)
         conditions["temperature"] = measured
     if held["user"].name:
         sections.setdefault("person", {})["operator"] = held["user"].name
-    listed = [item for item in laboratory.equipment if item.get("kind") not in _KINDS]
-    for kind, attribute in _KINDS.items():
+    listed = []
+    for kind, attribute in KINDS.items():
         part = held[attribute]
-        if part != type(part)():
-            item = {"name": part.name, "serial": part.serial_number, "kind": kind}
-            listed.append(item | {"certificate": part.certificate, "date": part.certificate_date})
-    listed.sort(key=lambda item: [*_KINDS, item.get("kind")].index(item.get("kind")))
-    return sections, tuple(dict(item) for item in listed)
+        item = {"name": part.name, "serial": part.serial_number, "certificate": part.certificate}
+        listed += [{**item, "date": part.certificate_date, "kind": kind}] * any(item.values())
+    listed += [dict(item) for item in laboratory.equipment if item.get("kind") not in KINDS]
+    return sections, tuple(listed)
 
 
-def _require_dates(conditions: Mapping[str, Any], name: str) -> None:
+def _require_dates(conditions: Mapping[str, Any]) -> None:
     """Refuse times of the measurement that are none, or that run backwards."""
-    dates = []
-    for key in _TIMES:
-        if text := conditions.get(key):
-            try:
-                dates.append(date.fromisoformat(text[:10]))
-            except ValueError as error:
-                problem = f"The {key.replace('_', ' ')} of the measurement is {text!r}."
-                why = "A certificate states the date of the measurement."
-                cure = f"State it like 2026-11-20T09:30:00+01:00, in {name} or in the scan."
-                raise InputError(problem, why=why, cure=cure) from error
-    if dates != sorted(dates):
-        raise InputError(f"The measurement begins on {dates[0]} and ends on {dates[1]}.")
-
-
-_TIMES = ("start_time", "end_time")
-_KINDS = {"load cell": "load_cell", "stage": "stage"}
+    times = [conditions[key] for key in ("start_time", "end_time") if conditions[key]]
+    try:
+        dates = [date.fromisoformat(text[:10]) for text in times]
+    except ValueError:
+        dates = []
+    if not dates or dates != sorted(dates):
+        problem = f"The measurement is said to run from {' to '.join(times)}."
+        cure = "State its times in order, like 2026-11-20T09:30:00+01:00."
+        raise InputError(problem, why="A certificate states its date.", cure=cure)
 
 
 def _conformity(
     values: tuple[CertifiedValue, ...], decision: Mapping[str, Any], name: str
 ) -> list[Conformity]:
     statements, known = [], {value.quantity.name: value for value in values}
-    limits = {key: item for key, item in decision.items() if key not in ("rule", "guard_band")}
-    if limits and "rule" not in decision:
-        cure = f'Write rule = "{RULES[0]}" or "{RULES[1]}".'
-        raise InputError(f"{name}: [decision] states limits, but no rule.", cure=cure)
-    for key, tolerance in limits.items():
-        if key not in known:
-            problem = f"{name}: [decision] {key} is not certified for this sensor."
-            raise InputError(problem, cure=f"There are {', '.join(known)}.")
-        value, where = known[key], f"{name}: [decision] {key}"
-        ends = (tolerance.get("lower", -np.inf), tolerance.get("upper", np.inf))
-        dimension = value.quantity.dimension
-        lower, upper = to_si(ends, tolerance.get("unit"), dimension, where)
-        factor = decision.get("guard_band", 1.0) if decision["rule"] == RULES[1] else 0.0
-        if factor < 0:
-            raise InputError(f"{name}: [decision] guard_band is {factor:g}, below zero.")
-        statements.append(Conformity(value, float(lower), float(upper), factor * value.expanded))
+    factor, rule = decision.get("guard_band", 1.0), decision.get("rule")
+    if decision and (rule is None or factor < 0):
+        cure = f'Write rule = "{RULES[0]}" or "{RULES[1]}", and a guard_band that is not negative.'
+        raise InputError(f"{name}: [decision] gives no decision rule.", cure=cure)
+    for key, limits in decision.items():
+        where = f"{name}: [decision] {key}"
+        if isinstance(limits, Mapping):
+            if key not in known:
+                cure = f"There are {', '.join(known)}."
+                raise InputError(f"{where} is not certified for this sensor.", cure=cure)
+            ends = limits.get("lower", -np.inf), limits.get("upper", np.inf)
+            lower, upper = to_si(ends, limits.get("unit"), known[key].quantity.dimension, where)
+            guard_band = factor * known[key].expanded if rule == RULES[1] else 0.0
+            statements.append(Conformity(known[key], float(lower), float(upper), guard_band))
     return statements
 
 

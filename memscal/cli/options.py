@@ -106,7 +106,7 @@ def options_of(*options: _Adder) -> _Adder:
     return add
 
 
-def laboratory_option(subject: str = "") -> _Adder:
+def laboratory_option(subject: str) -> _Adder:
     """Return the option of a laboratory's file."""
     about = "Laboratory's file (lab.toml): sensor, load cell, stage, operator, temperature, times."
     return option("--lab laboratory", FILE, metavar="lab.toml")(subject + about)
@@ -119,19 +119,6 @@ def with_laboratory(path: Path | None, scan: Scan) -> Scan:
     from memscal.formats.laboratory import read_laboratory
 
     return replace(scan, **read_laboratory(path).additions(scan))
-
-
-def accept_no_other_suffix(suffixes: Sequence[str]) -> Callable[..., Any]:
-    """Return a callback that refuses names of outputs without one of these suffixes."""
-
-    def check(ctx: click.Context, param: click.Parameter, paths: Sequence[Path]) -> Sequence[Path]:
-        for path in paths:
-            if path.suffix.lower() not in suffixes:
-                problem = f"{str(path)!r} does not end in {', '.join(suffixes)}"
-                raise click.BadParameter(f"{problem}: the suffix chooses the form.", ctx, param)
-        return paths
-
-    return check
 
 
 json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")

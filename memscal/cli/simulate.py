@@ -140,7 +140,7 @@ def _entry(name: str, value: float | str) -> tuple[str, str]:
     return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()
 
 
-_ROD_NAMES = ("half_range", "raster")
+_ROD_NAMES = ("half_range", "raster", "laboratory")
 """The options that only a rod scan alone has."""
 
 EXAMPLES = """\b
@@ -209,7 +209,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Whether the scan states the film's law and the rod's friction."
 )
 @option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
-@common.laboratory_option()
+@common.laboratory_option("Rod scan alone: ")
 @_sphere_options
 @output_options
 def command(
@@ -230,6 +230,7 @@ def command(
     prove_writable([output], force=force, inputs=[laboratory] if laboratory else [])
 
     from memscal.formats.scan import write_scan
+    from memscal.model.instrument import StressSensor
     from memscal.simulation.rod_scan import simulate
 
     loads = options["loads"] or (1.0,)
@@ -240,7 +241,8 @@ def command(
         raster=options["raster"],
         **_shared_settings(options),
     )
-    scan = _of_laboratory(laboratory, scan, load_cell=True)
+    if laboratory:
+        scan = common.with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
     with together():
         write_scan(scan, output, overwrite=force)
         if as_json:
@@ -275,19 +277,6 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
             raise click.UsageError(problem)
 
 
-def _of_laboratory(laboratory: Path | None, scan: Scan, *, load_cell: bool) -> Scan:
-    """Return a scan of the sensor (and load cell, on request) that a laboratory's file states."""
-    if laboratory is None:
-        return scan
-    from memscal.model.instrument import LoadCell
-
-    bare = replace(scan, sensor=replace(scan.sensor, name=""), load_cell=LoadCell())
-    stated = common.with_laboratory(laboratory, bare)
-    name = stated.sensor.name or scan.sensor.name
-    kept = stated.load_cell if load_cell else scan.load_cell
-    return replace(stated, sensor=replace(stated.sensor, name=name), load_cell=kept)
-
-
 def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
     from memscal.formats.scan import ensure_folder_writable, write_scans
     from memscal.simulation.experiment import simulate_experiment
@@ -307,12 +296,7 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
         thickness_factor=options["thickness_factor"],
         **settings,
     )
-    # A load cell that is named alike in two scans has one common error.
-    given = {"load_cell": options["one_load_cell"]}
-    scans = {
-        folder / f"{name}.h5": _of_laboratory(options["laboratory"], scan, **given)
-        for name, scan in made.scans.items()
-    }
+    scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     with together(folder):
         write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
         if as_json:
