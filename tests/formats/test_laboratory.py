@@ -31,7 +31,7 @@ def test_the_shipped_file_has_every_mandatory_key_and_says_that_names_are_placeh
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("[labratory]\nname = 'a'", "Did you mean laboratory?"),
+    ("[laboratories]\nname = 'a'", "Did you mean laboratory?"),
     ("[sensor]\nserial_number = '1'", "Did you mean serial?"),
     ("[decision]\ngaussian_sigm = {lower = 1, unit = 'mm'}", "Did you mean gaussian_sigma?"),
     ("[laboratory]\nname = 5", "[laboratory] name is 5, but should be text"),
