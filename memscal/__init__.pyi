@@ -75,6 +75,10 @@ from .model.indenter import Profile as Profile
 from .model.indenter import Rod as Rod
 from .model.indenter import RoundIndenter as RoundIndenter
 from .model.indenter import Sphere as Sphere
+from .model.instrument import Equipment as Equipment
+from .model.instrument import LoadCell as LoadCell
+from .model.instrument import StressSensor as StressSensor
+from .model.instrument import User as User
 from .model.measured_stress import MeasuredPoints as MeasuredPoints
 from .model.measured_stress import MeasuredProfile as MeasuredProfile
 from .model.measured_stress import MeasuredScan as MeasuredScan
@@ -82,9 +86,7 @@ from .model.measured_stress import MeasuredStress as MeasuredStress
 from .model.places import Places as Places
 from .model.provenance import Process as Process
 from .model.provenance import SourceFile as SourceFile
-from .model.scan import LoadCell as LoadCell
 from .model.scan import Scan as Scan
-from .model.scan import StressSensor as StressSensor
 from .model.stress import IdealReference as IdealReference
 from .model.stress import StressField as StressField
 from .model.stress import StressProfile as StressProfile

@@ -18,21 +18,23 @@ MODULES = {
 FLOW = [
     "version", "errors", "parallel", "progress", "model", "axisymmetry", "mechanics", "estimation",
     "deconvolution", "apparatus", "calibration", "simulation", "measurement", "friction",
-    "planning", "summaries", "figures", "cli", "__main__",
+    "planning", "summaries", "figures", "certificate", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
-USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "friction", "measurement"}
+USERS_OF_FORMATS = {
+    "apparatus", "calibration", "certificate", "figures", "cli", "friction", "measurement",
+}  # fmt: skip
 
 ONLY_IN = {
     "h5py": {"formats"}, "pint": {"formats"}, "meshio": {"formats"}, "matplotlib": {"figures"},
     "click": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"},
-    "pyarrow": {"formats"}, "distributed": {"parallel"},
+    "pyarrow": {"formats"}, "distributed": {"parallel"}, "weasyprint": {"certificate"},
 }  # fmt: skip
 
 SLOW = {
     "distributed", "matplotlib", "meshio", "pint", "pyarrow", "skfem", "skimage",
-    "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats",
+    "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats", "weasyprint",
 }  # fmt: skip
 LONGEST, SHORT = 600, 120
 MOST_MODULES, MOST_LINES, MOST_LINES_OF_TESTS = 194, 40_700, 27_000

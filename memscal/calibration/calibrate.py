@@ -52,7 +52,7 @@ from memscal.model.film import LINEAR
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, accepted_alterations, timestamp
 from memscal.model.result import Result
-from memscal.model.scan import LoadCell, Scan
+from memscal.model.scan import Scan, common_circumstances
 from memscal.model.sizes import MOST_OF_LINES
 from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
@@ -75,7 +75,7 @@ def assemble(
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are as ``stated`` by the scan where nothing was calculated with them.
     scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
-    reference, cells = _table(stress), [one.load_cell for one in solution.scans]
+    reference = _table(stress)
     versions = {"numpy": np.__version__, "scipy": scipy.__version__}
     record: dict[str, Any] = {
         **configuration,
@@ -122,7 +122,7 @@ def assemble(
         ),
         budget=results.budget,
         kernel_changes=results.kernel_changes,
-        load_cell=scan.load_cell if all(map(scan.load_cell.same_as, cells)) else LoadCell(),
+        **common_circumstances(solution.scans),
         other=_other(solution, other),
     )
 

@@ -16,6 +16,7 @@ COMMANDS = {
     "apply": ("apply", "Turn contact scans into measured stress, load by load."),
     "restore": ("restore", "Restore the stress at the base of a film from a scan."),
     "compare": ("compare", "Compare measured with calculated stress: effective friction."),
+    "certificate": ("certificate", "Write a certificate of calibration (HTML, PDF, XML)."),
     "design": ("design", "Predict the uncertainties of a scan before it is made."),
     "simulate": ("simulate", "Make a synthetic scan, or the scans of an experiment."),
     "import": ("import_", "Convert a table or a mesh to a scan or a reference."),

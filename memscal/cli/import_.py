@@ -97,7 +97,7 @@ _TABLE_NAMES = ["load", *_READING]
 
 _ONLY = {
     "scan": [
-        *(*_SCAN_NAMES, "load_scatter", "position_error", "figures"),
+        *(*_SCAN_NAMES, "load_scatter", "position_error", "figures", "laboratory"),
         *(*_SENSOR_NAMES.values(), *_CELL_NAMES.values()),
     ],
     "reference": _REFERENCE_NAMES,
@@ -174,6 +174,7 @@ _NEEDED_OF_MESHES = ("r_unit", "sigma_unit")
 )
 @option("--load-cell-serial", metavar="TEXT")("Scan: serial number of the load cell.")
 @option("--title", metavar="TEXT")("Scan: title.")
+@common.laboratory_option("Scan: ")
 @option("--r", metavar="COLUMN")("Reference: column of the radius.")
 @option("--r-unit", metavar="UNIT")(
     "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
@@ -234,15 +235,16 @@ def command(
     options |= {name: options[name] or None for name in ("repeat", "missing", "figures", "holds")}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    figures = options["figures"] or ()
-    out.prove_writable([output, *figures], force=force, inputs=with_drawn_in(table))
+    figures, laboratory = options["figures"] or (), options["laboratory"]
+    inputs = [*with_drawn_in(table), *([laboratory] if laboratory else [])]
+    out.prove_writable([output, *figures], force=force, inputs=inputs)
     with together():
         if kind == "scan":
             from memscal.formats.scan import write_scan
 
             scan = _read_scan(table, options)
             notes = scan.messages
-            write_scan(scan, output, overwrite=force)
+            write_scan(common.with_laboratory(laboratory, scan), output, overwrite=force)
             if scan.holds is not None:
                 out.write_files(out.rendered(scan.holds.plot, figures), force=force)
         else:
@@ -307,7 +309,7 @@ def _set_up(options: dict[str, Any]) -> dict[str, Any]:
 
 def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     from memscal.formats.tables.scan import import_table
-    from memscal.model.scan import LoadCell, StressSensor
+    from memscal.model.instrument import LoadCell, StressSensor
 
     sensor, load_cell = (
         _stated({key: options[name] for key, name in names.items()}, [*names])

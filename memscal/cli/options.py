@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from memscal.axisymmetry.kernels import RadialKernel
     from memscal.model.film import ElasticFilm
     from memscal.model.indenter import RoundIndenter
+    from memscal.model.scan import Scan
 
     _Number = click.ParamType[float]
 else:  # generic since click 8.2 only
@@ -102,6 +104,21 @@ def options_of(*options: _Adder) -> _Adder:
         return command
 
     return add
+
+
+def laboratory_option(subject: str) -> _Adder:
+    """Return the option of a laboratory's file."""
+    about = "Laboratory's file (lab.toml): sensor, load cell, stage, operator, temperature, times."
+    return option("--lab laboratory", FILE, metavar="lab.toml")(subject + about)
+
+
+def with_laboratory(path: Path | None, scan: Scan) -> Scan:
+    """Return a scan with what a laboratory's file adds to it, where there is one."""
+    if path is None:
+        return scan
+    from memscal.formats.laboratory import read_laboratory
+
+    return replace(scan, **read_laboratory(path).additions(scan))
 
 
 def _one_form(ctx: click.Context, param: click.Parameter, given: bool) -> bool:

@@ -198,18 +198,22 @@ _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 
 
 class FigurePath(click.Path):
-    """The name of a figure's file, whose suffix chooses the format."""
+    """The name of a figure's file, or of another of which the suffix chooses the format."""
 
     name = "figure"
+
+    def __init__(self, suffixes: Sequence[str] = FIGURE_SUFFIXES) -> None:
+        super().__init__()
+        self.suffixes = suffixes
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Path:
-        """Refuse a suffix in which no figure can be written."""
+        """Refuse a suffix in which nothing can be written."""
         path = Path(str(value))
-        if path.suffix.lower() not in FIGURE_SUFFIXES:
+        if path.suffix.lower() not in self.suffixes:
             self.fail(
-                f"{str(path)!r} does not end in {', '.join(FIGURE_SUFFIXES)}: the suffix chooses "
+                f"{str(path)!r} does not end in {', '.join(self.suffixes)}: the suffix chooses "
                 "the format.",
                 param,
                 ctx,

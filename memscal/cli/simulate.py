@@ -153,7 +153,7 @@ def _quantity(name: str) -> quantities.Quantity:
     return TRUTH.get(name) or estimated_quantity(name)
 
 
-_ROD_NAMES = ("half_range", "raster")
+_ROD_NAMES = ("half_range", "raster", "laboratory")
 """The options that only a rod scan alone has."""
 
 EXAMPLES = """\b
@@ -222,6 +222,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Whether the scan states the film's law and the rod's friction."
 )
 @option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
+@common.laboratory_option("Rod scan alone: ")
 @_sphere_options
 @output_options
 def command(
@@ -238,9 +239,11 @@ def command(
     if experiment == "sphere":
         return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
     output = output or Path("synthetic_scan.h5")
-    prove_writable([output], force=force)
+    laboratory = options["laboratory"]
+    prove_writable([output], force=force, inputs=[laboratory] if laboratory else [])
 
     from memscal.formats.scan import write_scan
+    from memscal.model.instrument import StressSensor
     from memscal.simulation.rod_scan import simulate
 
     loads = options["loads"] or (1.0,)
@@ -251,6 +254,8 @@ def command(
         raster=options["raster"],
         **_shared_settings(options),
     )
+    if laboratory:
+        scan = common.with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
     with together():
         write_scan(scan, output, overwrite=force)
         if as_json:

@@ -49,6 +49,17 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     legend_above(axes)
 
 
+def radial_figure(data: ApparatusData) -> Figure:
+    """Draw G(r) alone, half a page wide, as a certificate shows it."""
+    with style.house_style():
+        figure = style.new_figure(2.4)
+        figure.set_figwidth(style.FIGURE_WIDTH / 2)
+        axes = figure.subplots()
+        draw_radial(axes, data)
+        axes.set_xlabel("distance from the axis $r$ (mm)")
+    return figure
+
+
 def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     """Draw G(r) on a logarithmic axis; where G is not positive, it leaves the axis below."""
     radial = data.radial_profile

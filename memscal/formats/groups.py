@@ -24,14 +24,15 @@ from memscal.formats.values import (
     units_of,
 )
 from memscal.model import records
-from memscal.model.apparatus import ParameterSet
+from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
+from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
-from memscal.model.scan import LoadCell, StressSensor
+from memscal.model.scan import Scan
 from memscal.model.stress import IdealReference, StressField, StressProfile
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -339,12 +340,16 @@ def _shape(file: SafeFile, path: str) -> str:
     return require_text(file, f"{path}/shape").strip().lower()
 
 
-def instrument_group(sensor: StressSensor, load_cell: LoadCell) -> Group:
-    """Return the NXinstrument that holds the sensor, and the load cell where it is stated."""
-    sensors = {"stress_sensor": write_record(records.SENSOR, sensor)}
+def instrument_group(
+    sensor: StressSensor, load_cell: LoadCell, stage: Equipment | None = None
+) -> Group:
+    """Return the NXinstrument that holds the sensor, and load cell and stage if they are stated."""
+    parts = {"stress_sensor": write_record(records.SENSOR, sensor)}
     if load_cell != LoadCell():
-        sensors["load_cell"] = write_record(records.LOAD_CELL, load_cell)
-    children = {n: replace(g, children={**g.children, **_NOWHERE}) for n, g in sensors.items()}
+        parts["load_cell"] = write_record(records.LOAD_CELL, load_cell)
+    if stage not in (None, Equipment()):
+        parts["stage"] = write_record(records.STAGE, stage)
+    children = {n: replace(g, children={**g.children, **_NOWHERE}) for n, g in parts.items()}
     return Group("NXinstrument", children)
 
 
@@ -353,6 +358,21 @@ def read_instrument(file: SafeFile, path: str) -> dict[str, Any]:
     sensor = read_record(records.SENSOR, file, f"{path}/stress_sensor")
     load_cell = read_record(records.LOAD_CELL, file, f"{path}/load_cell")
     return {"sensor": StressSensor(**sensor), "load_cell": LoadCell(**load_cell)}
+
+
+def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
+    """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
+    user = write_record(records.USER, of.user)
+    times = write_record(records.TIMES, of).children
+    return {**times, **({"user": user} if user.children else {})}
+
+
+def read_circumstances(file: SafeFile) -> dict[str, Any]:
+    """Read when, by whom and with which stage a scan was made."""
+    stage = read_record(records.STAGE, file, "/entry/instrument/stage")
+    user = read_record(records.USER, file, "/entry/user")
+    times = read_record(records.TIMES, file, "/entry")
+    return {"stage": Equipment(**stage), "user": User(**user), **times}
 
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:

@@ -33,6 +33,8 @@ _MEASURED_ON = {
     "/entry/sample": records.SAMPLE,
     "/entry/instrument/stress_sensor": records.SENSOR,
     "/entry/instrument/load_cell": records.LOAD_CELL,
+    "/entry/instrument/stage": records.STAGE,
+    "/entry/user": records.USER,
 }
 # The records of each kind of file by their paths, in the order in which they are listed.
 _LAYOUTS: dict[str, dict[str, Record]] = {
@@ -54,6 +56,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         ),
     },
     writer.ARTIFACT_SCHEMA: {
+        "/entry": records.TIMES,
         "/entry/apparatus_function": records.FIELD,
         "/entry/radial_profile": records.RADIAL_VERSION_1_0,
         "/entry/radial_covariance": records.RADIAL_COVARIANCE,

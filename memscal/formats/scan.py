@@ -8,7 +8,7 @@ from typing import Any
 from memscal.errors import FormatError, OutputError, placed
 from memscal.formats import groups, values
 from memscal.formats.files import ensure_writable, together
-from memscal.formats.groups import read_record, write_record
+from memscal.formats.groups import read_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si
@@ -113,8 +113,9 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         unit=reading.si,
         **contact,
         **groups.read_instrument(file, "/entry/instrument"),
+        **groups.read_circumstances(file),
         title=optional_text(file, "/entry/title"),
-        **read_record(records.EXPERIMENT, file, "/entry"),
+        notes=optional_text(file, "/entry/notes/data"),
         reference=reference,
         synthetic=_read_synthetic(file),
         source=file.source,
@@ -157,16 +158,15 @@ def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = Fa
 
 
 def _entry(scan: Scan) -> Group:
-    texts = dict(write_record(records.EXPERIMENT, scan).children)
-    notes = {"notes": texts.pop("notes")} if scan.notes else {}
+    notes: dict[str, Node] = {"notes": writer.note(scan.notes)} if scan.notes else {}
     children: dict[str, Node] = {"title": scan.title} if scan.title else {}
     of_load = scan.load, scan.load_uncertainty, scan.rod_friction
     children |= {
-        **texts,
+        **groups.circumstances(scan),
         "data": _data_group(scan),
         "indenter": groups.indenter_group(scan.indenter, *of_load),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
-        "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
+        "instrument": groups.instrument_group(scan.sensor, scan.load_cell, scan.stage),
         **notes,
     }
     if scan.reference is not None:

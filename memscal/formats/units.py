@@ -37,6 +37,7 @@ _POWERS = {
     "voltage per length": {"V/m": 0, "mV/mm": 0},
     "angle": {"rad": 0},
     "energy": {"J": 0},
+    "temperature": {"K": 0},
     "stress per length": {"MPa/mm": 9},
     "dimensionless": dict.fromkeys(("1", "", *ARBITRARY), 0),
 }

@@ -14,9 +14,9 @@ from memscal.model.arrays import FloatArray, FrozenArrays
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
+from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
 from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process
-from memscal.model.scan import LoadCell, StressSensor
 from memscal.model.stress import StressProfile
 
 
@@ -212,6 +212,10 @@ class ApparatusData(Checked):
     kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
     other: OtherEstimate | None = None
     load_cell: LoadCell = dataclass_field(default_factory=LoadCell)
+    stage: Equipment = dataclass_field(default_factory=Equipment)
+    user: User = dataclass_field(default_factory=User)
+    start_time: str = ""
+    end_time: str = ""
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

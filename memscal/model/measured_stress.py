@@ -29,10 +29,10 @@ from memscal.model.checks import (
 )
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
+from memscal.model.instrument import LoadCell, StressSensor
 from memscal.model.notation import VOLTS, Reading, format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
-from memscal.model.scan import LoadCell, StressSensor
 
 #: Millimetres in a metre, millivolts in a volt.
 _FILE_SCALE = 1e3

@@ -9,7 +9,7 @@ from memscal.errors import InputError
 # Outside these powers of ten a factor reads better than a row of zeros.
 _PLAIN_EXPONENTS = range(-3, 5)
 _NEGLIGIBLE = 1e-12
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 #: SI units that take prefixes, and these, from 10^-18 to 10^9.
 NAMED_UNITS = ("V", "A", "T", "Pa", "N", "m", "Hz", "W", "J", "C", "F", "ohm", "S", "K", "s")
@@ -77,7 +77,7 @@ def format_measured(value: float, uncertainty: float | None, unit: str = "") -> 
     if uncertainty <= _NEGLIGIBLE * abs(value):
         return f"{value:.6g}{tail} (no uncertainty stated)"
     number, spread, exponent = _rounded(value, uncertainty)
-    factor = "" if exponent == 0 else "×10" + str(exponent).translate(_SUPERSCRIPTS)
+    factor = "" if exponent == 0 else "×10" + str(exponent).translate(SUPERSCRIPTS)
     if factor or tail:
         return f"({number} ± {spread}){factor}{tail}"
     return f"{number} ± {spread}"

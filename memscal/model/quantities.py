@@ -38,6 +38,7 @@ DIMENSIONS = {
     "dimensionless": Dimension("1", "1", "", 1.0),
     "angle": Dimension("rad", "rad", "rad", 1.0),
     "energy": Dimension("J", "J", "J", 1.0),
+    "temperature": Dimension("K", "K", "K", 1.0),
     "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
 

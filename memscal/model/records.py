@@ -48,20 +48,39 @@ SENSOR = record(
     Quantity("model", "text", "model of the sensor", origin="sensor_model"),
     Quantity("serial_number", "text", "serial number of the sensor"),
     Quantity("channel", "text", "channel of the sensor", origin="channel"),
+    Quantity("manufacturer", "text", "manufacturer of the sensor"),
+    *measured(Quantity("temperature", "temperature", "temperature of the sensor")),
 )
-LOAD_CELL = record(
-    "NXsensor",
-    Quantity("name", "text", "name of the load cell", origin="load_cell"),
-    Quantity("serial_number", "text", "serial number of the load cell"),
-    Quantity("certificate", "text", "certificate of the load cell"),
+
+
+def _equipment(nx_class: str, words: str, origin: str) -> Record:
+    return record(
+        nx_class,
+        Quantity("name", "text", f"name of the {words}", origin=origin),
+        Quantity("serial_number", "text", f"serial number of the {words}"),
+        Quantity("certificate", "text", f"certificate of the {words}"),
+        Quantity("certificate_date", "text", f"date of the certificate of the {words}"),
+    )
+
+
+LOAD_CELL = _equipment("NXsensor", "load cell", "load_cell")
+STAGE = _equipment("NXpositioner", "stage", "stage")
+USER = record(
+    "NXuser",
+    Quantity("name", "text", "who measured", origin="user"),
+    Quantity("affiliation", "text", "laboratory", origin="laboratory"),
 )
 _CONSTANT = Quantity("conversion_constant", _A, "conversion constant", "A", required=True)
 CONVERSION = record("NXcollection", *measured(_CONSTANT, required=True))
 
-EXPERIMENT = record(
+TIMES = record(
     "NXentry",
     Quantity("start_time", "text", "begin of the scan", origin="start_time"),
     Quantity("end_time", "text", "end of the scan", origin="end_time"),
+)
+EXPERIMENT = record(
+    "NXentry",
+    *TIMES.quantities,
     Quantity("notes", "note", "notes of the experiment", origin="notes"),
 )
 # The axes of the signal are those of the scan: [x], [y], [repeat, x], [repeat, y] or [y, x].

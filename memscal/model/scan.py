@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from importlib import import_module
@@ -19,6 +19,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
+from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
@@ -91,35 +92,6 @@ def require_plane(x: FloatArray, y: FloatArray) -> None:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class StressSensor:
-    """The sensor and the channel whose voltage was recorded."""
-
-    name: str = ""
-    model: str = ""
-    channel: str = "zz"
-    serial_number: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LoadCell:
-    """The load cell or balance by which loads were set or read; empty where it is not stated.
-
-    >>> LoadCell(name="balance", serial_number="7").same_as(LoadCell(serial_number="7"))
-    True
-    """
-
-    name: str = ""
-    serial_number: str = ""
-    certificate: str = ""
-
-    def same_as(self, other: LoadCell) -> bool:
-        """Whether both name one load cell: by its serial number, or by name if neither has one."""
-        if self.serial_number or other.serial_number:
-            return self.serial_number == other.serial_number
-        return self.name == other.name != ""
-
-
 class SetUp(NamedTuple):
     """What a scan was made with, all of it stated; the load in N."""
 
@@ -154,9 +126,9 @@ class Scan:
         SI unit of the readings: ``"V"``, ``"A"``, ``"T"``, ``"Pa"`` ..., ``"1"`` of counts.
     load, load_uncertainty : float, optional
         Nominal load of the indenter and its standard uncertainty, common to all points, in N.
-    indenter, film, sensor, load_cell
-        What was pressed, on what, measured by what, and what gave the load.  A calibration with a
-        reference of its own needs no load, indenter or film; all else does.
+    indenter, film, sensor, load_cell, stage, user
+        What was pressed, on what, measured by what, what gave load and position, and who measured.
+        A calibration with a reference of its own needs no load, indenter or film; all else does.
     rod_friction : float, optional
         0 where a rod slides freely under the film, ``inf`` where it sticks.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
@@ -216,6 +188,8 @@ class Scan:
     unit: str = "V"
     sensor: StressSensor = field(default_factory=StressSensor)
     load_cell: LoadCell = field(default_factory=LoadCell)
+    stage: Equipment = field(default_factory=Equipment)
+    user: User = field(default_factory=User)
     y: FloatArray | None = None
     repeat: NDArray[np.int64] | None = None
     branch: NDArray[np.int64] | None = None
@@ -447,3 +421,18 @@ class Scan:
                 cure="Give one standard uncertainty for each position, in m, none negative.",
             )
         object.__setattr__(self, "x_errors", errors)
+
+
+def common_circumstances(scans: Sequence[Scan]) -> dict[str, Any]:
+    """Return what gave loads and positions, and who measured, if common to all scans, and when."""
+    first = scans[0]
+    cells = all(first.load_cell.same_as(scan.load_cell) for scan in scans)
+    stages = all(first.stage.same_as(scan.stage) for scan in scans)
+    # Times in ISO 8601 and one time zone have the order of their texts.
+    return {
+        "load_cell": first.load_cell if cells else LoadCell(),
+        "stage": first.stage if stages else Equipment(),
+        "user": first.user if all(first.user == scan.user for scan in scans) else User(),
+        "start_time": min(scan.start_time for scan in scans),
+        "end_time": max(scan.end_time for scan in scans) if all(s.end_time for s in scans) else "",
+    }

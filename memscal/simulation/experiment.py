@@ -14,7 +14,8 @@ from memscal.mechanics.interface import Interface
 from memscal.model.arrays import FloatArray, require_non_negative, require_positive, require_range
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
-from memscal.model.scan import LoadCell, Scan, StressSensor
+from memscal.model.instrument import LoadCell, StressSensor
+from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 from memscal.simulation import rod_scan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, simulate, without_law

@@ -14,7 +14,8 @@ from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray, require_non_negative, require_positive, require_range
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod
-from memscal.model.scan import Scan, StressSensor
+from memscal.model.instrument import StressSensor
+from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
 # The film passes exp(-kh): beyond this in kh nothing is left in double precision.

@@ -97,9 +97,9 @@ def stated(item: ElasticFilm | Indenter) -> dict[str, float]:
 
 def test_the_folder_holds_what_its_readme_lists_and_is_small() -> None:
     listed = set(re.findall(r"^\| `([^`]+)`", README, flags=re.MULTILINE))
-    paths = [path for path in DATA.rglob("*") if path.suffix in {".h5", ".csv"}]
+    paths = [path for path in DATA.rglob("*") if path.suffix in {".h5", ".csv", ".toml"}]
     shipped = {path.relative_to(DATA).as_posix() for path in paths}
-    assert shipped == listed == {*SCANS, *EXPERIMENT, *TABLES, ARTIFACT}
+    assert shipped == listed == {*SCANS, *EXPERIMENT, *TABLES, ARTIFACT, "lab.toml"}
     assert sum(path.stat().st_size for path in DATA.rglob("*") if path.is_file()) < 1_150_000
 
 

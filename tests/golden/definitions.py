@@ -20,6 +20,7 @@ _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 # Of others any unit: readings have their own, and validators know no rad/mm and no 1 of a ratio.
 _UNITS = {
     "length": "NX_LENGTH", "stress": "NX_PRESSURE", "angle": "NX_ANGLE", "per area": "NX_PER_AREA",
+    "temperature": "NX_TEMPERATURE",
 }  # fmt: skip
 # Groups that no record declares by its class; a NXnote holds text, a NXcollection anything.
 _CLASSES = {"instrument": "NXinstrument", "process": "NXprocess", "numerics": "NXparameters"}
@@ -27,6 +28,7 @@ _MEASURED_ON = {
     "indenter": records.INDENTER, "sample": records.SAMPLE, "sample/film": records.FILM,
     "instrument/stress_sensor": records.SENSOR, "instrument/load_cell": records.LOAD_CELL,
 }  # fmt: skip
+_SCANNED = {**_MEASURED_ON, "instrument/stage": records.STAGE, "user": records.USER}
 _ANYTHING = record("NXcollection")
 _NOTE = record("NXnote")
 #: Records of alternatives: what is required of one is not there in another.
@@ -36,7 +38,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
     writer.SCAN_SCHEMA: (
         "A sensor's readings against the position of the indenter that is pressed on its film.",
         {
-            "data": records.SCAN_DATA, **_MEASURED_ON, "reference": records.REFERENCE_DATA,
+            "data": records.SCAN_DATA, **_SCANNED, "reference": records.REFERENCE_DATA,
             "synthetic": _ANYTHING, "notes": _NOTE,
         },
         ("data",),
@@ -58,7 +60,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             "radial_covariance": records.RADIAL_COVARIANCE,
             "kernel_changes": records.KERNEL_CHANGES,
             "transfer_function": records.TRANSFER, "reconvolution": records.RECONVOLUTION,
-            "parameters": _ANYTHING, "quality": _ANYTHING, **_MEASURED_ON,
+            "parameters": _ANYTHING, "quality": _ANYTHING, **_SCANNED,
             "reference": records.REFERENCE_DATA, "process": records.PROCESS,
             **{f"radial_profile_{route}": records.RADIAL for route in ("bayesian", "division")},
             **{
@@ -103,7 +105,7 @@ def definition(schema: str) -> str:
     item = ET.SubElement(stated, "enumeration")
     ET.SubElement(item, "item", {"value": name})
     _field(entry, "title", "NX_CHAR", optional=True)
-    if schema == writer.SCAN_SCHEMA:
+    if schema in (writer.SCAN_SCHEMA, writer.ARTIFACT_SCHEMA):
         for time in ("start_time", "end_time"):
             _field(entry, time, "NX_DATE_TIME", optional=True)
     if schema == writer.STRESS_SCHEMA:
@@ -131,7 +133,7 @@ def _group(made: dict[str | None, ET.Element], path: str, of: Record, *, needed:
     some = of.nx_class == "NXcollection" or of in _ALTERNATIVES
     for quantity in {quantity.key: quantity for quantity in of.quantities}.values():
         _quantity(group, quantity, optional=some or not quantity.required)
-    if of.nx_class in ("NXsample", "NXsensor"):
+    if of.nx_class in ("NXsample", "NXsensor", "NXpositioner"):
         _field(group, "depends_on", "NX_CHAR")
     if of is records.KERNEL_CHANGES:
         _field(group, "names", "NX_CHAR")

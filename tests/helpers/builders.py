@@ -25,6 +25,8 @@ BARE: dict[str, Any] = {
     **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
     "channels": {},
     "load_cell": memscal.LoadCell(),
+    "stage": memscal.Equipment(),
+    "user": memscal.User(),
 }
 """Changes that leave a scan without all that is optional."""
 
@@ -74,7 +76,13 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
         channels={"u_xz": 0.1 * u}, load=1.0, load_uncertainty=0.01,
         indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), rod_friction=np.inf,
         film=make_film(),
-        sensor=StressSensor(name="S1", model="MEMS", channel="zz"), title="A scan",
+        sensor=StressSensor(
+            name="S1", model="MEMS", channel="zz", serial_number="17", manufacturer="a foundry",
+            temperature=296.2, temperature_uncertainty=0.3,
+        ),
+        title="A scan",
+        stage=memscal.Equipment(name="stage", serial_number="8", certificate_date="2024-01-31"),
+        user=memscal.User(name="who measured", affiliation="a laboratory"),
         load_cell=memscal.LoadCell(name="balance", serial_number="7", certificate="2024-11"),
         start_time="2024-01-02T03:04:05+00:00", end_time="2024-01-02T04:04:05+00:00",
         notes="Two lines\nof notes, with an é.", reference=make_profile(),
@@ -122,6 +130,9 @@ def make_artifact(**changes: Any) -> ApparatusData:
         indenter=Rod(radius=0.25e-3),
         sensor=StressSensor(name="S1", model="MEMS"),
         load_cell=memscal.LoadCell(serial_number="7"),
+        stage=scan.stage,
+        user=scan.user,
+        start_time=scan.start_time,
         load=1.0,
         reference=make_profile(),
         process=Process(

@@ -1,0 +1,1 @@
+"""Certificates of calibration: their contents, their pages, and their XML."""

@@ -1,0 +1,210 @@
+"""The laboratory's file, lab.toml: who calibrates for whom, with what, under which conditions."""
+
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import date, datetime
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.files import read_bytes
+from memscal.formats.units import to_si
+from memscal.model.apparatus import ApparatusData
+from memscal.model.quantities import ESTIMATED
+from memscal.model.scan import Scan
+
+_LONGEST = 1 << 20
+_CELSIUS, ZERO_CELSIUS = ("degC", "°C"), 273.15
+
+RULES = ("simple acceptance", "guarded acceptance")
+"""Decision rules: whether a value must lie within its tolerance, or clear of its limits."""
+KINDS = {"load cell": "load_cell", "stage": "stage"}
+"""Kinds of equipment that scans and artifacts carry, with their attributes there."""
+
+# A star: a certificate needs it. After a colon its kind, if it is not text on one line.
+_ADDRESS = "street post_code city* country*:country email phone"
+_KEYS = {
+    "laboratory": f"name* {_ADDRESS} accreditation prefix:code number:code",
+    "customer": f"name* {_ADDRESS}",
+    "person": "name* role* operator",
+    "sensor": "name* model manufacturer* serial*",
+    "equipment": "name* kind serial* certificate* date*:date",
+    "conditions": "temperature*:temperature humidity*:dimensionless start_time*:time end_time:time",
+    "decision": " ".join(
+        ["rule:rule guard_band:number", *(f"{name}:limits" for name in ESTIMATED)]
+    ),
+    "limits": "lower:number upper:number unit",
+    "quantity": "value:number unit uncertainty:number",
+}
+SECTIONS = {
+    section: {key.partition(":")[0].strip("*"): key.partition(":")[2] or "text" for key in keys}
+    for section, keys in ((section, text.split()) for section, text in _KEYS.items())
+}
+"""Every key of the file with its kind, by its section, of limits, and of quantities."""
+NEEDED = {section: re.findall(r"(\w+)\*", text) for section, text in _KEYS.items() if "*" in text}
+"""Keys that a certificate needs, by their section."""
+
+_FORMS = {
+    "text": (r".*\S.*", "text on one line"),
+    "country": ("[A-Z]{2}", "two capital letters (ISO 3166-1)"),
+    "code": ("[A-Za-z0-9 ._/-]{1,40}", "of up to 40 letters, digits, blanks, and . _ / -"),
+    "rule": ("|".join(RULES), " or ".join(f'"{rule}"' for rule in RULES)),
+}
+#: Keys of the file whose attributes have other names.
+_NAMES = {"serial": "serial_number", "date": "certificate_date"}
+
+
+class Measured(NamedTuple):
+    """A value with its standard uncertainty, in SI units."""
+
+    value: float
+    uncertainty: float | None
+
+
+@dataclass(frozen=True)
+class LaboratoryFile:
+    """What a laboratory's file states, by section and key; of equipment a list of such."""
+
+    name: str
+    sections: Mapping[str, Mapping[str, Any]]
+    equipment: tuple[Mapping[str, Any], ...] = ()
+
+    def stated(self, section: str, key: str) -> Any:
+        """Return the value of a key, ``None`` where it is not stated."""
+        return self.sections.get(section, {}).get(key)
+
+    def additions(self, of: Scan | ApparatusData) -> dict[str, Any]:
+        """Return instruments, user and times with what the file adds; a contradiction is refused.
+
+        The customer, and who authorises, stay in the file.
+        """
+        temperature = self.stated("conditions", "temperature") or (None, None)
+        added: dict[str, Mapping[str, Any]] = {
+            "sensor": {
+                **self.sections.get("sensor", {}),
+                "temperature": temperature[0],
+                "temperature_uncertainty": temperature[1],
+            },
+            "user": {
+                "name": self.stated("person", "operator"),
+                "affiliation": self.stated("laboratory", "name"),
+            },
+        }
+        for kind, attribute in KINDS.items():
+            found = (item for item in self.equipment if item.get("kind") == kind)
+            added[attribute] = {k: v for k, v in next(found, {}).items() if k != "kind"}
+        times = {key: self.stated("conditions", key) for key in ("start_time", "end_time")}
+        return {
+            name: replace(getattr(of, name), **self._added(getattr(of, name), stated, name))
+            for name, stated in added.items()
+        } | self._added(of, times, "measurement")
+
+    def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> dict[str, Any]:
+        added = {_NAMES.get(k, k): v for k, v in stated.items() if v not in ("", None)}
+        for name in [name for name in added if getattr(part, name) not in ("", None)]:
+            held, value = getattr(part, name), added.pop(name)
+            if held != value:
+                raise InputError(
+                    f"The {name} of the {subject} is {value!r} in {self.name}, but {held!r} in the "
+                    "scan or artifact.".replace("_", " "),
+                    why="Both describe one measurement.",
+                    cure="Correct one of them, or leave it out of the laboratory's file.",
+                )
+        return added
+
+
+def read_laboratory(path: str | os.PathLike[str]) -> LaboratoryFile:
+    """Read a laboratory's file; a key that is not known is refused, with the nearest that is."""
+    name = Path(path).name
+    try:
+        content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        why = "A laboratory's file is TOML, in UTF-8; docs/certificate.md shows one."
+        raise FormatError(f"{name} is no TOML: {error}.", why=why) from error
+    equipment = content.pop("equipment", [])
+    if not isinstance(equipment, list):
+        raise FormatError(f"{name}: equipment is one table.", cure="Write [[equipment]] over each.")
+    listed = tuple(
+        _section(f"{name}: [[equipment]] {i}", "equipment", item)
+        for i, item in enumerate(equipment, 1)
+    )
+    for kind in KINDS:
+        if sum(item.get("kind") == kind for item in listed) > 1:
+            raise FormatError(f"{name} has more than one {kind}.", cure="Leave all but one out.")
+    known = [section for section in NEEDED if section != "equipment"] + ["decision"]
+    for section in content:
+        _require_known(name, section, known)
+    sections = {key: _section(f"{name}: [{key}]", key, item) for key, item in content.items()}
+    return LaboratoryFile(name, sections, listed)
+
+
+def missing_keys(
+    sections: Mapping[str, Mapping[str, Any]], equipment: tuple[Mapping[str, Any], ...]
+) -> Iterator[str]:
+    """Yield each key that a certificate needs and that is not stated, with its section."""
+    places = [(f"[{s}]", NEEDED[s], sections.get(s, {})) for s in NEEDED if s != "equipment"]
+    numbered = enumerate(equipment, 1)
+    places += [(f"[[equipment]] {i}", NEEDED["equipment"], item) for i, item in numbered]
+    for place, keys, stated in places:
+        for key in keys:
+            if (value := stated.get(key)) in (None, ""):
+                yield f"{place} {key}"
+            elif isinstance(value, Measured) and value.uncertainty is None:
+                yield f"{place} {key}.uncertainty"
+    if not any(item.get("kind") == "load cell" for item in equipment):
+        yield '[[equipment]] of kind = "load cell" (what gave the load)'
+
+
+def _section(where: str, section: str, content: Any) -> dict[str, Any]:
+    """Return a table with its values as their kinds ask for."""
+    if not isinstance(content, dict):
+        cure = f"Write it as a table of {', '.join(SECTIONS[section])}."
+        raise FormatError(f"{where} is {content!r}.", cure=cure)
+    for key in content:
+        _require_known(where, key, list(SECTIONS[section]))
+    return {k: _value(f"{where} {k}", SECTIONS[section][k], v) for k, v in content.items()}
+
+
+def _require_known(where: str, key: str, known: list[str]) -> None:
+    if key not in known:
+        close = get_close_matches(key, known, 1, 0.5)
+        cure = f"Did you mean {close[0]}?" if close else f"It may have {', '.join(known)}."
+        why = "What is misspelt would be missing in the certificate."
+        raise FormatError(f"{where} has {key}, which is not known.", why=why, cure=cure)
+
+
+def _value(where: str, kind: str, value: Any) -> Any:
+    """Return a value as its kind asks for: text, a time as text, a number, or a quantity."""
+    if kind in _FORMS:
+        pattern, form = _FORMS[kind]
+        if isinstance(value, str) and value.isprintable() and re.fullmatch(pattern, value):
+            return value.strip()
+    elif kind in ("date", "time"):
+        form = "a date, 2026-11-20" + ", or a time, 2026-11-20T09:30:00+01:00" * (kind == "time")
+        if isinstance(value, date) and (kind == "time" or not isinstance(value, datetime)):
+            return value.isoformat()
+    elif kind == "number":
+        form = "a number"
+        if isinstance(value, int | float) and math.isfinite(value) and not isinstance(value, bool):
+            return float(value)
+    elif kind == "limits":
+        limits, form = _section(where, kind, value), "limits, the lower below the upper"
+        ends = limits.get("lower", -math.inf), limits.get("upper", math.inf)
+        if ends[0] < ends[1] and ends != (-math.inf, math.inf):
+            return limits
+    else:
+        stated, form = _section(where, "quantity", value), "a value with its unit, u not negative"
+        spread = stated.get("uncertainty")
+        if {"value", "unit"} <= set(stated) and (spread is None or spread >= 0):
+            unit, zero = stated["unit"], 0.0
+            if kind == "temperature" and unit in _CELSIUS:
+                unit, zero = "K", ZERO_CELSIUS
+            number = float(to_si(stated["value"], unit, kind, where)) + zero
+            u = None if spread is None else float(to_si(spread, unit, kind, where))
+            return Measured(number, u)
+    raise FormatError(f"{where} is {value!r}, but should be {form}.")

@@ -1,0 +1,56 @@
+"""The instruments of a scan: the sensor, what gave load and position, and who measured."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressSensor:
+    """The sensor and the channel whose voltage was recorded.
+
+    ``temperature`` and its standard uncertainty, in K, are those of the sensor during the scan.
+    """
+
+    name: str = ""
+    model: str = ""
+    channel: str = "zz"
+    serial_number: str = ""
+    manufacturer: str = ""
+    temperature: float | None = None
+    temperature_uncertainty: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equipment:
+    """A measuring instrument, such as the stage: its certificate of calibration, and its date.
+
+    >>> Equipment(name="stage", certificate="K 12", certificate_date="2026-03-01").serial_number
+    ''
+    """
+
+    name: str = ""
+    serial_number: str = ""
+    certificate: str = ""
+    certificate_date: str = ""
+
+    def same_as(self, other: "Equipment") -> bool:
+        """Whether both name one instrument: by its serial number, or by name if neither has one."""
+        if self.serial_number or other.serial_number:
+            return self.serial_number == other.serial_number
+        return self.name == other.name != ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadCell(Equipment):
+    """The load cell or balance by which loads were set or read; empty where it is not stated.
+
+    >>> LoadCell(name="balance", serial_number="7").same_as(LoadCell(serial_number="7"))
+    True
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class User:
+    """Who measured, and the laboratory: ``name`` and ``affiliation``; empty if not stated."""
+
+    name: str = ""
+    affiliation: str = ""

@@ -1,0 +1,174 @@
+"""The XML of a certificate: a Digital Calibration Certificate that says what the artifact says."""
+
+import base64
+import os
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from dcclib.validation import SchematronValidator, XsdValidator
+from dsi_unit import DsiUnit
+
+import memscal
+from memscal.certificate.certificate import Certificate, certify
+from memscal.certificate.dcc import certificate_xml, dsi_unit
+from memscal.errors import InputError
+from memscal.formats.inspection import check
+from memscal.model.quantities import PER_MM2
+
+# It tells of a notation in its own tables; a unit of ours would have it in its warnings.
+pytestmark = pytest.mark.filterwarnings("ignore:The dsi string contains the token")
+
+NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
+SCHEMA = os.environ.get("MEMSCAL_DCC_SCHEMA", "")
+
+
+@pytest.fixture(scope="module")
+def xml(certificate: Certificate) -> bytes:
+    return certificate_xml(certificate)
+
+
+@pytest.fixture(scope="module")
+def root(xml: bytes) -> ET.Element:
+    return ET.fromstring(xml)
+
+
+@pytest.fixture(scope="module")
+def others(apparatus, laboratory) -> list[bytes]:
+    """Certificates with as little as may be, an accreditation, and a tolerance that is not met."""
+    bare = {
+        name: {k: v for k, v in section.items() if k not in ("street", "post_code", "email")}
+        for name, section in laboratory.sections.items()
+    }
+    bare["laboratory"]["accreditation"] = "body X"
+    bare["decision"]["conversion_constant"] = {"lower": 2.0, "unit": "V/MPa"}
+    plain = replace(laboratory, sections={k: v for k, v in bare.items() if k != "decision"})
+    current = memscal.calibrate(
+        replace(memscal.simulate(seed=1), unit="A", sensor=memscal.StressSensor())
+    ).apparatus
+    made = [(apparatus, replace(laboratory, sections=bare)), (current, plain)]
+    return [certificate_xml(certify(*pair)) for pair in made]
+
+
+def found(root: ET.Element, path: str) -> ET.Element:
+    element = root.find(path, NAMES)
+    assert element is not None, path
+    return element
+
+
+def numbers(root: ET.Element, path: str) -> np.ndarray:
+    return np.array([float(text) for text in (found(root, path).text or "").split()])
+
+
+def test_ptb_s_schematron_finds_no_error(xml, others):
+    judge = SchematronValidator.for_dcc()
+    for made in (xml, *others):
+        said = judge.validate_str(made.decode())
+        assert [item.text for item in said.failed_assertions] == []
+        # Its reports of role "error" do not count for it; its warning of a list of units of which
+        # all are equal is given for any list of units.
+        assert [item.text for item in said.successful_reports if item.role == "error"] == []
+        warnings = {item.text for item in said.successful_reports if item.role == "warning"}
+        assert all("unit" in text for text in warnings)
+
+
+NO_SCHEMA = (
+    "No package brings the schema, which its authors serve over the network alone: set "
+    "MEMSCAL_DCC_SCHEMA to the path of dcc.xsd 3.3.0, with what it imports beside it."
+)
+
+
+@pytest.mark.skipif(not SCHEMA, reason=NO_SCHEMA)
+def test_it_is_valid_by_the_schema(xml, others):
+    judge = XsdValidator.from_file(SCHEMA)
+    for made in (xml, *others):
+        assert [error.message for error in judge.validate_str(made.decode()).errors] == []
+
+
+@pytest.mark.parametrize(("units", "expected", "scale"), [
+    (("mV/Pa",), r"\milli\volt\pascal\tothe{-1}", 1e-3), (("mm",), r"\milli\metre", 1e-3),
+    (("mm²",), r"\milli\metre\tothe{2}", 1e-6), (("1/mm²",), r"\milli\metre\tothe{-2}", 1e6),
+    (("1/mm⁴",), r"\milli\metre\tothe{-4}", 1e12), (("uT/Pa",), None, 1e-6), (("",), r"\one", 1.0),
+    (("mm", "mm"), r"\milli\metre\tothe{2}", 1e-6), (("1/Pa",), r"\pascal\tothe{-1}", 1.0),
+    (("mm", "1/mm"), r"\one", 1.0), (("mV/Pa", "mm"), None, 1e-6), (("kg*m^2/s^3",), None, 1.0),
+])  # fmt: skip
+def test_units_are_written_as_d_si_reads_them(units, expected, scale):
+    written = dsi_unit(*units)
+    assert expected in (None, written)
+    unit = DsiUnit(written)
+    assert unit.valid
+    assert unit.warnings == []
+    si = [u.replace("mm", "m").replace("mV", "V").replace("uT", "T") for u in units]
+    assert DsiUnit(dsi_unit(*si)).get_scale_factor(unit) == pytest.approx(scale)
+
+
+def test_a_unit_without_a_name_in_d_si_is_refused():
+    with pytest.raises(InputError, match="furlong"):
+        dsi_unit("furlong/Pa")
+
+
+def test_every_unit_in_the_file_is_one_of_d_si(root):
+    stated = root.iterfind(".//si:unit", NAMES), root.iterfind(".//si:unitXMLList", NAMES)
+    units = {unit for kind in stated for element in kind for unit in (element.text or "").split()}
+    assert len(units) > 8
+    assert [unit for unit in units if not DsiUnit(unit).valid] == []
+
+
+def test_values_uncertainties_and_covariance_are_those_of_the_artifact(root, apparatus):
+    values = found(root, ".//dcc:result[1]//si:realListXMLList")
+    names = (found(values, "si:labelXMLList").text or "").split()
+    parameters = apparatus.parameters.only(names)
+    units = (found(values, "si:unitXMLList").text or "").split()
+    scale = np.array([1e-3 if "milli" in unit else 1.0 for unit in units])
+    scale = np.where(["tothe{2}" in unit for unit in units], 1e-6, scale)
+    u = np.sqrt(np.diag(parameters.covariance))
+    np.testing.assert_allclose(numbers(values, "si:valueXMLList") * scale, parameters.values)
+    expanded = numbers(values, ".//si:valueExpandedMUXMLList")
+    np.testing.assert_allclose(expanded * scale, 2 * u)
+    stored = values.iterfind(".//si:columnXMLList", NAMES)
+    columns = [numbers(column, ".//si:valueXMLList") for column in stored]
+    np.testing.assert_allclose(np.array(columns) * np.outer(scale, scale), parameters.covariance)
+    # The 95 % quantile of chi-square with six degrees of freedom.
+    region = found(values, ".//si:ellipsoidalRegionMUXMLList")
+    assert numbers(region, "si:coverageFactorXMLList") ** 2 == pytest.approx(12.592, abs=1e-3)
+
+
+def test_the_profile_is_that_of_the_page(root, certificate):
+    r, g = root.findall(".//dcc:result[2]//si:realListXMLList", NAMES)
+    np.testing.assert_allclose(numbers(r, "si:valueXMLList"), 1e3 * certificate.profile.r)
+    np.testing.assert_allclose(numbers(g, "si:valueXMLList") * PER_MM2, certificate.profile.g)
+    expanded = numbers(g, ".//si:valueExpandedMUXMLList") * PER_MM2
+    np.testing.assert_allclose(expanded, certificate.profile.expanded)
+    assert len(g.findall(".//si:columnXMLList", NAMES)) == certificate.profile.r.size
+
+
+def test_conditions_conformity_and_people_stand_where_a_dcc_has_them(root, others, certificate):
+    influences = root.iterfind(".//dcc:influenceCondition//si:value", NAMES)
+    assert [float(e.text or "") for e in influences] == pytest.approx([23.0, 45.0])
+    core = "dcc:administrativeData/dcc:coreData/dcc:uniqueIdentifier"
+    assert found(root, core).text == certificate.number
+    assert found(root, ".//dcc:metaData/dcc:conformity").text == "pass"
+    assert found(ET.fromstring(others[0]), ".//dcc:metaData/dcc:conformity").text == "noPass"
+    assert ET.fromstring(others[1]).find(".//dcc:conformity", NAMES) is None
+    names = [e.text for e in root.iterfind(".//dcc:measuringEquipment/dcc:name/dcc:content", NAMES)]
+    assert names == [item["name"] for item in certificate.equipment]
+
+
+def test_the_artifact_in_it_is_whole_and_says_the_same(root, apparatus, tmp_path: Path):
+    held = found(root, ".//dcc:byteData/dcc:dataBase64").text
+    assert held is not None
+    path = tmp_path / "artifact.h5"
+    path.write_bytes(base64.b64decode(held))
+    assert all(finding.passed for finding in check(path))
+    again = memscal.load_apparatus(path)
+    assert again.conversion_constant == apparatus.conversion_constant
+    np.testing.assert_array_equal(again.radial_profile.g, apparatus.radial_profile.g)
+
+
+def test_an_artifact_that_is_too_large_is_named_in_its_place(certificate):
+    root = ET.fromstring(certificate_xml(replace(certificate, artifact=b"")))
+    assert root.find(".//dcc:byteData", NAMES) is None
+    text = found(root, ".//dcc:result[3]//dcc:text/dcc:content").text or ""
+    assert certificate.apparatus.content_digest in text

@@ -1,0 +1,134 @@
+"""The laboratory's file: what it may hold, and what scans and artifacts take from it."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import memscal
+from memscal.cli import main
+from memscal.errors import FormatError, InputError, MemscalError
+from memscal.formats.laboratory import NEEDED, Measured, read_laboratory
+
+SHIPPED = Path(__file__).parents[2] / "calibration_data" / "lab.toml"
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "lab.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_shipped_file_has_every_mandatory_key_and_says_that_names_are_placeholders():
+    shipped = tomllib.loads(SHIPPED.read_text(encoding="utf-8"))
+    for section, keys in NEEDED.items():
+        for table in shipped[section] if section == "equipment" else [shipped[section]]:
+            assert set(keys) <= set(table)
+    assert "PLACEHOLDER" in SHIPPED.read_text(encoding="utf-8").partition("[laboratory]")[0]
+    people = [shipped[key]["name"] for key in ("laboratory", "customer", "person")]
+    assert all("placeholder" in name.lower() for name in people)
+    assert len(read_laboratory(SHIPPED).equipment) == 3
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("[laboratories]\nname = 'a'", "Did you mean laboratory?"),
+    ("[sensor]\nserial_number = '1'", "Did you mean serial?"),
+    ("[decision]\ngaussian_sigm = {lower = 1, unit = 'mm'}", "Did you mean gaussian_sigma?"),
+    ("[laboratory]\nname = 5", "[laboratory] name is 5, but should be text"),
+    ("[laboratory]\nname = ' '", "should be text"),
+    ("[laboratory]\ncountry = 'France'", "two capital letters"),
+    ("[laboratory]\nprefix = 'a\"<b'", "up to 40 letters"),
+    ("[decision]\nrule = 'lenient'", '"guarded acceptance"'),
+    ("[decision]\ncentre = {lower = 2, upper = 1, unit = 'mm'}", "lower below the upper"),
+    ("[decision]\ncentre = {unit = 'mm'}", "should be limits"),
+    ("[decision]\nguard_band = '1'", "should be a number"), ("customer = 1", "as a table"),
+    ("[conditions]\ntemperature = 23.0", "a table of value, unit, uncertainty"),
+    ("[conditions]\ntemperature = {value = 23.0, unit = 'mm'}", "must be a temperature"),
+    ("[conditions]\ntemperature = {value = 23.0, unit = 'degC', u = 1}", "uncertainty"),
+    ("[conditions]\nhumidity = {value = 45, unit = '%', uncertainty = -1}", "u not negative"),
+    ("[conditions]\nhumidity = {value = nan, unit = '%'}", "should be a number"),
+    ("[conditions]\nstart_time = 'noon'", "2026-11-20T09:30:00+01:00"),
+    ("[[equipment]]\nname = 'a'\ndate = 2026-01-01T10:00:00", "be a date"),
+    ("[[equipment]]\nkind = 'stage'\n[[equipment]]\nkind = 'stage'", "more than one stage"),
+    ("[equipment]\nname = 'a'", "[[equipment]]"),
+    ("[sensor\n", "no TOML"),
+])  # fmt: skip
+def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path: Path, text: str, words: str):
+    with pytest.raises(MemscalError) as refusal:
+        read_laboratory(written(tmp_path, text))
+    assert words in str(refusal.value)
+    assert "lab.toml" in str(refusal.value)
+
+
+def test_degrees_celsius_are_kelvins_of_another_zero_and_the_same_uncertainty(tmp_path: Path):
+    for value, unit in ((23.0, "degC"), (23.0, "°C"), (296.15, "K")):
+        quantity = f'{{value = {value}, unit = "{unit}", uncertainty = 0.3}}'
+        read = read_laboratory(written(tmp_path, f"[conditions]\ntemperature = {quantity}"))
+        assert read.stated("conditions", "temperature") == pytest.approx(Measured(296.15, 0.3))
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    path, scan = tmp_path / "scan.csv", memscal.simulate(seed=1)
+    lines = [f"{x * 1e3},{u * 1e3}" for x, u in zip(scan.x, scan.u_zz, strict=True)]
+    path.write_text("\n".join(["x,U", *lines]), encoding="utf-8")
+    return path
+
+
+IMPORT = [
+    *("--x", "x", "--x-unit", "mm", "--u", "U", "--u-unit", "mV", "--load", "1", "--radius"),
+    *("0.25", "--young-modulus", "2.2", "--poisson-ratio", "0.5", "--thickness", "2"),
+]
+
+
+def imported(table: Path, *options: str) -> int:
+    out = str(table.with_name("scan.h5"))
+    return main(["import", str(table), "-o", out, "--force", *IMPORT, *options])
+
+
+def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(table: Path):
+    assert imported(table, "--lab", str(SHIPPED)) == 0
+    path = table.with_name("scan.h5")
+    apparatus = memscal.calibrate(path).apparatus
+    apparatus.save(table.with_name("artifact.h5"))
+    for held in (memscal.read_scan(path), memscal.load_apparatus(table.with_name("artifact.h5"))):
+        assert held.sensor.serial_number == "SN-PLACEHOLDER-1"
+        assert held.sensor.manufacturer == "Example Manufacturer (placeholder)"
+        assert held.sensor.temperature == pytest.approx(296.15)
+        assert held.sensor.temperature_uncertainty == pytest.approx(0.3)
+        assert held.load_cell.certificate == "CERT-PLACEHOLDER-1"
+        assert (held.stage.name, held.stage.certificate_date) == ("example stage", "2026-01-16")
+        assert held.user == memscal.User(
+            name="B. Placeholder", affiliation="Example Laboratory (placeholder)"
+        )
+        assert held.start_time == "2026-02-02T09:00:00+01:00"
+    for file in (path, table.with_name("artifact.h5")):
+        content = file.read_bytes()
+        assert b"B. Placeholder" in content
+        assert b"Customer" not in content
+        assert b"A. Placeholder" not in content
+
+
+def test_a_scan_that_says_otherwise_than_the_file_is_refused(table: Path, capsys):
+    assert imported(table, "--lab", str(SHIPPED), "--sensor-name", "another") == 3
+    assert "'another' in the scan" in capsys.readouterr().err
+    scan = memscal.simulate(seed=1, points=9)
+    with pytest.raises(InputError, match="name of the sensor"):
+        read_laboratory(SHIPPED).additions(scan)
+
+
+def test_the_file_belongs_to_scans_and_is_not_written_over(table: Path):
+    assert imported(table, "--lab", str(SHIPPED), "--format", "reference") == 2
+    mine = written(table.parent, SHIPPED.read_text(encoding="utf-8"))
+    options = ["import", str(table), "-o", str(mine), "--force", *IMPORT, "--lab", str(mine)]
+    assert main(options) == 4
+    with pytest.raises(FormatError, match="not known"):
+        read_laboratory(written(table.parent, "[nothing]"))
+
+
+def test_a_simulated_rod_scan_takes_the_file_and_an_experiment_does_not(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    assert main(["simulate", "-o", str(path), "--points", "9", "--lab", str(SHIPPED)]) == 0
+    assert memscal.read_scan(path).load_cell.serial_number == "LC-PLACEHOLDER"
+    assert memscal.read_scan(path).sensor.name == "example sensor"
+    assert main(["simulate", "--experiment", "sphere", "--lab", str(SHIPPED)]) == 2
