@@ -35,6 +35,8 @@ class Progress:
         How many are done, and of how many; of ``"finite strain"`` the share of the work, of 1.
     seconds : float
         Since the task began.
+    kept : float
+        How many were done before that, as in a batch that is resumed.
 
     Examples
     --------
@@ -53,17 +55,19 @@ class Progress:
     done: float
     total: float
     seconds: float
+    kept: float = 0.0
 
     @property
     def left(self) -> float:
-        """Seconds that the rest takes at the pace so far."""
-        return self.seconds * (self.total - self.done) / self.done if self.done else float("inf")
+        """Seconds that the rest takes at the pace so far; infinite before anything is done."""
+        done = self.done - self.kept
+        return self.seconds * (self.total - self.done) / done if done else float("inf")
 
     def __str__(self) -> str:
         """Return the count with the time left."""
         share = f"{self.done:.0%} of {self.task}"
         text = share if self.total == 1 else f"{self.done:g} of {self.total:g} {self.task}"
-        return f"{text}, {span(self.left)} left" if 0 < self.done < self.total else text
+        return f"{text}, {span(self.left)} left" if self.kept < self.done < self.total else text
 
 
 Listener: TypeAlias = Callable[[Progress], None] | Literal[True] | None
@@ -108,17 +112,17 @@ def reported(function: _Function) -> _Function:
     return cast("_Function", told)
 
 
-def counter(task: str, total: float) -> Callable[[float], None]:
-    """Begin a task; return what is called with how much of it is done."""
+def counter(task: str, total: float) -> Callable[..., None]:
+    """Begin a task; return what is called with how much of it is done, and was done before."""
     listener, start = _LISTENER.get(), monotonic()
     if listener is _nobody:
-        return lambda _: None
+        return lambda *_: None
     said = start
 
-    def tell(done: float) -> None:
+    def tell(done: float, kept: float = 0.0) -> None:
         nonlocal said
         now = monotonic()
-        progress = Progress(task, done, total, now - start)
+        progress = Progress(task, done, total, now - start, kept)
         if now - said >= _EVERY or (said > start and done == total):
             _LOG.info("%s", progress)
             said = now
@@ -129,13 +133,17 @@ def counter(task: str, total: float) -> Callable[[float], None]:
 
 
 def counted(
-    items: Iterable[_Item], task: str, total: float, size: Callable[[_Item], float] = lambda _: 1
+    items: Iterable[_Item],
+    task: str,
+    total: float,
+    size: Callable[[_Item], float] = lambda _: 1,
+    kept: Callable[[_Item], bool] = lambda _: False,
 ) -> Iterator[_Item]:
-    """Begin a task; return its items, which are told of as they come, each of some size."""
+    """Begin a task; return its items, told of as they come: their sizes, what was done before."""
     tell, rest = counter(task, total), iter(items)
 
     def each() -> Iterator[_Item]:
-        done = 0.0
+        done = before = 0.0
         while True:
             token = _LISTENER.set(_nobody)
             try:
@@ -145,7 +153,8 @@ def counted(
             finally:
                 _LISTENER.reset(token)
             done += size(item)
-            tell(done)
+            before += size(item) if kept(item) else 0.0
+            tell(done, before)
             yield item
 
     return each()

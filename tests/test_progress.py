@@ -24,6 +24,8 @@ def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
     (("contacts", 137, 500, 30.0), "137 of 500 contacts, 79 s left"),
     (("contacts", 1, 500, 30.0), "1 of 500 contacts, 4.2 h left"),
     (("contacts", 500, 500, 30.0), "500 of 500 contacts"), (("draws", 0, 9, 0.1), "0 of 9 draws"),
+    (("scans", 90, 100, 1.0, 90), "90 of 100 scans"),
+    (("scans", 92, 100, 5.0, 90), "92 of 100 scans, 20 s left"),
     (("the loading", 0.25, 1.0, 60.0), "25% of the loading, 3 min left"),
 ])  # fmt: skip
 def test_progress_in_words_has_the_count_and_the_time_left(arguments, text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack
+from operator import attrgetter
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -137,5 +138,5 @@ def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Itera
             count = workers or cores()
             executor, most = stack.enter_context(worker_pool(count)), lambda: 2 * count
         stack.enter_context(out.working("Calibrating"))
-        outcomes = batch.run(executor, most)
-        yield from counted(outcomes, "scans", batch.count, lambda outcome: outcome.scans)
+        size, kept = attrgetter("scans"), attrgetter("kept")
+        yield from counted(batch.run(executor, most), "scans", batch.count, size, kept)

@@ -52,9 +52,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         lines = "<br>\n".join(map(escape, self.answer().splitlines()))
-        return (f"<p>{lines}</p>\n" if lines else "") + "\n".join(
-            table.html() for table in self.tables()
-        )
+        blocks = [f"<p>{lines}</p>"] if lines else []
+        return "\n".join([*blocks, *(table.html() for table in self.tables())])
 
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them."""

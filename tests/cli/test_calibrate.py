@@ -156,7 +156,7 @@ def test_a_sweep_is_drawn_and_given_as_json(run: Run, scan: Path, monkeypatch: p
     monkeypatch.setattr(memscal.Calibration, "sweep", short)
     sweep = run("calibrate", scan, "--json", "--sweep-figure", "sweep.SVG").json["sweep"]
     assert sweep["conversion_constant"]["unit"] == "mV/Pa"
-    assert len(sweep["relative_rms"]["draws"]) == len(sweep["amplitude"])
+    assert len(sweep["relative_rms"]["draws"]) == len(sweep["amplitude"]["value"])
     assert b"<svg" in Path("sweep.SVG").read_bytes()
 
 

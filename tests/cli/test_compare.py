@@ -78,7 +78,7 @@ def test_measured_stress_gives_the_numbers_of_its_scans(run: Run, compare: Run, 
     for load in of_scans.json["loads"]:
         # In their order, with no friction and full stick, which need not be asked for.
         profiles = load["by_loading"]["incremental"]["profiles"]
-        assert [p["friction_coefficient"] for p in profiles] == [0.0, 0.1, 0.2, None]
+        assert [p["friction_coefficient"]["value"] for p in profiles] == [0.0, 0.1, 0.2, None]
     assert names(Path.cwd()) == []
 
 

@@ -52,7 +52,7 @@ def test_the_law_of_the_film_and_the_friction_of_the_rod_are_stated(run: Run, ta
     scan = memscal.read_scan("a.h5")
     assert (scan.film.law, scan.film.mooney_rivlin_ratio) == ("mooney-rivlin", 0.2)
     assert scan.rod_friction == np.inf
-    assert "mooney-rivlin " in run("inspect", "a.h5").out
+    assert " mooney-rivlin\n" in run("inspect", "a.h5").out
     sphere = ["--indenter", "sphere", "--rod-friction", "0"]
     run("import", table, "-o", "b.h5", *COLUMNS, *SET_UP, *sphere).exits(2, "--indenter rod")
 

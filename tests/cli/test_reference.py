@@ -56,10 +56,11 @@ def test_a_depth_beyond_linear_elasticity_is_pointed_out_with_what_a_rubber_does
 def test_a_rough_interface_is_named(run: Run):
     rough = ["--greenwood-tripp", 1.82, 5000, 20, "--slip-length", 1.82]
     done = run("reference", "sphere", "--load", 0.5, "--friction", 0.5, *rough, "--rings", 32)
-    assert "interface: Greenwood-Tripp law (roughness 1.82 um" in done.out
-    assert "slip length 1.82 um" in done.out
+    title = " ".join(done.out.split())
+    assert "interface: Greenwood-Tripp law (roughness 1.82 um" in title
+    assert "slip length 1.82 um" in title
     exponential = run("reference", "sphere", "--exponential", 0.8, 0.5, "--rings", 32)
-    assert "exponential law (length 0.8 um" in exponential.out
+    assert "exponential law (length 0.8 um" in " ".join(exponential.out.split())
 
 
 def test_a_cone_and_a_measured_tip_go_to_a_file_and_come_back(run: Run, folder: Path):
@@ -116,7 +117,7 @@ def test_what_cannot_be_solved_and_wrong_usage_are_refused(run, folder, code, ar
 def test_a_figure_of_the_contacts_is_written(run: Run, folder: Path):
     done = run("reference", "sphere", "--load", 0.5, "--load", 1, "--figure", "contacts.svg")
     done.exits(0, "Written: contacts.svg")
-    assert [line.split()[0] for line in done.out.splitlines()[3:]] == ["0.5", "1"]
+    assert [line.split()[0] for line in done.out.splitlines()[-2:]] == ["0.5", "1"]
     assert Path("contacts.svg").read_bytes().startswith(b"<?xml")
 
 
