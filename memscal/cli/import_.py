@@ -126,7 +126,7 @@ _NEEDED_OF_MESHES = ("r_unit", "sigma_unit")
 )
 @option("--u-errors", metavar="COLUMN")("Scan: column of each reading's standard uncertainty.")
 @option("--noise", Quantity("unit of u"))(
-    "Scan: standard uncertainty of each reading, one number in the unit of the readings."
+    "Scan: standard uncertainty of each reading, one number, in the unit of u."
 )
 @option("--holds", is_flag=True)(
     "Scan: the table is a log in the order of time. Holds, where the indenter presses at rest, are "

@@ -18,9 +18,9 @@ FloatArray = NDArray[np.float64]
 _SMALLEST, _LARGEST = 1e-30, 1e30
 #: Wide ranges of what films and indenters have, in SI units; a thousand times the lowest is usual.
 _SIZES = {
-    "young_modulus": ("Pa", 1e3, 1e10),
-    "thickness": ("m", 1e-6, 0.1),
-    "radius": ("m", 1e-6, 0.1),
+    "young_modulus": ("Young's modulus", "Pa", 1e3, 1e10),
+    "thickness": ("The thickness of the film", "m", 1e-6, 0.1),
+    "radius": ("The radius of the indenter", "m", 1e-6, 0.1),
 }
 _PREFIXES = {"m": 1e-3, "u": 1e-6, "k": 1e3, "M": 1e6, "G": 1e9}
 _SHOWN: dict[Any, Any] = {}
@@ -37,7 +37,7 @@ def require_positive(name: str, value: float, unit: str = "") -> None:
 def warn_of_units(*records: Any) -> None:
     """Warn of the film and the indenter of no set-up, and name the unit that was probably meant."""
     for record in records:
-        for name, (unit, low, high) in _SIZES.items():
+        for name, (words, unit, low, high) in _SIZES.items():
             # A sphere's radius is that of its curvature: a lens has metres.
             most = high * (1000 if getattr(record, "shape", "") == "sphere" else 1)
             value = getattr(record, name, low)
@@ -46,7 +46,7 @@ def warn_of_units(*records: Any) -> None:
             prefix = min(_PREFIXES, key=lambda p: abs(math.log(value * _PREFIXES[p] / low / 1e3)))
             meant = value * _PREFIXES[prefix]
             text = (
-                f"The {name.replace('_', ' ')} is {value:g} {unit}. Probably {value:g} "
+                f"{words} is {value:g} {unit}. Probably {value:g} "
                 f"{prefix}{unit} was meant, which is {meant:g} {unit}."
             )
             # Of one place in the code, so that each text is shown once.

@@ -21,6 +21,7 @@ _LIFTED = 0.5
 _STEADY, _NOISE, _TO_SIGMA = 0.02, 5.0, 1.4826 / np.sqrt(2)
 #: Fewer rows do not tell the scatter.
 _FEWEST = 5
+_LOGGED = ("x", "y", "u_zz", "normal_load")
 _CURE = (
     "Check the columns of position, load and reading; name the column of the load "
     "(load_column=...; --load-column COLUMN), which tells best when the indenter presses."
@@ -45,26 +46,36 @@ class Holds(Result):
 
 def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: Reading) -> Holds:
     """Find the holds in the columns of a log, which are in the order of time."""
-    log = {name: columns[name] for name in ("x", "y", "u_zz", "normal_load") if name in columns}
-    whole = np.logical_and.reduce([np.isfinite(values) for values in log.values()])
+    whole = np.logical_and.reduce([np.isfinite(columns[n]) for n in _LOGGED if n in columns])
     columns, line = {name: values[whole] for name, values in columns.items()}, line[whole]
-    log = {name: columns[name] for name in log}
-    u, load = log["u_zz"], log.get("normal_load")
-    position = log["x"] + 1j * log.get("y", 0.0)
-    way = np.hypot(np.ptp(position.real), np.ptp(position.imag)) if u.size else 0.0
+    u, load = columns["u_zz"], columns.get("normal_load")
+    if u.size < _FEWEST:
+        raise InputError(f"The log has {u.size} rows without gaps.", cure=_CURE)
+    position = columns["x"] + 1j * columns.get("y", np.zeros(u.size))
+    way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
     dwell = np.append(0, np.cumsum(np.abs(np.diff(position)) > _MOVING * way))
     pressed = _timed(u, dwell) if load is None else _loaded(load)
     level = float(np.median(u[~pressed])) if not pressed.all() else 0.0
     starts = np.flatnonzero(np.diff(np.where(pressed, dwell, -1), prepend=-1))
     runs = [run for run in np.split(np.arange(u.size), starts) if run.size and pressed[run[0]]]
-    if load is not None:
-        runs = [run[_steady(load[run], float(np.quantile(load[run], 0.75)), 0.0)] for run in runs]
-    held = [run[_steady(u[run], float(np.median(u[run])), level)] for run in runs if run.size]
-    held = [run for run in held if run.size >= _FEWEST]
+    for values, lifted, share in ((load, 0.0, 0.75), (u, level, 0.5)):
+        if values is not None:  # of a load's run the ramps are below the hold
+            near = _NOISE * _noise(values[pressed])
+            runs = [run[_steady(values[run], lifted, share, near)] for run in runs if run.size]
+    held = [run for run in runs if run.size >= _FEWEST]
     if not held:
         why = f"A hold is {_FEWEST} rows or more in which position, load and reading are steady."
         raise InputError("The log has no hold.", why=why, cure=_CURE)
+    return _averaged(columns, line, held, len(runs) - len(held), reading)
+
+
+def _averaged(
+    columns: Mapping[str, FloatArray], line: NDArray[Any], held: list[NDArray[np.intp]],
+    left_out: int, reading: Reading,
+) -> Holds:  # fmt: skip
+    """Average all columns over the rows of each hold, and say what the readings scatter by."""
     first, stop = np.array([(run[0], run[-1] + 1) for run in held]).T
+    u = columns["u_zz"]
     mean = {
         name: np.array([values[run].mean() for run in held]) for name, values in columns.items()
     }
@@ -86,7 +97,7 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
     found = (
         f"{len(held)} holds of {size.min()} to {size.max()} rows, the first in lines "
         f"{line[first[0]]} to {line[stop[0] - 1]}, are averaged to one reading each; "
-        f"{len(runs) - len(held)} presses of fewer than {_FEWEST} steady rows are left out."
+        f"{left_out} presses of fewer than {_FEWEST} steady rows are left out."
     )
     scatters = (
         f"Within a hold the readings scatter by {usual}, neighbouring rows correlate by "
@@ -96,6 +107,7 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
         f"From the first to the last third of a hold the readings change by {changes} (median; at "
         f"most by {reading.text(np.abs(change).max())})."
     )
+    log = {name: columns[name] for name in _LOGGED if name in columns}
     return Holds(log, line, first, stop, mean, errors, reading, (found, scatters, changed))
 
 
@@ -128,8 +140,8 @@ def _noise(values: FloatArray) -> float:
     return float(np.median(np.abs(np.diff(values)))) * _TO_SIGMA if values.size > 1 else 0.0
 
 
-def _steady(values: FloatArray, middle: float, level: float) -> slice:
-    """Return the rows from the first to the last that is close to the middle."""
-    close = max(_NOISE * _noise(values), _STEADY * abs(middle - level))
-    inside = np.flatnonzero(np.abs(values - middle) <= close)
+def _steady(values: FloatArray, lifted: float, share: float, near: float) -> slice:
+    """Return the rows from the first to the last that is close to the quantile of a share."""
+    held = float(np.quantile(values, share))
+    inside = np.flatnonzero(np.abs(values - held) <= max(near, _STEADY * abs(held - lifted)))
     return slice(inside[0], inside[-1] + 1) if inside.size else slice(0)

@@ -10,8 +10,9 @@ MOST_OF_LINES, MOST_OF_RASTER, MOST_CORRELATED = 2_000_000, 1_000_000, 4_000
 MOST_OF_CONTACT, MOST_RESTORED = 4_000, 100_000
 #: Rows and columns of a table, and pixels along a side of a reference that is a field.
 MOST_ROWS, MOST_COLUMNS, MOST_PIXELS = 20_000_000, 1_000, 2_048
-#: Elements of XML in a workbook: of each a reader makes an object.
-MOST_ELEMENTS = 3_000_000
+#: Tags of XML in the sheets of a workbook (four for a cell), and in all else of it: of each of them
+#: a reader makes an object.
+MOST_TAGS, MOST_OTHER_TAGS = 3_000_000, 300_000
 #: Bytes of a table, of an HDF5 file and of all that is held of one, of one array in it as it is
 #: held, and of any other file (a mesh, an image).
 MOST_TABLE_BYTES, MOST_HDF5_BYTES, MOST_ARRAY_BYTES, MOST_FILE_BYTES = (

@@ -132,3 +132,43 @@ def test_the_table_itself_is_never_replaced(run: Run, table: Path):
     before = table.read_bytes()
     run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force").exits(4)
     assert table.read_bytes() == before
+
+
+def test_what_was_pressed_on_what_is_told_after_the_import(run: Run, table: Path):
+    told = run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, "--noise", 0.04).exits(0).out
+    for words in (
+        "Units: u_zz in mV, x in mm.", "Rod: radius (0.2500 ± 0.0020) mm.",
+        "Pressed with: load (1.000 ± 0.010) N.", "Young's modulus (2.20 ± 0.10) MPa",
+        "uncertainty of each reading: 0.04 mV",
+    ):  # fmt: skip
+        assert words in told, told
+    np.testing.assert_allclose(memscal.read_scan("scan.h5").u_zz_errors, np.full(65, 4e-5))
+
+
+@pytest.mark.parametrize(("arguments", "code", "words"), [
+    (["--load", 80, "--load-unit", "g"], 3, "80 g weigh 0.785 N"),
+    (["--load", 1, "--sheet", "A"], 3, "--sheet) has no effect on a text"),
+    (["--load", 1, "--indenter", "sphere"], 2, "--radius"), (["--figure", "a.png"], 2, "--holds"),
+    ([*SET_UP, "--thickness", 1500], 3, "Probably 1.5 mm was meant"),
+    ([*SET_UP, "--thickness", 0.02], 3, "times the film's thickness of 0.02 mm"),
+])  # fmt: skip
+@pytest.mark.filterwarnings("default::memscal.errors.UnitWarning")
+def test_an_option_without_effect_or_of_no_set_up_is_refused(
+    run: Run, table: Path, folder: Path, arguments, code, words
+):
+    run("import", table, "-o", "scan.h5", *COLUMNS, *arguments).exits(code, words)
+    assert names(folder) == ["scan.csv"]
+
+
+def test_a_log_of_presses_is_averaged_and_drawn(run: Run, folder: Path):
+    x = np.repeat(np.linspace(-8, 8, 17), 20)
+    load = np.tile(np.repeat([0.0, 1.0], 10), 17)
+    noise = np.random.default_rng(1).normal(size=(2, x.size)) * 1e-3
+    rows = np.stack([x, load * np.exp(-(x**2)) + noise[0], load + noise[1]], axis=1)
+    write_table(folder / "log.csv", "x/mm,u/mV,F [N]", rows)
+    log = ["--x", "x", "--u", "u", "--load-column", "F", "--holds", "--figure", "log.png"]
+    told = run("import", "log.csv", "-o", "scan.h5", *log, *SET_UP[4:]).exits(0).out
+    assert "17 holds of 10 to 10 rows, the first in lines 12 to 21" in told
+    assert (folder / "log.png").read_bytes().startswith(b"\x89PNG")
+    scan = memscal.read_scan("scan.h5")
+    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)

@@ -1,5 +1,6 @@
 """Tables as they leave an experiment or a FEM program, with everything that can be messy."""
 
+import hashlib
 import re
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,13 @@ from helpers.builders import make_film
 from hypothesis import given
 from hypothesis import strategies as st
 
-from memscal.errors import FormatError, InputError
+from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, import_table
 from memscal.formats.tables.text_table import TextTable
 from memscal.model.checks import marked_texts
-from memscal.model.indenter import Rod
+from memscal.model.indenter import Rod, Sphere
+from memscal.model.scan import Scan
 
 
 def scan_table(path: Path, text: str, **options: Any) -> ImportedScan:
@@ -185,6 +187,120 @@ def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
         FormatError, match=r"not a number or approach or retreat in line 2 \('down'"
     ):
         scan_table(tmp_path, "x,u,b\n0,1,down\n1,2,approach\n", branch="b")
+
+
+EXPORT = (
+    "Protokoll;;\nLabor Nord;;\nLast;1,0;N\n;;\nWeg x;Spannung (µV);Nr\n[um];;-\n"
+    "-8000;100,5;1\n-7000;n.a.;2\n;7;3\n0;-9999;4\n8000;200;5\n"
+)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-be", "cp1252"])
+@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
+def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, encoding, ends):
+    content = EXPORT.replace("\n", ends).encode(encoding)
+    mark = b"\xfe\xff" if encoding == "utf-16-be" else b""
+    (tmp_path / "t.csv").write_bytes(mark + content)
+    scan = import_table(tmp_path / "t.csv", x="Weg x", u="Spannung", missing=["N.A.", "-9999"])
+    np.testing.assert_allclose(scan.x, [-8e-3, -7e-3, 0, 8e-3])
+    np.testing.assert_allclose(scan.u_zz, [100.5e-6, np.nan, np.nan, 200e-6])
+    for words in (
+        "The table says: Last;1,0;N\n", "header is line 5, a row of units below it",
+        "u_zz in µV, x in um", "2 values of u_zz are missing (NaN), lines 8, 10.",
+        "1 rows without a position were left out, line 9.",
+    ):  # fmt: skip
+        assert words in scan.notes, scan.notes
+    if mark:
+        assert scan.source.sha256 == hashlib.sha256(mark + content).hexdigest()
+
+
+@pytest.mark.parametrize(("text", "options"), [
+    ("Rate;10\nLoad;1,0\nx;u\n0,5;1,25\n1,5;2,5\n", {}), ("x u\n0,5 1,25\n1,5 2,5\n", {}),
+    ("# rod\n# x/mm u/mV\n0.5 1.25\n1.5 2.5\n", {"x_unit": None, "u_unit": None}),
+    ("7,8\n9,9\nx,u\n0.5,1.25\n1.5,2.5\n", {"skip_rows": 2}),
+    ("t,x,u\n12:01,0.5,1.25\n12:02,1.5,2.5\n", {}),
+    ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
+], ids=["pairs", "decimal comma", "savetxt", "skip", "time", "units"])  # fmt: skip
+def test_the_header_is_found_below_what_stands_above_it(tmp_path: Path, text, options):
+    scan = scan_table(tmp_path, text, film=None, **options)
+    np.testing.assert_allclose(scan.x, [0.5e-3, 1.5e-3])
+    np.testing.assert_allclose(scan.u_zz, [1.25e-3, 2.5e-3])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_path: Path, seed):
+    """Wherever they stand, the first row of numbers included, and in blocks read in either way."""
+    rng = np.random.default_rng(seed)
+    lines = [f"{i},{i}" for i in range(40_000)]
+    wrong = np.sort(rng.choice(len(lines), 12, replace=False))
+    wrong[0] = 0
+    for i in wrong:
+        lines[i] = f"{i},OVL"
+    lines.insert(int(wrong[3]), "# comment")
+    named = [i + 4 + (k >= 3) for k, i in enumerate(wrong[:5])]
+    text = "made by hand\n\nx,u\n" + "\n".join(lines)
+    expected = ", ".join(f"{n} \\('OVL'\\)" for n in named) + " and 7 more"
+    with pytest.raises(FormatError, match=expected):
+        scan_table(tmp_path, text, film=None)
+
+
+@pytest.mark.parametrize(("head", "options", "words"), [
+    ("x [um],u", {}, r"'x' states the unit 'um', but x_unit \(--x-unit\) is 'mm'"),
+    ("x,u (uV)", {}, "'uV', but u_unit"), ("x,u [mm]", {}, "'mm', but u_unit"),
+    ("x [mm],u/V", {"u_unit": "parsnip"}, "'V', but u_unit"),
+    ("x,u [channel 1]", {"u_unit": None}, "states no unit that is known"),
+    ("x,u", {"load_unit": "g"}, "80 g weigh"), ("x,u", {"noise": 1, "u_errors": "x"}, "one uncert"),
+    ("x,u", {"noise": 1, "holds": True}, "one uncertainty"),
+    ("x,u", {"load": None, "load_uncertainty": 1.0}, "belongs to a load"),
+    ("x,u", {"load_column": "u", "load_unit": "g"}, 'unit "g", but it must be a force'),
+])  # fmt: skip
+def test_what_contradicts_or_has_no_effect_is_refused(tmp_path: Path, head, options, words):
+    with pytest.raises(InputError, match=words):
+        scan_table(tmp_path, f"{head}\n0,1\n1,2\n2,1\n", **options)
+
+
+def test_the_same_unit_in_other_letters_does_not_contradict(tmp_path: Path):
+    text = "x (µm),u [millivolt]\n0,1\n1e3,2\n2e3,1\n"
+    scan = scan_table(tmp_path, text, x_unit="um")
+    np.testing.assert_allclose(scan.x, [0, 1e-3, 2e-3])
+
+
+def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tmp_path: Path):
+    text = "x,u,e [uV]\n0,1,30\n1,2,40\n2,1,50\n"
+    column = scan_table(tmp_path, text, u_errors="e")
+    np.testing.assert_allclose(column.u_zz_errors, [3e-5, 4e-5, 5e-5])
+    assert "uncertainty of each reading: 0.04 mV (median)" in column.notes
+    np.testing.assert_allclose(scan_table(tmp_path, text, noise=0.04).u_zz_errors, np.full(3, 4e-5))
+
+
+@pytest.mark.parametrize(("options", "direction"), [
+    ({"x": "b", "y": "a"}, "y"), ({"x": "a", "y": "b"}, "x"), ({"x": None, "y": "a"}, "y"),
+])  # fmt: skip
+def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path: Path, options, direction):
+    scan = scan_table(tmp_path, "a,b,u\n-2,5.001,1\n0,5,2\n3,4.999,1\n", **options)
+    assert (scan.kind, scan.direction) == ("line", direction)
+    np.testing.assert_allclose(scan.x, [-2e-3, 0, 3e-3])
+
+
+def test_positions_are_held_against_film_and_rod_and_the_unit_is_named(tmp_path: Path):
+    x = np.linspace(-8e3, 8e3, 65)  # 250 mm apart, were they mm
+    text = rows(x.tolist(), np.exp(-((x / 1e3) ** 2)).tolist(), header="x,u")
+    with pytest.raises(InputError, match=r"step is 250 mm(.|\n)*um as mm\?"):
+        scan_table(tmp_path, text, film=make_film(thickness=1.5e-3))
+    with pytest.raises(InputError, match=r"positions span 1\.6e\+04 mm"):
+        scan_table(tmp_path, text, indenter=Sphere(radius=0.1))
+    scan = scan_table(tmp_path, text, x_unit="um")
+    assert "Rod: radius 0.25 mm" in scan.notes
+    assert "Young's modulus (2.20 ± 0.10) MPa" in scan.notes
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"thickness": 1.5}, "1.5 m. Probably 1.5 mm was meant"), ({"thickness": 2e3}, "2000 um"),
+    ({"young_modulus": 1.8}, "Young's modulus is 1.8 Pa. Probably 1.8 MPa was meant"),
+])  # fmt: skip
+def test_a_film_that_none_has_is_warned_of_with_the_unit_that_was_meant(changes, words):
+    with pytest.warns(UnitWarning, match=words):
+        Scan(x=[0, 1e-3], u_zz=[0, 1], film=make_film(**changes))
 
 
 def reference_table(path: Path, text: str, **options: Any) -> Any:

@@ -21,7 +21,6 @@ from memscal.model.places import places_of
 from memscal.model.plausibility import require_plausible, require_span
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
-from memscal.model.result import Result
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers
 
 Column = str | int
@@ -41,7 +40,7 @@ class ImportedScan(Scan):
     """A scan that was read from a table, and what was done on the way."""
 
     messages: tuple[Message, ...] = ()
-    holds: Result | None = None
+    holds: Any = None  # memscal.model.holds.Holds, where they were asked for
 
 
 def import_table(
@@ -114,34 +113,37 @@ def import_table(
     <ImportedScan: line, 5 points, x from -8 to 8 mm, load 1 N>
     """
     require_sign("sign of the voltage", u_sign)
-    no_load = load is None and load_column is None
-    for useless, name in (
-        (load_unit and load_column is None, "load_unit (--load-unit), that of a column of loads,"),
-        (no_load and stated.get("load_uncertainty") is not None, "load_uncertainty"),
-        (noise is not None and (u_errors is not None or holds), "noise (--noise)"),
-        (u_errors is not None and holds, "u_errors (--u-errors)"),
-    ):
+    no_load, of_u = load is None and load_column is None, (u_unit, "u_unit (--u-unit)")
+    noisy = u_errors is not None or noise is not None
+    for useless, problem, cure in (
+        (load_unit and load_column is None, "load_unit (--load-unit) belongs to a column of loads.",
+         "Give the load (--load) in N: 80 g weigh 0.785 N."),
+        (no_load and stated.get("load_uncertainty") is not None,
+         "load_uncertainty (--load-uncertainty) belongs to a load.", "Give the load, too."),
+        (noisy and (holds or (u_errors is not None and noise is not None)),
+         "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or that of holds.",
+         "Give one of them."),
+    ):  # fmt: skip
         if useless:
-            why = "Loads (--load) are in N; readings state one uncertainty, or holds find it."
-            raise InputError(f"{name} has no effect here.", why=why, cure="Leave it out.")
+            raise InputError(problem, cure=cure)
     if x is None and y is None:
         raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
     table = open_table(
         source, sheet=sheet, skip_rows=skip_rows, missing=tuple(missing), delimiter=delimiter,
         decimal=decimal,
     )  # fmt: skip
-    of_u = u_unit, "u_unit (--u-unit)"
     u_unit = table.unit_of(u, *of_u)
     reading = reading_of(u_unit, table.where(u))
     volts = dimension_in("voltage", reading)
+    of_x = x_unit, "x_unit (--x-unit)", None
     wanted = {
         name: Wanted(column, table.unit_of(column, *unit), dimension)
-        for name, column, dimension, *unit in (
-            ("u_zz", u, volts, *of_u), ("u_xz", u_xz, volts, *of_u, u_unit),
-            ("u_yz", u_yz, volts, *of_u, u_unit), ("u_zz_errors", u_errors, volts, *of_u, u_unit),
-            ("normal_load", load_column, "force", load_unit, "load_unit (--load-unit)", "N"),
-            ("x", x, "length", x_unit, "x_unit (--x-unit)"),
-            ("y", y, "length", x_unit, "x_unit (--x-unit)"),
+        for name, column, dimension, unit in (
+            ("u_zz", u, volts, (*of_u, None)), ("u_xz", u_xz, volts, (*of_u, u_unit)),
+            ("u_yz", u_yz, volts, (*of_u, u_unit)),
+            ("u_zz_errors", u_errors, volts, (None, "", u_unit)),
+            ("normal_load", load_column, "force", (load_unit, "load_unit (--load-unit)", "N")),
+            ("x", x, "length", of_x), ("y", y, "length", of_x),
         )
         if column is not None
     }  # fmt: skip
@@ -233,7 +235,7 @@ def _set_up_in_words(stated: Any) -> Iterator[str]:
     film, indenter = (getattr(stated, name, None) for name in ("film", "indenter"))
     shape = "indenter" if indenter is None else indenter.shape
     for name, owner, record in (
-        (shape, indenter, ROUND_INDENTER), ("load", stated, LOAD), ("film", film, FILM),
+        (shape, indenter, ROUND_INDENTER), ("pressed with", stated, LOAD), ("film", film, FILM),
     ):  # fmt: skip
         words = []
         for q in (q for q in record.quantities if not q.name.endswith("_uncertainty")):

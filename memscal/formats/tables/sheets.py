@@ -28,7 +28,7 @@ from memscal.formats.tables.text_table import (
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
-from memscal.model.sizes import MOST_ELEMENTS, MOST_FILE_BYTES, too_large
+from memscal.model.sizes import MOST_FILE_BYTES, MOST_OTHER_TAGS, MOST_TAGS, too_large
 
 _KINDS = dict.fromkeys((".xlsx", ".xlsm"), "workbook") | dict.fromkeys(
     (".parquet", ".pq"), "Parquet"
@@ -93,31 +93,35 @@ def _sheet_table(
     text, cells = io.BytesIO(), 0
     for row in chosen.iter_rows(values_only=True):
         cells += max(len(row), 1)
-        if cells > MOST_ELEMENTS:
-            raise too_large(name, cells, MOST_ELEMENTS, "cells", cure="Save it as CSV.")
+        if cells > MOST_TAGS:
+            raise too_large(name, cells, MOST_TAGS, "cells", cure="Save it as CSV.")
         text.write("\t".join(map(_cell, row)).encode() + b"\n")
-    content = Sheet(chosen.title, text.getvalue(), hashlib.sha256(data).hexdigest())
+    cure = f"Name the sheet of the table (--sheet): {', '.join(book.sheetnames)}."
+    content = Sheet(chosen.title, text.getvalue(), hashlib.sha256(data).hexdigest(), cure)
     return TextTable(name, sheet=content, **reading)
 
 
 def _inflated(data: bytes, name: str) -> io.BytesIO:
     """Return the XML of a workbook unpacked, if it is neither too large nor of another kind."""
-    plain, total, elements = io.BytesIO(), 0, 0
+    plain, total, tags = io.BytesIO(), 0, {True: 0, False: 0}
     with zipfile.ZipFile(io.BytesIO(data)) as packed, zipfile.ZipFile(plain, "w") as unpacked:
         # Others are pictures and programs.
         for entry in (e for e in packed.infolist() if e.filename.endswith((".xml", ".rels"))):
-            pieces = []
+            pieces, in_sheet = [], entry.filename.startswith("xl/worksheets/")
+            most = MOST_TAGS if in_sheet else MOST_OTHER_TAGS
             with packed.open(entry) as member:
                 while piece := member.read(_PIECE):
                     pieces.append(piece)
-                    total, elements = total + len(piece), elements + piece.count(b"<")
-                    for size, most, of in (
-                        (total, MOST_FILE_BYTES, "bytes when it is unpacked"),
-                        (elements, 2 * MOST_ELEMENTS, "tags of XML (four for a cell)"),
-                    ):
-                        if size > most:
-                            kind, cure = UnsafeFileError, "Save the sheet as CSV."
-                            raise too_large(name, size, most, of, cure=cure, error=kind)
+                    total += len(piece)
+                    tags[in_sheet] += piece.count(b"<")
+                    if total > MOST_FILE_BYTES or tags[in_sheet] > most:
+                        of = f"tags of XML in its {'sheets' if in_sheet else 'texts and styles'}"
+                        size, most, of = (
+                            (tags[in_sheet], most, of) if tags[in_sheet] > most
+                            else (total, MOST_FILE_BYTES, "bytes when it is unpacked")
+                        )  # fmt: skip
+                        kind, cure = UnsafeFileError, "Save the sheet as CSV."
+                        raise too_large(name, size, most, of, cure=cure, error=kind)
             xml = b"".join(pieces)
             # Entities multiply, and other encodings hide them.
             encoding = re.search(rb"encoding\s*=\s*[\"']([^\"']*)", xml[:200])

@@ -216,6 +216,7 @@ class Sheet(NamedTuple):
     name: str
     text: bytes
     sha256: str
+    cure: str
 
 
 class TextTable(NamedColumns):
@@ -257,8 +258,9 @@ class TextTable(NamedColumns):
         """Find the first row of numbers, and the header and the row of units above it."""
         rows, places = self._rows(lines)
         if (start := _first_of_numbers(rows, self._missing)) is None:
-            cure = "Give a table with rows of numbers."
-            raise FormatError(f"{self._name} has no row of numbers.", cure=cure)
+            sheet = f"sheet {self._sheet.name!r} of " if self._sheet else ""
+            cure = self._sheet.cure if self._sheet else "Give a table with rows of numbers."
+            raise FormatError(f"{sheet}{self._name} has no row of numbers.", cure=cure)
         above = [(places[i], rows[i]) for i in range(start) if any(rows[i])]
         if not above:  # numpy.savetxt writes the header as a comment
             comments = [(n, s.lstrip(" \t#%")) for n, s in written if n < places[start]]
@@ -298,7 +300,10 @@ class TextTable(NamedColumns):
 
     def _sayings(self) -> Iterator[str]:
         """Yield what is written above the table: it may say that the data are synthetic."""
-        texts = (s.strip(f' \t#%"{self._delimiter}').replace("\t", " ") for s in self._said)
+        texts = (
+            s.strip(f' \t#%"{self._delimiter}').replace("\t", " ").replace('"', "")
+            for s in self._said
+        )
         said = [printable(text, _MAX_COMMENT).strip() for text in texts]
         yield from (f"The table says: {text}" for text in said[:_MAX_COMMENTS] if text)
         if len(said) > _MAX_COMMENTS:

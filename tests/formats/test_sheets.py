@@ -1,0 +1,146 @@
+"""Tables that are no text: workbooks, Parquet files, and columns in memory."""
+
+import io
+import sys
+import zipfile
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+import memscal
+from memscal.errors import FormatError, InputError
+from memscal.formats.tables import sheets
+
+X, U = [-8.0, 0.0, 8.0], [0.1, 2.0, 0.2]
+
+
+def workbook(path: Path) -> Path:
+    """A cover, and a sheet with a title, merged heads, units, a time stamp and an error."""
+    book = openpyxl.Workbook()
+    book.active.title = "Info"
+    book.active["A1"] = "A. N. Other, placeholder"
+    sheet = book.create_sheet("Daten")
+    sheet["A1"] = "# Rod 12"
+    sheet.merge_cells("A1:C1")
+    sheet["A2"] = "Position"
+    sheet.merge_cells("A2:B2")
+    for row in (["x", "t", "U"], ["[mm]", "s", "(mV)"]):
+        sheet.append(row)
+    for x, u in zip(X, U, strict=True):
+        sheet.append([x, date(2024, 5, 12), u])
+    sheet.append([9.0, None, "#N/A"])
+    book.save(path)
+    return path
+
+
+def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp_path: Path):
+    book = workbook(tmp_path / "rod.xlsx")
+    scan = memscal.import_table(book, sheet="Daten", x="x", u="U")
+    np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3, 9e-3])
+    np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3, np.nan])
+    assert "The table says: Rod 12" in scan.notes
+    assert "1 values of u_zz are missing (NaN), row 8." in scan.notes
+    with pytest.raises(InputError, match=r"'Info' of rod\.xlsx has no row(.|\n)*Info, Daten"):
+        memscal.import_table(book, x="x", u="U")
+    with pytest.raises(InputError, match=r"no sheet 'Data'(.|\n)*Info, Daten"):
+        memscal.import_table(book, sheet="Data", x="x", u="U")
+
+
+SHEET = (
+    b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>%s'
+)
+SHEET += b"</sheetData></worksheet>"
+FAR = b'<row r="1"><c r="A1"><v>1</v></c></row><row r="999999999"><c r="A1"><v>1</v></c></row>'
+DOCTYPE = b'<!DOCTYPE a [<!ENTITY b "bb">]>' + SHEET % b"&b;"
+
+
+@pytest.mark.parametrize(("xml", "words"), [
+    (SHEET % (b" " * 2**20), "1,0.* bytes when it is unpacked"),
+    (SHEET % (b"<c/>" * 1001), "tags of XML in its sheets"),
+    (SHEET % FAR, "has 1,001 cells"),
+    (SHEET % b"".join(b'<row><c r="XFD%d"/></row>' % i for i in range(9)), "cells"),
+    (DOCTYPE, "declarations"), ((SHEET % b"").decode().encode("utf-16"), "encoding"),
+    (b'<?xml version="1.0" encoding="cp037"?>' + SHEET % b"", "encoding"), (b"<a", "cannot be"),
+], ids=["size", "tags", "rows", "columns", "entities", "utf-16", "ebcdic", "damaged"])  # fmt: skip
+def test_a_hostile_workbook_is_refused_before_it_takes_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, xml, words
+):
+    limits = {"MOST_TAGS": 1000, "MOST_OTHER_TAGS": 1000, "MOST_FILE_BYTES": 2**20}
+    for name, limit in limits.items():
+        monkeypatch.setattr(sheets, name, limit)
+    plain, book = io.BytesIO(), openpyxl.Workbook()
+    book.save(plain)
+    path = tmp_path / "hostile.xlsx"
+    with zipfile.ZipFile(plain) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, xml if "sheet1" in name else source.read(name), 8)
+    with pytest.raises(FormatError if words == "cannot be" else InputError, match=words):
+        sheets.open_table(path)
+
+
+def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
+    fields = [pa.field("x", pa.float32(), metadata={"units": "mm"}), pa.field("U [uV]", pa.int64())]
+    table = pa.table([pa.array(X, pa.float32()), pa.array([1, None, 3])], schema=pa.schema(fields))
+    parquet.write_table(table, tmp_path / "rod.parquet")
+    scan = memscal.import_table(tmp_path / "rod.parquet", x="x", u="U")
+    np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3])
+    np.testing.assert_allclose(scan.u_zz, [1e-6, np.nan, 3e-6])
+    assert scan.source.file_name == "rod.parquet"
+    (tmp_path / "no.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(FormatError, match=r"no\.parquet cannot be read"):
+        memscal.import_table(tmp_path / "no.parquet", x="x", u="u")
+
+
+@pytest.mark.parametrize("frame", [
+    pd.DataFrame({"x/mm": X, "U (mV)": U}), {"x [mm]": X, "U [mV]": np.array(U)},
+    pd.DataFrame({"x/mm": ["-8,0", "0", "8"], "U (mV)": ["0,1", "2", "0,2"]}),
+], ids=["data frame", "mapping", "text with decimal commas"])  # fmt: skip
+def test_columns_in_memory_are_a_table(frame: Any):
+    scan = memscal.import_table(frame, x="x", u="U", load=1.0)
+    np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3], rtol=1e-15)
+    np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3], rtol=1e-15)
+    assert scan.source is None
+
+
+@pytest.mark.parametrize(("frame", "words"), [
+    ({"x": [1, 2], "u": [1, 2, 3]}, r"shape \(3,\) in 2 rows"), ([1, 2], "no table with columns"),
+    ({"x": [1, 2], "u": ["a", 1]}, "not a number in row 1 \\('a'\\)"),
+])  # fmt: skip
+def test_what_is_no_table_in_memory_is_refused(frame: Any, words):
+    with pytest.raises(InputError, match=words):
+        memscal.import_table(frame, x="x", u="u", x_unit="mm", u_unit="mV")
+
+
+def test_scans_are_made_of_arrays_in_any_units():
+    scan = memscal.Scan.from_arrays(X, [U, U], x_unit="mm", u_unit="mV", u_errors=0.01, load=1.0)
+    assert (scan.kind, scan.load) == ("repeats", 1.0)
+    np.testing.assert_allclose(scan.u_zz, np.array([U, U]) * 1e-3)
+    np.testing.assert_allclose(scan.u_zz_errors, np.full((2, 3), 1e-5))
+    raster = memscal.Scan.from_arrays(X, np.eye(3), y=np.array(X)[:, None], x_unit="mm")
+    assert (raster.kind, raster.y[3], raster.u_zz[4]) == ("points", 0.0, 1.0)
+    with pytest.raises(InputError, match=r"shape of u, \(3,\)"):
+        memscal.Scan.from_arrays(X, U, repeat=[1, 2])
+
+
+@pytest.mark.parametrize(("name", "options", "words"), [
+    ("a.xlsx", {"delimiter": ";"}, "delimiter.* no effect on a workbook"),
+    ("a.parquet", {"skip_rows": 2}, "--skip-rows.* no effect on a Parquet"),
+    ("a.csv", {"sheet": "A"}, "--sheet.* no effect on a text"), ("a.ods", {}, r"\.xlsx or as CSV"),
+])  # fmt: skip
+def test_an_option_that_a_kind_of_table_has_no_use_for_is_refused(name, options, words):
+    with pytest.raises(InputError, match=words):
+        memscal.import_table(name, x="x", u="u", **options)
+
+
+def test_a_workbook_without_openpyxl_names_the_extra(tmp_path: Path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    (tmp_path / "b.xlsx").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"openpyxl(.|\n)*memscal\[tables\]"):
+        memscal.import_table(tmp_path / "b.xlsx", x="x", u="u")

@@ -1,0 +1,84 @@
+"""Holds in a log: found whatever the load cell shows, and averaged with what they scatter by."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.errors import InputError
+from memscal.model.holds import find_holds
+from memscal.model.notation import VOLTS
+
+PLACES = np.linspace(-8e-3, 8e-3, 33)
+SIGNAL = 15e-3 * np.exp(-((PLACES / 1.2e-3) ** 2))
+
+
+def log(seed: int, correlation: float = 0.0, *, creep: float = 0.0) -> dict[str, Any]:
+    """Moves, presses with ramps and holds of 20 to 40 rows; noise of 2 uV."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for x, before, u in zip(PLACES, [-9e-3, *PLACES[:-1]], SIGNAL, strict=True):
+        moves, waits, ramp, held = 6, int(rng.integers(8, 12)), 4, int(rng.integers(20, 40))
+        up = np.linspace(0, 1, ramp, endpoint=False)
+        load = [np.zeros(moves + waits), up, np.ones(held), up[::-1], np.zeros(5)]
+        late = [np.zeros(moves + waits), up, 1 - creep * np.exp(-np.arange(held) / 8), up[::-1]]
+        position = [np.linspace(before, x, moves), np.full(waits + 2 * ramp + held + 5, x)]
+        parts.append(
+            (*map(np.concatenate, (position, load)), u * np.concatenate([*late, load[-1]]))
+        )
+    x, load, u = (np.concatenate(part) for part in zip(*parts, strict=True))
+    noise = rng.normal(size=x.size)
+    for i in range(1, x.size):
+        noise[i] = correlation * noise[i - 1] + np.sqrt(1 - correlation**2) * noise[i]
+    load = load + rng.normal(size=x.size) * 2e-3
+    return {"x": x + rng.normal(size=x.size) * 1e-6, "normal_load": load, "u_zz": u + 2e-6 * noise}
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+@pytest.mark.parametrize("loads", [True, False], ids=["load", "no load"])
+def test_the_means_of_holds_scatter_by_their_uncertainty(correlation, loads):
+    """About the truth, 330 of them: their variance lies within 4 sd of 1, and a share of bias."""
+    errors = []
+    for seed in range(10):
+        columns = log(seed, correlation)
+        if not loads:
+            del columns["normal_load"]
+        holds = find_holds(columns, np.arange(columns["x"].size), VOLTS)
+        assert holds.first.size == PLACES.size
+        np.testing.assert_allclose(holds.mean["x"], PLACES, atol=2e-6)
+        errors.append((holds.mean["u_zz"] - SIGNAL) / holds.u_errors)
+    square = np.mean(np.square(errors))
+    assert abs(square - 1) < 4 * np.sqrt(2 / np.size(errors)) + 0.1
+
+
+def test_creep_within_holds_is_told():
+    columns = log(1, creep=0.2)
+    holds = find_holds(columns, np.arange(columns["x"].size), VOLTS)
+    assert float(holds.notes[2].split("at most by ")[1].split()[0]) > 0.05
+
+
+def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
+    columns = log(2)
+    first = int(np.argmax(columns["normal_load"] > 0.9))
+    columns["normal_load"][first + 3 :][columns["x"][first + 3 :] < -7.8e-3] = 0.0
+    holds = find_holds(columns, np.arange(columns["x"].size), VOLTS)
+    assert holds.first.size == PLACES.size - 1
+    assert "1 presses of fewer than 5 steady rows are left out" in holds.notes[0]
+    with pytest.raises(InputError, match="The log has no hold"):
+        find_holds({n: v[::40] for n, v in columns.items()}, np.arange(99)[:48], VOLTS)
+
+
+def test_a_log_becomes_a_scan_and_a_figure():
+    columns = log(3)
+    scan = memscal.import_table(
+        columns, x="x", u="u_zz", load_column="normal_load", x_unit="m", u_unit="V", holds=True
+    )
+    assert (scan.kind, scan.x.size) == ("line", PLACES.size)
+    assert np.median(scan.u_zz_errors) == pytest.approx(2e-6 / np.sqrt(30), rel=0.3)
+    assert scan.load == pytest.approx(1.0, abs=1e-3)
+    figure = scan.holds.plot()
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "x (mm)", "load (N)", "reading (mV)", "reading (mV)",
+    ]  # fmt: skip
+    assert len(figure.axes[2].collections[0].get_segments()) == PLACES.size
