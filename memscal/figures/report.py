@@ -251,9 +251,9 @@ def _of_restoration(restored: Restoration) -> Report:
 
 #: Captions of a comparison's figures, by the beginning of their names.
 _COMPARED = {
-    "profiles": "Measured and calculated profiles{}. Points: measured stress; solid and dashed: "
-    "the calculated limits, without friction and with full stick. Below: measured less calculated "
-    "stress over its uncertainty.",
+    "profiles": "Measured and calculated profiles{}. Points: measured stress; lines: calculated, "
+    "with the friction coefficients that the legend names. Below: measured less calculated stress "
+    "over its uncertainty.",
     "maxima": "Maximum of the stress against the load. Points: the largest measured stress over "
     "the largest of the frictionless contact; lines: the same calculated with each friction "
     "coefficient.",
