@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
@@ -80,8 +80,7 @@ class Conformity:
         return float(ndtr(high / self.of.uncertainty) - ndtr(low / self.of.uncertainty))
 
 
-@dataclass(frozen=True)
-class CertifiedProfile:
+class CertifiedProfile(NamedTuple):
     """G at some radii, in SI units: ``r``, ``g`` (n,), and the covariance (n, n)."""
 
     r: FloatArray

@@ -2,7 +2,6 @@
 
 import base64
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from string import Template
@@ -13,49 +12,16 @@ import numpy as np
 from scipy.special import chdtri
 
 from memscal.certificate.certificate import COVERAGE_FACTOR, COVERAGE_PROBABILITY, Certificate
-from memscal.errors import InputError
 from memscal.formats.laboratory import SECTIONS, ZERO_CELSIUS
+from memscal.formats.units import dsi_unit
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import DIMENSIONS, PER_MM
 from memscal.version import __version__
 
 _CONSTANT = Path(__file__).with_name("dcc.xml")
 _SPACES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
-_UNITS = {
-    "m": "metre", "V": "volt", "Pa": "pascal", "N": "newton", "A": "ampere", "T": "tesla",
-    "rad": "radian", "K": "kelvin", "°C": "degreecelsius", "%": "percent", "s": "second",
-    "Hz": "hertz", "W": "watt", "J": "joule", "C": "coulomb", "F": "farad", "ohm": "ohm",
-    "S": "siemens", "kg": "kilogram", "cd": "candela", "mol": "mole",
-}  # fmt: skip
-_PREFIXES = {
-    "a": "atto", "f": "femto", "p": "pico", "n": "nano", "u": "micro", "m": "milli", "k": "kilo",
-    "M": "mega", "G": "giga",
-}  # fmt: skip
-_FACTOR = re.compile(r"([*/]?)([A-Za-z°%]+|1)\^?(-?\d*)")
-
 #: Elements by their names: text, a tree of more, or a list of such, one after the other.
 Tree = Mapping[str, Any]
-
-
-def dsi_unit(*units: str) -> str:
-    r"""Return the product of units as D-SI writes it: mV/Pa as ``\milli\volt\pascal\tothe{-1}``."""
-    powers: Counter[str] = Counter()
-    for unit in units:
-        plain = unit.replace("²", "^2").replace("⁴", "^4")
-        for sign, symbol, power in _FACTOR.findall(plain):
-            if symbol != "1":
-                powers[_dsi_name(symbol)] += (-1 if sign == "/" else 1) * int(power or 1)
-    written = {name: "" if p == 1 else f"\\tothe{{{p}}}" for name, p in powers.items() if p}
-    return "".join(name + power for name, power in written.items()) or r"\one"
-
-
-def _dsi_name(symbol: str) -> str:
-    if symbol in _UNITS:
-        return f"\\{_UNITS[symbol]}"
-    if symbol[0] in _PREFIXES and symbol[1:] in _UNITS:
-        return f"\\{_PREFIXES[symbol[0]]}\\{_UNITS[symbol[1:]]}"
-    problem = f"The unit {symbol} has no name in D-SI."
-    raise InputError(problem, cure="Write the certificate as .html.")
 
 
 def certificate_xml(of: Certificate) -> bytes:

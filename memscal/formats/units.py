@@ -177,6 +177,20 @@ def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
         raise UnitError(problem, why=f"It is a {dimension}.", cure=cure) from error
 
 
+def dsi_unit(*units: str) -> str:
+    r"""Return the product of units as D-SI writes it: mV/Pa as ``\milli\volt\pascal\tothe{-1}``."""
+    product = _registry().Quantity(1.0)
+    for unit in units:
+        plain = unit.replace("²", "^2").replace("⁴", "^4")
+        product *= _pint_quantity(plain or "1", "unit", "certificate")
+    factors = []
+    for unit, power in product.unit_items():
+        prefix, name, _ = _registry().parse_unit_name(unit)[0]
+        factor = (rf"\{prefix}" if prefix else "") + "\\" + name.replace("meter", "metre")
+        factors.append(factor if power == 1 else rf"{factor}\tothe{{{power:g}}}")
+    return "".join(factors) or r"\one"
+
+
 @functools.cache
 def _registry() -> Any:
     import pint

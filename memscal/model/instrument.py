@@ -21,11 +21,7 @@ class StressSensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Equipment:
-    """A measuring instrument, such as the stage: its certificate of calibration, and its date.
-
-    >>> Equipment(name="stage", certificate="K 12", certificate_date="2026-03-01").serial_number
-    ''
-    """
+    """A measuring instrument, such as the stage, with the certificate of its calibration."""
 
     name: str = ""
     serial_number: str = ""

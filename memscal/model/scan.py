@@ -426,12 +426,12 @@ class Scan:
 def common_circumstances(scans: Sequence[Scan]) -> dict[str, Any]:
     """Return what gave loads and positions, and who measured, if common to all scans, and when."""
     first = scans[0]
-    cells = all(first.load_cell.same_as(scan.load_cell) for scan in scans)
-    stages = all(first.stage.same_as(scan.stage) for scan in scans)
     # Times in ISO 8601 and one time zone have the order of their texts.
     return {
-        "load_cell": first.load_cell if cells else LoadCell(),
-        "stage": first.stage if stages else Equipment(),
+        "load_cell": first.load_cell
+        if all(first.load_cell.same_as(scan.load_cell) for scan in scans)
+        else LoadCell(),
+        "stage": first.stage if all(first.stage == scan.stage for scan in scans) else Equipment(),
         "user": first.user if all(first.user == scan.user for scan in scans) else User(),
         "start_time": min(scan.start_time for scan in scans),
         "end_time": max(scan.end_time for scan in scans) if all(s.end_time for s in scans) else "",

@@ -74,12 +74,9 @@ def test_an_artifact_that_says_otherwise_than_the_file_is_refused(
         certify(replace(apparatus, **changes), laboratory)
 
 
-@pytest.mark.parametrize(("begin", "end", "words"), [
-    ("on Monday", "", "from on Monday"),
-    ("2026-02-03", "2026-02-02", "from 2026-02-03 to 2026-02-02"),
-])  # fmt: skip
-def test_wrong_times_are_refused(apparatus, laboratory, begin, end, words):
-    with pytest.raises(InputError, match=words):
+@pytest.mark.parametrize(("begin", "end"), [("on Monday", ""), ("2026-02-03", "2026-02-02")])
+def test_times_that_are_none_or_run_backwards_are_refused(apparatus, laboratory, begin, end):
+    with pytest.raises(InputError, match=f"from {begin}"):
         certify(apparatus, stating(laboratory, "conditions", start_time=begin, end_time=end))
 
 
@@ -129,15 +126,6 @@ def test_the_conformance_probability_is_that_of_a_normal_distribution(y, lower, 
     assert conformity(y, 0.1, lower, upper).probability == pytest.approx(expected, abs=1e-8)
 
 
-def test_the_conformance_probability_is_the_share_of_draws_within_the_tolerance(seed):
-    draws, rng = 200_000, np.random.default_rng(seed)
-    for y, lower, upper in rng.uniform([0, -2, 0.5], [1, 0, 2], size=(20, 3)):
-        p = conformity(y, 0.5, lower, upper).probability
-        x = rng.normal(y, 0.5, draws)
-        share = np.mean((x >= lower) & (x <= upper))
-        assert abs(share - p) < 6 * np.sqrt(p * (1 - p) / draws) + 1e-4
-
-
 NUMBERS = st.floats(-10, 10)
 
 
@@ -174,8 +162,3 @@ def test_limits_that_cannot_be_decided_on_are_refused(apparatus, laboratory, cha
         changed = without(laboratory, "decision", "rule")
     with pytest.raises(InputError, match=words):
         certify(apparatus, changed)
-
-
-def test_without_tolerances_no_conformity_is_stated(apparatus, laboratory):
-    kept = {k: v for k, v in laboratory.sections.items() if k != "decision"}
-    assert certify(apparatus, replace(laboratory, sections=kept)).conformity == ()
