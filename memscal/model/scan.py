@@ -255,7 +255,11 @@ def require_plane(x: FloatArray, y: FloatArray) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class StressSensor:
-    """The sensor and the channel whose voltage was recorded."""
+    """The sensor and the channel whose voltage was recorded.
+
+    >>> StressSensor(name="W7", serial_number="0012").channel
+    'zz'
+    """
 
     name: str = ""
     model: str = ""
