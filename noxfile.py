@@ -57,8 +57,8 @@ def outside_the_checkout(session: nox.Session, *, requirements: list[str]) -> It
             clutter = shutil.ignore_patterns("__pycache__", ".*")
             if (ROOT / name).is_dir():
                 shutil.copytree(ROOT / name, copy / name, ignore=clutter)
-        for name in ("pyproject.toml", "README.md", "CONTRIBUTING.md"):
-            shutil.copy(ROOT / name, copy)
+        for file in (*ROOT.glob("*.md"), *map(ROOT.joinpath, ("pyproject.toml", "CITATION.cff"))):
+            shutil.copy(file, copy)
         with session.chdir(copy):
             yield copy
 
@@ -123,8 +123,34 @@ def judges(session: nox.Session) -> None:
 
 
 @nox.session
+def docs(session: nox.Session) -> None:
+    """Build the documentation into site/, without a warning and without the network."""
+    with outside_the_checkout(session, requirements=group("docs")) as copy:
+        shutil.copy(ROOT / "LICENSE", copy)
+        shutil.rmtree(ROOT / "site", ignore_errors=True)
+        strict = ("--fail-on-warning", "--keep-going", "--nitpicky", "--jobs", "auto", "--quiet")
+        site = os.fspath(ROOT / "site")
+        session.run("sphinx-build", *strict, "--conf-dir", "docs", ".", site)
+
+
+@nox.session
+def packages(session: nox.Session) -> None:
+    """Build source distribution and wheel; install each on its own, and calibrate with it."""
+    session.install("build>=1.2")
+    with TemporaryDirectory(prefix="memscal-") as folder, session.chdir(folder):
+        session.run("python", "-m", "build", "--outdir", "dist", os.fspath(ROOT))
+        made = sorted(Path("dist").iterdir())
+        assert [path.suffix for path in made] == [".whl", ".gz"], made
+        for path in made:
+            session.install("--force-reinstall", os.fspath(path))
+            session.run("memscal", "simulate", "-o", "scan.h5", "--force", env=NOTHING_FROM_OUTSIDE)
+            calibrate = ("memscal", "calibrate", "scan.h5", "--report", "scan.html", "--force")
+            session.run(*calibrate, env=NOTHING_FROM_OUTSIDE, silent=True)
+
+
+@nox.session(requires=["docs"])
 def pages(session: nox.Session) -> None:
-    """Have a browser open, judge and print the pages that the built wheel writes."""
+    """Have a browser open, judge and print the pages of the built wheel and of the site."""
     for program in ("chromium", "npm"):
         if not shutil.which(program):
             session.error(f"{program} is not installed: apt-get install {program}")
@@ -132,6 +158,7 @@ def pages(session: nox.Session) -> None:
         fetch = ("npm", "install", "--silent", "--no-audit", "--no-fund", "--ignore-scripts")
         session.run(*fetch, "--prefix", os.fspath(copy / "npm"), AXE, external=True)
         session.env["MEMSCAL_AXE"] = os.fspath(copy / "npm/node_modules/axe-core/axe.min.js")
+        session.env["MEMSCAL_SITE"] = os.fspath(ROOT / "site")
         run_pytest(session, "-m", "pages", "tests/pages", *session.posargs)
 
 

@@ -40,7 +40,7 @@ class ApparatusFunction(Result, ApparatusData):
     the voltage where the indenter stands at larger x (or y) than the sensor.
 
     Made by :func:`memscal.calibrate` or :func:`memscal.load_apparatus`; its data are described
-    in :class:`memscal.model.apparatus.ApparatusData`.  All quantities are in SI units.
+    in ``ApparatusData``.  All quantities are in SI units.
     ``print(apparatus)`` shows the parameters with their standard uncertainties and the checks.
 
     Examples

@@ -15,6 +15,15 @@ class MemscalError(Exception):
     problem, why, cure : str
         What is wrong (the file, the path inside it, the value, the unit), why this stops the work,
         and what the user can do.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> try:
+    ...     memscal.Rod(radius=-1e-3)
+    ... except memscal.MemscalError as error:
+    ...     print(error.problem)
+    rod radius is -0.001 m, but it must be finite and above zero.
     """
 
     exit_code = 3

@@ -1,10 +1,19 @@
-"""Numbers in the documentation are those that memscal calculates; notebooks are their scripts."""
+"""What the documentation says is so: numbers, messages, examples; notebooks are their scripts."""
 
+import doctest
+import inspect
+import re
 import runpy
+import shlex
 from pathlib import Path
 
 import jupytext
 import pytest
+from helpers.bench import Bench
+
+import memscal
+from memscal.cli import main
+from memscal.cli.commands import memscal as program
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTEBOOKS = DOCS.with_name("notebooks")
@@ -36,3 +45,83 @@ def test_every_notebook_has_its_script_and_says_the_same() -> None:
     assert scripts.keys() == books.keys()
     for name, script in scripts.items():
         assert cells(script) == cells(books[name]), f"jupytext --sync notebooks/{name}.py"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """Return the blocks of code of a page."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives() -> None:
+    page = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"^\| `(.+?)`", page, flags=re.MULTILINE)
+    assert len(quoted) > 20
+    package = Path(memscal.__path__[0])
+    sources = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
+    joined = re.sub(r'"\s+f?"', "", sources)  # a text over several lines
+    filled = re.sub("…+", "…", re.sub(r"\{[^{}]*\}", "…", joined))
+    assert [message for message in quoted if message not in filled] == []
+
+
+def test_every_option_in_the_documentation_exists() -> None:
+    unknown = []
+    for page in (*DOCS.glob("*.md"), DOCS.with_name("README.md")):
+        text = page.read_text(encoding="utf-8")
+        for line in re.findall(r"^memscal .*", text, flags=re.MULTILINE):
+            name, *arguments = shlex.split(line.split(" > ")[0], comments=True)[1:]
+            command = program.get_command(None, name)
+            known = {option for p in command.params for option in p.opts} if command else set()
+            given = {word for word in arguments if re.match("--?[a-z]", word)}
+            unknown += [(page.name, line, option) for option in given - known]
+    assert unknown == []
+
+
+def test_the_citation_names_the_version() -> None:
+    citation = DOCS.with_name("CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {memscal.__version__}\n" in citation
+
+
+def test_every_public_name_has_an_example_that_runs_and_a_place_in_the_reference() -> None:
+    # The doctests of docstrings run where they stand; those of the page of results run here.
+    page = (DOCS / "results.md").read_text(encoding="utf-8")
+    shown = {
+        name
+        for names in re.findall(r"^### (.*)$", page, re.MULTILINE)
+        for name in names.split(", ")
+    }
+    test = doctest.DocTestParser().get_doctest(
+        "\n".join(blocks("results.md", "python")), {}, "docs/results.md", None, 0
+    )
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert runner.run(test, clear_globs=False).failed == 0
+    public = {name: getattr(memscal, name) for name in memscal.__all__ if name[0] != "_"}
+    own = {name for name, thing in public.items() if ">>>" in (inspect.getdoc(thing) or "")}
+    assert set(public) - own - shown == set()
+    made = {type(value) for value in test.globs.values()}
+    classes = {thing for name, thing in public.items() if name in shown - own}
+    concrete = {c for c in classes if isinstance(c, type) and not getattr(c, "_is_protocol", False)}
+    assert {c for c in concrete if not any(issubclass(each, c) for each in made)} == set()
+    listed = re.findall(r"^   (\w+)$", (DOCS / "api.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert sorted(listed) == sorted(public)
+
+
+@pytest.mark.filterwarnings("ignore:It is not known whether this device:FutureWarning")  # drivers
+def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scan = memscal.simulate(points=33, noise=0.0)
+    bench = Bench(scan, noise=0.005 * scan.u_zz.max(), seed=seed)
+    procedure, run = blocks("acquisition.md", "python")
+    names: dict[str, object] = {"__name__": "recipe"}
+    exec(compile(procedure, "acquisition.md", "exec"), names)
+    names |= {"STAGE": bench.stage, "VOLTMETER": bench.voltmeter, "sleep": lambda _: None}
+    exec(compile(run, "acquisition.md", "exec"), names)
+    assert (bench.readings, bench.dragged, bench.enabled) == (2 * 33 * 10, 0, set())
+    assert bench.position["2"] > 0  # the rod is left lifted
+    for line in blocks("acquisition.md", "console")[1].strip().splitlines():
+        assert main(shlex.split(line)[1:]) in (0, 1)
+    found = memscal.load_apparatus("sensor.apparatus.h5").parameters
+    for name in ("conversion_constant", "gaussian_sigma"):
+        assert abs(found[name] - scan.synthetic[name]) < 5 * found.uncertainty(name)

@@ -25,7 +25,11 @@ _DIRECTIONS = 64
 
 @dataclass(frozen=True)
 class EvenGrid:
-    """A quarter plane of ``count`` by ``count`` points, ``spacing`` (m) apart, axis included."""
+    """A quarter plane of ``count`` by ``count`` points, ``spacing`` (m) apart, axis included.
+
+    >>> EvenGrid(count=3, spacing=1e-3).axes[0]
+    array([-0.002, -0.001,  0.   ,  0.001,  0.002])
+    """
 
     count: int
     spacing: float
@@ -120,7 +124,11 @@ class EvenGrid:
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """A rectangular lattice for a raster: odd numbers of even positions about the axis, in m."""
+    """A rectangular lattice for a raster: odd numbers of even positions about the axis, in m.
+
+    >>> Lattice(x=np.linspace(-2e-3, 2e-3, 5), y=np.linspace(-1e-3, 1e-3, 3)).spacing
+    (0.001, 0.001)
+    """
 
     x: FloatArray
     y: FloatArray

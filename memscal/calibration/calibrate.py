@@ -311,7 +311,7 @@ def calibrate(
         by method ``"bayesian"``; see docs/tangential.md.
     method : str or Regulariser, default "white-noise"
         Whose A and G the result has.  ``"white-noise"``, the paper's, divides the field of the
-        smoothed voltages; :func:`memscal.deconvolution.division.regulariser_names` lists other
+        smoothed voltages; ``tikhonov``, ``wiener`` and more are other
         divisions.  ``"bayesian"`` takes A and G from the scan's points: the smaller error, for
         friction.  ``.apparatus.other`` is the estimate by the other route.
     centre : str, optional

@@ -167,6 +167,16 @@ def write_reference(
     ------
     OutputError
         If the file exists or cannot be written.
+
+    Examples
+    --------
+    >>> import memscal, tempfile
+    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> rod = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_reference(rod.profile(), f"{folder}/rod.h5")
+    ...     memscal.calibrate(memscal.simulate(), reference=f"{folder}/rod.h5").passed
+    True
     """
     data, parameters, process = profile_groups(profile)
     stored = {"reference": data, "parameters": parameters, "process": process}

@@ -153,6 +153,14 @@ def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = Fa
     ------
     OutputError
         If the file exists or cannot be written.
+
+    Examples
+    --------
+    >>> import memscal, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_scan(memscal.simulate(points=33), f"{folder}/scan.h5")
+    ...     read_scan(f"{folder}/scan.h5").kind
+    'line'
     """
     writer.write_tree(writer.file_tree(writer.SCAN_SCHEMA, _entry(scan)), path, overwrite=overwrite)
 

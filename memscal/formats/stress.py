@@ -113,6 +113,16 @@ def read_stress(path: str | os.PathLike[str], *, accept_altered: bool = False) -
     FormatError, UnitError, UnsafeFileError, SchemaVersionError
         If the file does not hold measured stress that this version can read, or was changed
         since it was written (its content digest no longer fits).
+
+    Examples
+    --------
+    >>> import memscal, tempfile
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1), method="bayesian").apparatus
+    >>> measured = memscal.measure_stress(memscal.simulate(seed=2), apparatus)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     measured.save(f"{folder}/rod.stress.h5")
+    ...     read_stress(f"{folder}/rod.stress.h5") == measured
+    True
     """
     with open_hdf5(path, accept_altered=accept_altered) as file:
         return stress_from(file)

@@ -116,8 +116,8 @@ def indent(
 
     Notes
     -----
-    Contact is unilateral, friction Amontons' (:mod:`memscal.mechanics.solver.step`).  A rod that
-    slides freely or sticks is solved to higher accuracy (:mod:`memscal.mechanics.rod`).  Solutions
+    Contact is unilateral, friction Amontons' (``mechanics.solver.step``).  A rod that
+    slides freely or sticks is solved to higher accuracy (``mechanics.rod``).  Solutions
     are cached: the same request is answered at once.
 
     Examples

@@ -111,6 +111,13 @@ class ExponentialCompliance:
         :math:`\lambda`, in m; 0 is rigid.
     reference_pressure : float
         :math:`p_1`, the pressure at which the mean planes meet (d = 0), in Pa.
+
+    Examples
+    --------
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> law = ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6)
+    >>> float(law.pressure(np.array(0.0), film))
+    1000000.0
     """
 
     decay_length: float

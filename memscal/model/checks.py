@@ -142,6 +142,10 @@ class QualityCheck:
 
     A check passes while ``value`` is at most ``limit``.  ``p_value``: the chance of such a value,
     or a larger one, if nothing is wrong; ``None`` where it is not known.
+
+    >>> check = QualityCheck("applied_force_2", 0.4, 3.0, True, "Force against load.", p_value=0.7)
+    >>> check.kind, check.profile
+    ('applied_force', '2')
     """
 
     name: str

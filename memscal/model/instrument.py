@@ -8,6 +8,9 @@ class StressSensor:
     """The sensor and the channel whose voltage was recorded.
 
     ``temperature`` and its standard uncertainty, in K, are those of the sensor during the scan.
+
+    >>> StressSensor(name="W7", serial_number="0012").channel
+    'zz'
     """
 
     name: str = ""
@@ -21,7 +24,11 @@ class StressSensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Equipment:
-    """A measuring instrument, such as the stage, with the certificate of its calibration."""
+    """A measuring instrument, such as the stage, with the certificate of its calibration.
+
+    >>> Equipment(name="stage", serial_number="7").same_as(Equipment(name="stage"))
+    False
+    """
 
     name: str = ""
     serial_number: str = ""
@@ -46,7 +53,11 @@ class LoadCell(Equipment):
 
 @dataclass(frozen=True, kw_only=True)
 class User:
-    """Who measured, and the laboratory: ``name`` and ``affiliation``; empty if not stated."""
+    """Who measured, and the laboratory: ``name`` and ``affiliation``; empty if not stated.
+
+    >>> User(affiliation="a laboratory").name
+    ''
+    """
 
     name: str = ""
     affiliation: str = ""

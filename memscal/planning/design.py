@@ -56,6 +56,9 @@ class Plan:
     ``load_uncertainty`` and ``noise`` are relative, to the load and to the signal with the rod
     right above the sensor; ``noise_voltage`` (V) replaces ``noise``.  Positions run from minus to
     plus ``half_range``, or to the last whole step within.
+
+    >>> Plan(step=0.5e-3, repeats=2).positions
+    33
     """
 
     film: ElasticFilm = PAPER_FILM

@@ -1,0 +1,4 @@
+// The theme's arrows beside the pages of a section have no name for those who hear a page.
+document.querySelectorAll(".bd-sidebar summary").forEach((arrow) => {
+  arrow.setAttribute("aria-label", `Pages below ${arrow.closest("li").querySelector("a").textContent}`);
+});
