@@ -34,7 +34,7 @@ from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
 from memscal.summaries import fleet_results
 from memscal.summaries.calibration import apparatus_of, sensor_title
-from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, worst_checks
+from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
 from memscal.version import __version__
 
 #: By the policy in it a browser fetches nothing and runs nothing.
@@ -58,11 +58,11 @@ class Report:
     """What the page of a result says beside its tables, of which ``leading`` precede figures."""
 
     title: str
-    verdict: str = ""  # by default that of the checks
+    verdict: str = ""  # by default the answer of the result
     failed: bool = False  # or if a check failed
     leading: int = 2
     pictures: Sequence[Picture] = ()
-    checks: Sequence[QualityCheck] | None = None
+    checks: Sequence[QualityCheck] = ()
     messages: Sequence[Message] = ()
     budget: Table | None = None
     settings: Sequence[Table] = ()
@@ -79,7 +79,7 @@ def html_report(result: Result) -> str:
         "Results": _html(tables[: report.leading]),
         "Figures": html_figures(report.pictures),
         "Further results": _html(tables[report.leading :]),
-        "Quality checks": _checks(report.checks or ()),
+        "Quality checks": _checks(report.checks),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
         "Uncertainty budget": _html([report.budget] if report.budget else []),
         "What was measured on": _html(report.settings),
@@ -90,9 +90,9 @@ def html_report(result: Result) -> str:
         for heading, content in sections.items()
         if content
     )
-    failed = report.failed or not all(check.passed for check in report.checks or ())
+    failed = report.failed or not all(check.passed for check in report.checks)
     kind = "verdict failed" if failed else "verdict"
-    lines = "<br>\n".join(escape(report.verdict or _verdict(report.checks)).splitlines())
+    lines = "<br>\n".join(escape(report.verdict or result.answer()).splitlines())
     note = f'<p class="{kind}" role="note">{lines}</p>\n' if lines else ""
     heading = f"<h1>{escape(report.title)}</h1>\n{note}"
     page = Template(_PAGE.read_text(encoding="utf-8"))
@@ -146,20 +146,10 @@ def _image(figure: Figure, file_format: str, dpi: float) -> str:
 def report_of(result: Result) -> Report:
     """Return what the page of a result says beside its tables."""
     tables: list[Table] = result.tables()
-    checks, messages = getattr(result, "checks", None), getattr(result, "messages", ())
+    checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
     title = tables[0].title if tables else type(result).__name__
     pictures = [Picture(result.plot, title, title)] if result._figure else []
     return Report(title=title, pictures=pictures, checks=checks, messages=messages)
-
-
-def _verdict(checks: Sequence[QualityCheck] | None) -> str:
-    if not checks:
-        return "" if checks is None else "No quality check was made."
-    failed = [check.name.replace("_", " ") for check in checks if not check.passed]
-    if not failed:
-        return f"All {len(checks)} quality checks passed."
-    count = f"{len(failed)} of {len(checks)} quality checks failed"
-    return f"{count}: {', '.join(failed)}. Read what each failure means before use."
 
 
 @report_of.register(ApparatusFunction)
@@ -171,7 +161,7 @@ def _of_calibration(result: Calibration | ApparatusFunction) -> Report:
         f"Panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
         f"the apparatus function with its band, linear and logarithmic; the transfer function "
         f"resolved up to {data.resolved_wavenumber / PER_MM:.3g} rad/mm. "
-        f"{values_text(data)}. {_verdict(data.checks)}"
+        f"{values_text(data)}. {verdict(data.checks)}"
     )
     caption = (
         "a, c: scan, reconvolutions with the deconvolved G and with the Gaussian, and the "
@@ -291,14 +281,14 @@ def _of_comparison(compared: FrictionComparison | ShearComparison) -> Report:
 
 @report_of.register
 def _of_fleet(fleet: FleetResults) -> Report:
-    verdict = fleet_results.verdict(fleet)
+    counts = fleet_results.verdict(fleet)
     caption = (
         "a, b: distributions of A and of the Gaussian width fitted to the scan. c: sensors that "
         "failed each check, and errors by class. d: A over the wafer, or along the batch."
     )
-    picture = Picture(fleet.plot, f"Panels: {caption} {verdict}", caption)
+    picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
     title, failed = f"Calibrations of {fleet.name}", bool(fleet.failed)
-    return Report(title=title, verdict=verdict, failed=failed, pictures=[picture])
+    return Report(title=title, verdict=counts, failed=failed, pictures=[picture])
 
 
 def _contact_words(scan: Scan | MeasuredScan) -> str:

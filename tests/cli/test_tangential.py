@@ -57,7 +57,6 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
                "--report", "shear.html")  # fmt: skip
     page = (folder / "shear.html").read_text(encoding="utf-8")
     assert "by the shear" in page
-    assert "No quality check was made." in page
     friction = (0.0, 0.1, np.inf)
     alone = memscal.compare_shear(
         measured, folder / "xz.apparatus.h5", friction=friction, loading="total"
