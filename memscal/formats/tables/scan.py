@@ -37,7 +37,12 @@ _MIXED = 0.3
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ImportedScan(Scan):
-    """A scan that was read from a table, and what was done on the way."""
+    """A scan that was read from a table, and what was done on the way.
+
+    >>> rows = {"x [mm]": [-1.0, 0.0, 1.0], "U [mV]": [1.0, 3.0, 1.0]}
+    >>> isinstance(import_table(rows, x="x [mm]", u="U [mV]"), ImportedScan)
+    True
+    """
 
     messages: tuple[Message, ...] = ()
     holds: Any = None  # memscal.model.holds.Holds, where they were asked for
