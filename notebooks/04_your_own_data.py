@@ -61,9 +61,9 @@ print("".join((TABLES / "sphere_dry.csv").read_text().splitlines(keepends=True)[
 # %% [markdown]
 # ## 2. Import
 #
-# A table states neither its units nor the indenter and the film; the options do. Each *standard
-# uncertainty* that you state here is propagated to the friction coefficient, and one that you leave
-# out counts as zero. At the terminal you would type what follows `memscal`.
+# The heads of this table state the units; the options state the indenter and the film. Each
+# *standard uncertainty* that you state here is propagated to the friction coefficient, and one that
+# you leave out counts as zero. At the terminal you would type what follows `memscal`.
 
 
 # %%
@@ -110,7 +110,8 @@ run(
 # `--load-scatter`, in percent, is independent from contact to contact: it is noise, and repeats
 # average it.
 #
-# Read the notes: how many readings, lines and places the table holds, and what is missing. Without
+# Read the notes: how many readings, lines and places the table holds, what is missing, and what was
+# pressed on what. Without
 # the load among the columns of `--repeat`, the contacts of three loads would be in one line; the
 # import warns of it.
 #

@@ -180,6 +180,7 @@ def import_table(
     columns = _placed(columns, notes, (lambda _: "of holds") if found else table.lines)
     stated |= {"load": load, "unit": reading.si, "source": table.source, "holds": found}
     scan = _scan_of(columns, notes, reading, load_scatter, x_error, stated)
+    del columns  # the scan has copies, and ten million rows are many
     if scan.film is not None:
         (require_plausible if isinstance(scan.indenter, Rod) else require_span)(scan)
     return scan
