@@ -143,7 +143,8 @@ def counted(
     tell, rest = counter(task, total), iter(items)
 
     def each() -> Iterator[_Item]:
-        done = before = 0.0
+        done: float = 0
+        before: float = 0
         while True:
             token = _LISTENER.set(_nobody)
             try:
@@ -153,7 +154,7 @@ def counted(
             finally:
                 _LISTENER.reset(token)
             done += size(item)
-            before += size(item) if kept(item) else 0.0
+            before += size(item) if kept(item) else 0
             tell(done, before)
             yield item
 

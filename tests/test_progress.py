@@ -93,4 +93,4 @@ def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) 
     monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
     with reporting(True):
         list(counted("ab", "<draws>", 2))
-    assert shown[-1] == '<progress value="2.0" max="2"></progress> 2 of 2 &lt;draws&gt;'
+    assert shown[-1] == '<progress value="2" max="2"></progress> 2 of 2 &lt;draws&gt;'
