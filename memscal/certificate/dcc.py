@@ -107,7 +107,8 @@ def _real(value: float, unit: str) -> Tree:
 
 
 def _numbers(values: float | Iterable[float] | FloatArray) -> str:
-    return " ".join(map(repr, np.atleast_1d(np.asarray(values, dtype=np.float64)).tolist()))
+    numbers = np.atleast_1d(np.asarray(values, dtype=np.float64)).tolist()
+    return " ".join(repr(number) if np.isfinite(number) else "NaN" for number in numbers)
 
 
 def _listed(

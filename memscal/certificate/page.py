@@ -174,7 +174,8 @@ def _profile(of: Certificate) -> str:
 
 def _budget(of: Certificate) -> str:
     budget = of.apparatus.budget
-    columns = [value for value in of.values if value.quantity.name in budget and value.value]
+    finite = [value for value in of.values if np.isfinite(value.value) and value.value]
+    columns = [value for value in finite if value.quantity.name in budget]
     sources = dict.fromkeys(s for value in columns for s in budget[value.quantity.name])
     shares = {
         source: [100 * budget[v.quantity.name].get(source, 0.0) / abs(v.value) for v in columns]

@@ -14,6 +14,7 @@ from dsi_unit import DsiUnit
 import memscal
 from memscal.certificate.certificate import Certificate, certify
 from memscal.certificate.dcc import certificate_xml
+from memscal.certificate.page import certificate_page
 from memscal.formats.inspection import check
 from memscal.formats.units import dsi_unit
 from memscal.model.quantities import PER_MM2
@@ -157,8 +158,11 @@ def test_the_artifact_in_it_is_whole_and_says_the_same(root, apparatus, tmp_path
     np.testing.assert_array_equal(again.radial_profile.g, apparatus.radial_profile.g)
 
 
-def test_an_artifact_that_is_too_large_is_named_in_its_place(certificate):
-    root = ET.fromstring(certificate_xml(replace(certificate, artifact=b"")))
+def test_what_is_too_large_or_not_determined_is_said_in_its_place(certificate):
+    values = tuple(replace(value, value=np.nan) for value in certificate.values)
+    root = ET.fromstring(certificate_xml(replace(certificate, artifact=b"", values=values)))
+    assert np.isnan(numbers(root, ".//dcc:result[1]//si:valueXMLList")).all()
+    assert "not determined" in certificate_page(replace(certificate, values=values))
     assert root.find(".//dcc:byteData", NAMES) is None
     text = found(root, ".//dcc:result[3]//dcc:text/dcc:content").text or ""
     assert certificate.apparatus.content_digest in text

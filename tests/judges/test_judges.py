@@ -4,12 +4,14 @@ import os
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from helpers.nexus import definitions_folder, violations
 
 import memscal
+from memscal.formats.laboratory import read_laboratory
 
 pytestmark = pytest.mark.judges
 
@@ -19,7 +21,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A file of each kind as a user writes it, with all that it may hold."""
     folder = tmp_path_factory.mktemp("written")
     files = {name: folder / f"{name}.h5" for name in (
-        "line", "raster", "reference", "artifact", "compact", "of_raster", "stress",
+        "line", "raster", "reference", "artifact", "compact", "of_raster", "stress", "named",
     )}  # fmt: skip
     data = Path(__file__).parents[2] / "calibration_data"
     experiment = data / "sphere_experiment"
@@ -34,6 +36,9 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     apparatus.compact().save(files["compact"])
     memscal.calibrate(raster).apparatus.save(files["of_raster"])
     memscal.measure_stress(contacts, apparatus).save(files["stress"])
+    unnamed = replace(scan, sensor=memscal.StressSensor(), load_cell=memscal.LoadCell())
+    additions = read_laboratory(data / "lab.toml").additions(unnamed)
+    memscal.calibrate(replace(unnamed, **additions)).apparatus.save(files["named"])
     return files
 
 
