@@ -8,6 +8,7 @@ from itertools import combinations, starmap
 
 import numpy as np
 import pytest
+from helpers.builders import make_sweep
 from helpers.friction_results import comparison, interface_comparison
 from helpers.paper import FILM, SPHERE
 from helpers.scans import known_apparatus, measured, pressed, sphere_scan
@@ -16,7 +17,6 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 import memscal
-from memscal.calibration.sweep import Sweep
 from memscal.cli.compare import figure_stems
 from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import render_figure
@@ -30,16 +30,6 @@ WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 @cache
 def compared() -> memscal.FrictionComparison:
     return comparison(lubrications=STATES, interface=interface_comparison())
-
-
-def swept() -> Sweep:
-    draws = 1e-7 + 1e-10 * np.random.default_rng(1).normal(size=(5, 6))
-    one = np.linspace(1.0, 1.01, 5)
-    return Sweep(
-        amplitude=np.logspace(-1, 1, 5), conversion_constant=1e-7 * one,
-        gaussian_sigma_deconvolved=5e-4 * one, relative_rms=5e-3 * one,
-        seed_conversion_constant=draws, seed_gaussian_sigma=5e3 * draws, seed_relative_rms=draws,
-    )  # fmt: skip
 
 
 def fleet() -> FleetResults:
@@ -64,7 +54,7 @@ FIGURES: dict[str, Callable[..., Figure]] = {
     ).plot(),
     "contacts": lambda _: contacts()[0].plot(beside=contacts()[1:]),
     "design": lambda _: memscal.design(step=0.5e-3, repeats=2).plot(),
-    "sweep": lambda _: swept().plot(),
+    "sweep": lambda _: make_sweep().plot(),
     "fleet": lambda _: fleet().plot(),
     "laws": lambda _: interface_comparison().plot(),
 } | {
