@@ -73,9 +73,14 @@ def run_pytest(session: nox.Session, *arguments: str) -> None:
 def tests(session: nox.Session) -> None:
     """Test the built wheel: notebooks, studies in reduced form, unit tests and doctests."""
     with outside_the_checkout(session, requirements=group("test")) as copy:
-        everything = sorted(os.fspath(book) for book in copy.glob("notebooks/*.ipynb"))
-        everything += [os.fspath(copy / "tests"), "--pyargs", "memscal", "--nbmake"]
+        executed = shutil.copytree(copy / "notebooks", copy / "executed")
+        everything = sorted(os.fspath(book) for book in executed.glob("*.ipynb"))
+        everything += [os.fspath(copy / "tests"), "--pyargs", "memscal", "--nbmake", "--overwrite"]
         run_pytest(session, *IN_PARALLEL, "--durations=20", *(session.posargs or everything))
+        if not session.posargs:
+            # The notebooks are stored with outputs, which must be those of this version.
+            compare = ("python", "docs/store_notebooks.py", "--compare", os.fspath(executed))
+            session.run(*compare, env=NOTHING_FROM_OUTSIDE)
 
 
 @nox.session(default=False)

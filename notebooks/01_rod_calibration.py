@@ -51,7 +51,7 @@ MM, UM, KPA, MV = 1e-3, 1e-6, 1e3, 1e-3  # memscal computes in SI units
 BLACK, BLUE, ORANGE, GREEN, GREY = "black", "#0072B2", "#D55E00", "#009E73", "0.6"
 
 # %matplotlib inline
-plt.rcParams.update({"figure.figsize": (6.4, 3.6), "figure.dpi": 110, "font.size": 9})
+plt.rcParams.update({"figure.figsize": (6.4, 3.6), "figure.dpi": 80, "font.size": 9})
 plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": False})
 
 # %% [markdown]
@@ -220,7 +220,7 @@ ax.plot(distance[left] / MM, signal[left] / MV, "o", ms=4, mfc="none", color=BLA
 ax.plot(distance[~left] / MM, signal[~left] / MV, "o", ms=3, color=BLACK, label="right")
 ax.plot(r_profile / MM, u_profile / MV, color=BLUE, label="profile")
 ax.axhline(np.mean(noise) / MV, color=GREY, ls="--", label="noise of one point")
-ax.set(xlabel="distance from the centre, r (mm)", ylabel="voltage above the baseline (mV)")
+ax.set(xlabel="distance from the axis r (mm)", ylabel="voltage above the baseline (mV)")
 ax.set(yscale="log", xlim=(0, 8.5), ylim=(3e-3, 30))
 ax.legend()
 plt.show()
@@ -376,7 +376,7 @@ top.set(ylabel="$U_{zz}$ (mV)", xlim=(-0.1, 8.5))
 top.legend()
 bottom.axhspan(-2, 2, color=GREY, alpha=0.2, lw=0)
 bottom.plot(distance / MM, residual, "o", ms=3, color=BLUE)
-bottom.set(xlabel="distance from the centre, r (mm)", ylabel="residual / noise")
+bottom.set(xlabel="distance from the axis r (mm)", ylabel="residual / noise")
 plt.show()
 
 print(f"mean square of residual / noise: {np.mean(residual**2):.2f}")
@@ -456,11 +456,11 @@ names = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 sources = list(apparatus.budget["conversion_constant"])
 fig, ax = plt.subplots(figsize=(6.4, 3.4))
 for i, (name, colour) in enumerate(zip(names, (BLACK, ORANGE, BLUE), strict=True)):
-    shares = [100 * apparatus.budget[name].get(source, 0.0) / values[name] for source in sources]
+    shares = [200 * apparatus.budget[name].get(source, 0.0) / values[name] for source in sources]
     ax.barh(np.arange(len(sources)) + 0.27 * (i - 1), shares, height=0.25, color=colour, label=name)
 ax.set_yticks(range(len(sources)), [source.replace("_", " ") for source in sources])
 ax.invert_yaxis()
-ax.set(xlabel="standard uncertainty (% of the value)")
+ax.set(xlabel="uncertainty, k = 2 (% of the value)")
 ax.legend()
 plt.show()
 

@@ -39,7 +39,7 @@ LOADINGS = ("incremental", "total")
 BLACK, BLUE, ORANGE, GREEN, GREY = "black", "#0072B2", "#D55E00", "#009E73", "0.6"
 
 # %matplotlib inline
-plt.rcParams.update({"figure.figsize": (7.2, 3.4), "figure.dpi": 110, "font.size": 9})
+plt.rcParams.update({"figure.figsize": (7.2, 3.4), "figure.dpi": 80, "font.size": 9})
 plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": False})
 
 film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
@@ -70,8 +70,8 @@ for friction, colour in ((0.0, BLUE), (0.3, GREEN), (math.inf, ORANGE)):
     r = np.linspace(0, 8e-3, 400)
     right.plot(r / MM, contact.base_stress(r) / KPA, color=colour)
     right.plot(r / MM, contact.base_shear(r) / KPA, color=colour, ls="--")
-left.set(xlabel="radius, r (mm)", ylabel="at the interface (kPa)")
-right.set(xlabel="radius, r (mm)", ylabel="at the base (kPa)")
+left.set(xlabel="r (mm)", ylabel="stress at the interface (kPa)")
+right.set(xlabel="r (mm)", ylabel="stress at the base (kPa)")
 left.legend(title="friction coefficient")
 fig.suptitle("Pressure (solid) and shear (dashed, positive outward)")
 plt.show()
@@ -216,7 +216,7 @@ for load, colour in ((0.34, GREEN), (1.37, BLUE), (2.75, ORANGE)):
         label = f"{load} N, μ = {name(friction)}"
         for ax in axes:
             ax.plot(radii / MM, s / KPA, style, color=colour, label=label)
-axes[0].set(xlim=(0, 8), ylim=(0, None), xlabel="r (mm)", ylabel="$G \\otimes \\sigma_{zz}$ (kPa)")
+axes[0].set(xlim=(0, 8), ylim=(0, None), xlabel="r (mm)", ylabel="blurred stress S (kPa)")
 axes[1].set(xlim=(0, 8), ylim=(0.05, 200), yscale="log", xlabel="r (mm)")
 axes[0].legend()
 plt.show()
@@ -229,7 +229,7 @@ fig, ax = plt.subplots(figsize=(4.6, 3.4))
 for friction, colour in ((0.0, BLUE), (0.2, GREY), (0.3, GREEN), (math.inf, ORANGE)):
     s = profiles[friction, "incremental"][-1]
     ax.plot(radii / MM, s / KPA, color=colour, label=f"μ = {name(friction)}")
-ax.set(xlim=(0, 6), ylim=(0, None), xlabel="r (mm)", ylabel="$G \\otimes \\sigma_{zz}$ (kPa)")
+ax.set(xlim=(0, 6), ylim=(0, None), xlabel="r (mm)", ylabel="blurred stress S (kPa)")
 ax.legend()
 plt.show()
 

@@ -44,7 +44,7 @@ BLACK, BLUE, ORANGE, GREEN, GREY = "black", "#0072B2", "#D55E00", "#009E73", "0.
 
 # %matplotlib inline
 cache = TemporaryDirectory()  # calculated contacts are kept here while the notebook runs
-plt.rcParams.update({"figure.figsize": (7.2, 3.2), "figure.dpi": 110, "font.size": 9})
+plt.rcParams.update({"figure.figsize": (7.2, 3.2), "figure.dpi": 80, "font.size": 9})
 plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": False})
 
 rod, dry, lubricated = (
@@ -84,7 +84,7 @@ g, u_g = radial.g * MM**2, radial.g_errors * MM**2
 right.fill_between(radial.r / MM, g - 2 * u_g, g + 2 * u_g, color=BLUE, alpha=0.25, lw=0)
 right.plot(radial.r / MM, g, color=BLUE, label="deconvolved G, band k = 2")
 right.plot(radial.r / MM, radial.g_gaussian * MM**2, "--", color=ORANGE, label="Gaussian")
-right.set(xlabel="distance from the axis (mm)", ylabel="G (1/mm²)", xlim=(0, 3))
+right.set(xlabel="distance from the axis r (mm)", ylabel="G (1/mm²)", xlim=(0, 3))
 right.legend()
 plt.show()
 
@@ -135,14 +135,14 @@ for row, (load, colour) in enumerate(zip(shown, (GREEN, BLUE, ORANGE), strict=Tr
             curve = apparatus.convolve(r, contact[load.load].base_stress(r))
             ax.plot(r / MM, curve / KPA, style, color=colour, lw=0.9)
         ax.errorbar(
-            profile.r / MM, profile.s_zz / KPA, profile.s_zz_errors / KPA, fmt="o", ms=2.5, lw=0.7,
-            color=colour, label=f"{load.load:g} N",
+            profile.r / MM, profile.s_zz / KPA, 2 * profile.s_zz_errors / KPA, fmt="o", ms=2.5,
+            lw=0.7, color=colour, label=f"{load.load:g} N",
         )  # fmt: skip
-        ax.set(xlabel="distance from the centre (mm)", xlim=(0, 8))
+        ax.set(xlabel="distance from the axis r (mm)", xlim=(0, 8))
     width = free[load.load].contact_radius / MM
     linear.barh(-3.5 - 3 * row, width, height=2, color=colour)
-linear.set(ylabel="stress at the base (kPa)", ylim=(-12, None))
-linear.legend(title="solid: μ = 0, dashed: μ = ∞")
+linear.set(ylabel="blurred stress S (kPa)", ylim=(-12, None))
+linear.legend(title="bars: k = 2; solid: μ = 0, dashed: μ = ∞")
 logarithmic.set(yscale="log", ylim=(0.05, 200))
 plt.show()
 
@@ -204,12 +204,12 @@ for friction, style, colour in (
 for load, marker, face in ((dry_load, "o", "black"), (wet_load, "s", "white")):
     profile = load.profile
     style = {"fmt": marker, "color": "black", "mfc": face, "ms": 3, "lw": 0.7, "ls": "none"}
-    errors = profile.s_zz_errors / KPA
+    errors = 2 * profile.s_zz_errors / KPA  # k = 2
     left.errorbar(profile.r / MM, profile.s_zz / KPA, errors, label=load.lubrication, **style)
     departure = profile.s_zz - np.interp(profile.r, r, frictionless)
     right.errorbar(profile.r / MM, departure / KPA, errors, **style)
-left.set(xlim=(-0.1, 6), xlabel="distance from the centre (mm)", ylabel="stress at the base (kPa)")
-right.set(xlim=(-0.1, 6), xlabel="distance from the centre (mm)", ylabel="less that of μ = 0 (kPa)")
+left.set(xlim=(-0.1, 6), xlabel="r (mm)", ylabel="blurred stress S (kPa), bars: k = 2")
+right.set(xlim=(-0.1, 6), xlabel="r (mm)", ylabel="less that of μ = 0 (kPa)")
 left.legend()
 plt.show()
 
@@ -247,11 +247,11 @@ for ax, load in zip(axes, dry_loads, strict=True):
     for i, colour in enumerate(colours):
         curve = (load.calculated[i] - load.calculated[0]) / percent
         ax.plot(profile.r / MM, curve, color=colour, label=name(FRICTION[i]))
-    errors = profile.s_zz_errors / percent
+    errors = 2 * profile.s_zz_errors / percent
     departure = (profile.s_zz - load.calculated[0]) / percent
     ax.errorbar(profile.r / MM, departure, errors, fmt="o", ms=2.5, lw=0.7, color=BLACK)
     ax.set(title=f"{load.load:g} N", xlabel="r (mm)", xlim=(-0.1, 5), ylim=(-8, 28))
-axes[0].set_ylabel("difference (%)")
+axes[0].set_ylabel("difference (%), bars: k = 2")
 axes[-1].legend(title="μ", loc="center left", bbox_to_anchor=(1, 0.5))
 plt.show()
 
@@ -278,10 +278,10 @@ def draw_maxima(ax, comparison, loading):
         if of_state:
             ax.errorbar(
                 [load.load for load in of_state], [load.ratio for load in of_state],
-                [load.ratio_uncertainty for load in of_state], fmt="o", ms=4, mfc=face,
+                [2 * load.ratio_uncertainty for load in of_state], fmt="o", ms=4, mfc=face,
                 color="black", capsize=2, lw=0.8, label=state,
             )  # fmt: skip
-    ax.set(title=f"{loading} loading", xlabel="load (N)", ylabel="$S_{max}/p^0_{max}$")
+    ax.set(title=f"{loading} loading", xlabel="load (N)", ylabel="$S_{max}/p^0_{max}$, bars: k = 2")
 
 
 LAWS = ("linear", "neo-hookean")

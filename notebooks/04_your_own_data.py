@@ -44,7 +44,7 @@ MM, MV = 1e-3, 1e-3  # memscal computes in SI units
 # %matplotlib inline
 scratch = TemporaryDirectory()  # where the files of this notebook go
 folder = Path(scratch.name)
-plt.rcParams.update({"figure.figsize": (7.2, 3.0), "figure.dpi": 110, "font.size": 9})
+plt.rcParams.update({"figure.figsize": (7.2, 3.0), "figure.dpi": 80, "font.size": 9})
 plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": False})
 
 # %% [markdown]

@@ -14,6 +14,7 @@ from helpers.bench import Bench
 import memscal
 from memscal.cli import main
 from memscal.cli.commands import memscal as program
+from memscal.cli.compare import figure_stems
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTEBOOKS = DOCS.with_name("notebooks")
@@ -125,3 +126,39 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
     found = memscal.load_apparatus("sensor.apparatus.h5").parameters
     for name in ("conversion_constant", "gaussian_sigma"):
         assert abs(found[name] - scan.synthetic[name]) < 5 * found.uncertainty(name)
+
+
+def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine() -> None:
+    books = {book: book.read_text(encoding="utf-8") for book in NOTEBOOKS.glob("*.ipynb")}
+    for book, text in books.items():
+        assert text.count('"image/png": "') > 3, book.name
+        words = re.sub(r'"image/png": "[^"]*"', "", text)
+        assert set(re.findall(r'"execution_count": (\w+)', words)) == {"null"}
+        local = r"/tmp|/home|/root|/Users|0x[0-9a-f]{6}|\d\d:\d\d:\d\d|\"execution\"|\"version\""
+        assert re.findall(local, words) == []
+    assert sum(len(text) for text in books.values()) < 2e6
+
+
+def test_a_stored_output_differs_by_a_word_a_line_or_more_than_the_last_digit_of_a_number() -> None:
+    differences = runpy.run_path(str(DOCS / "store_notebooks.py"))["differences"]
+    stored = ["A = 1.017e+00 mV", "all checks passed", "x = −3.21"]
+    assert differences(stored, ["A = 1.016e+00 mV", "all checks passed", "x = −3.20"]) == []
+    for line, other in ((0, "A = 1.1 mV"), (1, "all checks failed"), (2, "x = 3.21")):
+        changed = [*stored[:line], other, *stored[line + 1 :]]
+        assert len(differences(stored, changed)) == 1
+    assert len(differences(stored, stored[:2])) == 1
+
+
+def test_every_picture_is_there_with_words_and_made_by_a_command_or_script_of_the_page() -> None:
+    readme = DOCS.with_name("README.md").read_text(encoding="utf-8")
+    page = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[(.+)\]\(images/([\w-]+)\.png\)", page)
+    commands = "".join(re.findall(r"^```console\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
+    assert len(shown) >= 15
+    for words, name in shown:
+        assert len(words) > 20
+        assert f"{name}.png" in commands or name in figure_stems(["dry"], interface=True)
+    stored = {path.stem for path in (DOCS / "images").glob("*.png")}
+    assert stored == {name for _, name in shown} | {"overview"}
+    assert "](docs/images/overview.png)" in readme
+    assert sum(path.stat().st_size for path in (DOCS / "images").iterdir()) < 1.5e6

@@ -51,6 +51,7 @@ def draw_scans(panels: Sequence[Axes], loads: Loads) -> None:
             label = labelled.yaxis.label
             label.set(visible=i == len(panels) // 2, y=0.5 if len(panels) % 2 else 1.0)
             labelled.set_in_layout(labelled is axes)
+            labelled.yaxis.labelpad = 10  # clear of the longer numbers of other panels
     legend_above(panels[0], points=loads[0][1].reconvolution.x.size)
 
 

@@ -46,9 +46,9 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     bins = int(np.clip(2 * np.cbrt(inside.size), 5, _MOST_BINS))
     axes.hist(inside, bins=bins, color=COLOURS["deconvolved"], alpha=0.8)
     axes.axvline(centre, color=COLOURS["measured"], lw=1, label="median")
-    for sign in (-1, 1) if spread > 0 else ():
-        limit, about = centre + sign * ROBUST_LIMIT * spread, "_" if sign > 0 else ""
-        name = f"{about}{ROBUST_LIMIT:g} robust deviations"
+    limits = [centre + sign * ROBUST_LIMIT * spread for sign in (-1, 1)]
+    for i, limit in enumerate(limit for limit in limits if low <= limit <= high):
+        name = f"{'_' * i}{ROBUST_LIMIT:g} robust deviations"
         axes.axvline(limit, color=COLOURS["gaussian"], lw=1, ls="--", label=name)
     if low < high:
         margin = 0.04 * (high - low)
@@ -65,12 +65,13 @@ def _failures(axes: Axes, fleet: FleetResults) -> None:
     axes.set_xlabel("sensors (grey: errors, not calibrated)")
     if not bars:
         axes.text(0.5, 0.5, "no failed check, no error", ha="center", transform=axes.transAxes)
-        axes.set_yticks([])
+        axes.set(xticks=[], yticks=[])
         return
     names, numbers, colours = zip(*bars, strict=True)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.barh(range(len(bars)), numbers, color=[COLOURS[colour] for colour in colours])
     axes.set_yticks(range(len(bars)), [drawable(name) for name in names], fontsize=7)
+    axes.set_ylim(-0.7, max(len(bars), 5) - 0.3)
 
 
 def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:

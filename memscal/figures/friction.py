@@ -14,6 +14,7 @@ from memscal.errors import InputError
 from memscal.figures import friction_profiles as profiles
 from memscal.figures.friction_profiles import friction_name, friction_position, lubricated_words
 from memscal.figures.style import (
+    ALONG_RADIUS,
     COLOURS,
     COVERAGE_NOTE,
     EXPANDED,
@@ -114,7 +115,7 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
 _SHOWN = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, np.inf)
 #: Labels at the ends of curves keep this share of the panel's height apart.
 _APART = 0.045
-_ROOM = 0.22
+_ROOM = 0.26
 
 
 def maxima_figure(comparison: FrictionComparison) -> Figure:
@@ -201,6 +202,7 @@ def comparison_figure(
         best, _ = profiles.fitted_friction(comparison, loads)
         profiles.draw_residuals(panels[1, 0], comparison, loads, best)
         profiles.share_limits([panels[1, 0]])
+        panels[0, 0].set_xlabel(ALONG_RADIUS)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
         draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)

@@ -82,7 +82,7 @@ def fitted_friction(
 ) -> tuple[float, str]:
     """Return the most likely coefficient of all loads together, and its name."""
     joint = comparison.joint[loads[0].lubrication][loads[0].loading]
-    words = "most likely" if joint.value is None else "fitted to all loads"
+    words = "most likely" if joint.value is None else "fitted"
     return joint.best, rf"$\mu_e$ = {friction_name(joint.best)} ({words})"
 
 
@@ -178,6 +178,8 @@ def draw_profiles(
         axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
         for ls, label in styles.items():
             axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
+        pale = mark(loads[0].lubrication, "0.3") | {"ls": "none", "ms": 3.0, "alpha": 2 * _PALE}
+        axes.plot([], [], label="pale: less than 2u", **pale)
     else:
         axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
         axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)

@@ -94,7 +94,8 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison |
         label = "expected"
         if isinstance(compared.stress, Contact):
             friction = compared.stress.friction
-            label = f"calculated, {f'friction {friction:.3g}' if friction else 'no friction'}"
+            of = f"friction {friction:.3g}" if friction else "no friction"
+            label = rf"calculated $\sigma_{{zz}}$, {of}"
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
     many = restored.points.u.size > style.SCATTER_THRESHOLD
     size = 1.2 if many else 0.8 * style.marker_size(restored.points.u.size)

@@ -94,8 +94,7 @@ def new_figure(height: float, note: str = "") -> Figure:
     figure = Figure(figsize=(FIGURE_WIDTH, height + room), layout=layout)
     FigureCanvasAgg(figure)
     if note:
-        line = figure.text(0.01, 0.3 * share, note, color=COLOURS["muted"], fontsize=7)
-        line.set_in_layout(False)
+        figure.text(0.01, 0.3 * share, note, color=COLOURS["muted"], fontsize=7)
     return figure
 
 

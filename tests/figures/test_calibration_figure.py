@@ -40,20 +40,6 @@ def texts(figure):
     return "\n".join(text.get_text() for text in figure.texts)
 
 
-def test_every_axis_names_its_quantity_and_unit(drawn):
-    axes = panels(drawn())
-    units = {
-        "scan": (None, "mV"), "residuals": (None, "$u$"), "scan_log": ("mm", "mV"),
-        "radial": (None, "1/mm$^2$"), "radial_log": ("mm", "1/mm$^2$"),
-        "transfer": ("rad/mm", "(1)"),
-    }  # fmt: skip
-    for name, (along, up) in units.items():
-        assert up in axes[name].get_ylabel()
-        assert not along or f"({along})" in axes[name].get_xlabel()
-    (right,) = axes["scan"].child_axes
-    assert "kPa" in right.get_ylabel()
-
-
 @pytest.mark.parametrize("points", [33, 200])
 def test_the_scan_panel_holds_the_points_and_both_reconvolutions(make_apparatus, drawn, points):
     data = make_apparatus(points=points)
@@ -239,18 +225,6 @@ def test_no_text_above_the_panels_leaves_the_page(drawn, sentence):
     panel_top = max(axes.get_tightbbox(renderer).y1 for axes in panels(figure).values())
     assert all(box.x0 >= 0 and box.x1 <= figure.bbox.width for box in boxes)
     assert all(panel_top <= box.y0 and box.y1 <= figure.bbox.height for box in boxes)
-
-
-@pytest.mark.parametrize("kind", ["line", "radii"])
-def test_legends_lie_outside_the_panels_and_inside_the_page(drawn, kind):
-    figure = drawn(kind, 33)
-    renderer = figure.canvas.get_renderer()
-    named = [axes for axes in panels(figure).values() if axes.get_legend() is not None]
-    assert len(named) > 2
-    for axes in named:
-        box = axes.get_legend().get_window_extent(renderer)
-        assert box.y0 >= axes.bbox.y1 - 1, axes.get_label()
-        assert box.x1 <= figure.bbox.width, axes.get_label()
 
 
 def test_a_raster_is_drawn_against_the_distance_from_its_centre(drawn):

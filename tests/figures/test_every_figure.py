@@ -2,22 +2,21 @@
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from itertools import combinations, starmap
 
 import numpy as np
 import pytest
+from helpers.builders import make_sweep
 from helpers.friction_results import comparison, interface_comparison
 from helpers.paper import FILM, SPHERE
 from helpers.scans import known_apparatus, measured, pressed, sphere_scan
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 import memscal
-from memscal.calibration.sweep import Sweep
 from memscal.cli.compare import figure_stems
 from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import render_figure
@@ -31,16 +30,6 @@ WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 @cache
 def compared() -> memscal.FrictionComparison:
     return comparison(lubrications=STATES, interface=interface_comparison())
-
-
-def swept() -> Sweep:
-    draws = 1e-7 + 1e-10 * np.random.default_rng(1).normal(size=(5, 6))
-    one = np.linspace(1.0, 1.01, 5)
-    return Sweep(
-        amplitude=np.logspace(-1, 1, 5), conversion_constant=1e-7 * one,
-        gaussian_sigma_deconvolved=5e-4 * one, relative_rms=5e-3 * one,
-        seed_conversion_constant=draws, seed_gaussian_sigma=5e3 * draws, seed_relative_rms=draws,
-    )  # fmt: skip
 
 
 def fleet() -> FleetResults:
@@ -65,7 +54,7 @@ FIGURES: dict[str, Callable[..., Figure]] = {
     ).plot(),
     "contacts": lambda _: contacts()[0].plot(beside=contacts()[1:]),
     "design": lambda _: memscal.design(step=0.5e-3, repeats=2).plot(),
-    "sweep": lambda _: swept().plot(),
+    "sweep": lambda _: make_sweep().plot(),
     "fleet": lambda _: fleet().plot(),
     "laws": lambda _: interface_comparison().plot(),
 } | {
@@ -86,26 +75,19 @@ def figure_fixture(request, make_apparatus) -> Figure:
     return figure
 
 
-def shown_texts(figure: Figure) -> Iterator[Text]:
+def words(figure: Figure) -> list[Text]:
     """Texts that are drawn: not the ticks beyond an axis, not what is empty or hidden."""
-    yield from figure.texts
-    for legend in figure.legends:
-        yield from (*legend.get_texts(), legend.get_title())
-    axes: list[Axes] = [each for each in figure.axes if each.axison]
+    texts = list(figure.texts)
+    axes = [each for each in figure.axes if each.axison]
     axes += [child for each in axes for child in each.child_axes]
     for each in axes:
-        yield from (each.title, each._left_title, each._right_title, *each.texts)
-        yield from each.get_legend().get_texts() if each.get_legend() else ()
-        for axis in (each.xaxis, each.yaxis):
-            yield axis.label
-            if axis.get_visible():
-                ticks = axis._update_ticks()
-                yield from (t.label1 for t in ticks if t.label1.get_visible())
-                yield from (t.label2 for t in ticks if t.label2.get_visible())
-
-
-def words(figure: Figure) -> list[Text]:
-    return [t for t in shown_texts(figure) if t.get_visible() and t.get_text().strip()]
+        texts += [each.title, each._left_title, each._right_title, *each.texts]
+        texts += [each.xaxis.label, each.yaxis.label]
+        for axis in (axis for axis in (each.xaxis, each.yaxis) if axis.get_visible()):
+            texts += [label for t in axis._update_ticks() for label in (t.label1, t.label2)]
+    for legend in (*figure.legends, *(each.get_legend() for each in axes if each.get_legend())):
+        texts += [*legend.get_texts(), legend.get_title()]
+    return [text for text in texts if text.get_visible() and text.get_text().strip()]
 
 
 def test_uncertainties_have_one_coverage_factor_which_is_stated(figure: Figure):
@@ -147,12 +129,28 @@ def test_no_text_lies_on_another_or_leaves_the_page(figure: Figure):
     assert [pair for pair in starmap(overlap, combinations(boxes, 2)) if pair] == []
 
 
-def test_an_svg_holds_the_words_as_text(figure: Figure):
+def test_a_legend_lies_above_its_panel(figure: Figure):
+    renderer = figure.canvas.get_renderer()
+    for axes in (each for each in figure.axes if each.get_legend()):
+        assert axes.get_legend().get_window_extent(renderer).y0 >= axes.bbox.y1 - 1
+
+
+def test_an_svg_holds_the_words_as_text_and_refers_to_nothing_outside(figure: Figure):
     root = ET.fromstring(render_figure(figure, "svg"))
-    written = "".join(
-        "".join(each.itertext()) for each in root.iter("{http://www.w3.org/2000/svg}text")
-    )
+    texts = root.iter("{http://www.w3.org/2000/svg}text")
+    written = "".join("".join(each.itertext()) for each in texts)
     plain = [t.get_text() for t in words(figure) if not re.search(r"[$\n]", t.get_text())]
     assert plain
     assert [text for text in plain if text not in written] == []
-    assert "DejaVu Sans" in ET.tostring(root, encoding="unicode")
+    links = [v for each in root.iter() for name, v in each.attrib.items() if name.endswith("href")]
+    assert all(link.startswith(("#", "data:")) for link in links)
+
+
+WITHOUT_UNIT = r"\$u\$|^sensors|in the batch|mu_e\$|ln[ (\\]"
+
+
+def test_the_label_of_an_axis_has_a_unit(figure: Figure):
+    labels = [text for each in figure.axes for text in (each.get_xlabel(), each.get_ylabel())]
+    assert any(labels)
+    for label in filter(None, labels):
+        assert re.search(rf"\(.+\)|{WITHOUT_UNIT}", label), label

@@ -2,29 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers.builders import make_sweep
 
-from memscal.calibration.sweep import Sweep
 from memscal.figures.sweep import sweep_figure
-
-
-def make_sweep(seeds: int = 12, tail: float = 1.0) -> Sweep:
-    rng = np.random.default_rng(5)
-    amplitude = np.logspace(-1, 1, 9)
-    constant = 3e-8 * (1 - 0.002 * amplitude)
-    sigma = 0.55e-3 * (1 + 0.01 * np.log(amplitude))
-    misfit = 0.005 * (1 + 0.05 * amplitude)
-
-    def draws(values):
-        spread = 1 + 0.01 * rng.normal(size=(9, seeds))
-        if seeds:
-            spread[-1, 0] = tail
-        return values[:, None] * spread
-
-    return Sweep(
-        amplitude=amplitude, conversion_constant=constant, gaussian_sigma_deconvolved=sigma,
-        relative_rms=misfit, seed_conversion_constant=draws(constant),
-        seed_gaussian_sigma=draws(sigma), seed_relative_rms=draws(misfit),
-    )  # fmt: skip
 
 
 def line(axes, label):

@@ -7,6 +7,7 @@ import numpy as np
 
 import memscal
 from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
+from memscal.calibration.sweep import Sweep
 from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,
@@ -150,3 +151,24 @@ def make_artifact(**changes: Any) -> ApparatusData:
 def scan_points(scan: Reconvolution, chosen: Any) -> Reconvolution:
     """Return the points with these numbers."""
     return replace(scan, **{n: v[chosen] for n, v in vars(scan).items() if v is not None})
+
+
+def make_sweep(seeds: int = 12, tail: float = 1.0) -> Sweep:
+    """A sweep of known numbers; ``tail`` spoils one draw at the largest amplitude."""
+    rng = np.random.default_rng(5)
+    amplitude = np.logspace(-1, 1, 9)
+    constant = 3e-8 * (1 - 0.002 * amplitude)
+    sigma = 0.55e-3 * (1 + 0.01 * np.log(amplitude))
+    misfit = 0.005 * (1 + 0.05 * amplitude)
+
+    def draws(values):
+        spread = 1 + 0.01 * rng.normal(size=(9, seeds))
+        if seeds:
+            spread[-1, 0] = tail
+        return values[:, None] * spread
+
+    return Sweep(
+        amplitude=amplitude, conversion_constant=constant, gaussian_sigma_deconvolved=sigma,
+        relative_rms=misfit, seed_conversion_constant=draws(constant),
+        seed_gaussian_sigma=draws(sigma), seed_relative_rms=draws(misfit),
+    )  # fmt: skip
