@@ -44,6 +44,7 @@ templates_path = [str(Path(__file__).with_name("templates"))]
 # Notebooks are shown as they are stored: nox --session tests executes them.
 nb_execution_mode = "off"
 nb_output_stderr = "remove"
+nb_render_markdown_format = "myst"  # tables among the outputs
 myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 
