@@ -1,6 +1,7 @@
 """Contents of a certificate of calibration, once for all its forms."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
 from typing import Any, NamedTuple
@@ -19,10 +20,8 @@ from memscal.model.arrays import FloatArray
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, Quantity, parameter_quantity
 
-COVERAGE_FACTOR = 2.0
-"""k of every expanded uncertainty, U = k u."""
-COVERAGE_PROBABILITY = 0.95
-"""About that of a normal distribution within k = 2."""
+COVERAGE_FACTOR, COVERAGE_PROBABILITY = 2.0, 0.95
+"""k of every expanded uncertainty U = k u, and about what a normal distribution has within."""
 
 #: Parameters of the sensor; the others are those of one scan.
 _OF_SENSOR = (
@@ -81,16 +80,11 @@ class Conformity:
 
 
 class CertifiedProfile(NamedTuple):
-    """G at some radii, in SI units: ``r``, ``g`` (n,), and the covariance (n, n)."""
+    """G (n,) at radii ``r`` (n,), with its covariance (n, n), in SI units."""
 
     r: FloatArray
     g: FloatArray
     covariance: FloatArray
-
-    @property
-    def expanded(self) -> FloatArray:
-        """The expanded uncertainties of G, (n,)."""
-        return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,12 +125,9 @@ class Certificate:
     @property
     def accreditation(self) -> str:
         """What the laboratory states of its accreditation, in a sentence."""
-        if stated := self.sections["laboratory"].get("accreditation"):
-            return f"Accreditation, as the laboratory states it: {stated}."
-        return (
-            "This is no accredited certificate: the laboratory states no accreditation for this "
-            "calibration."
-        )
+        stated = self.sections["laboratory"].get("accreditation")
+        none = "This is no accredited certificate: the laboratory states no accreditation for it."
+        return f"Accreditation, as the laboratory states it: {stated}." if stated else none
 
     @property
     def decision(self) -> str:
@@ -144,21 +135,12 @@ class Certificate:
         stated = self.sections.get("decision", {})
         if stated.get("rule") == RULES[0]:
             return "Simple acceptance (JCGM 106:2012, 8.2): the value lies within its tolerance."
-        return (
-            "Guarded acceptance (JCGM 106:2012, 8.3.2): the value lies within its tolerance, and "
-            f"clear of its limits by the guard band w = {stated.get('guard_band', 1.0):g} U."
-        )
+        rule = "Guarded acceptance (JCGM 106:2012, 8.3.2): the value lies within its tolerance"
+        return f"{rule}, and clear of its limits by w = {stated.get('guard_band', 1.0):g} U."
 
 
 def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certificate:
-    """Return the contents of a certificate.
-
-    Raises
-    ------
-    InputError
-        If mandatory fields are missing (all are named), artifact and laboratory's file contradict
-        each other, or the conversion constant is not per pascal.
-    """
+    """Return the contents of a certificate; what is mandatory and missing is all named."""
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
     if missing := [*missing_keys(sections, equipment)]:
@@ -168,7 +150,6 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
             "17025:2017, 7.8.2 and 7.8.4).",
             cure=f"State them in {laboratory.name}, or in the scan (memscal import --lab).",
         )
-    _require_dates(sections["conditions"])
     parameters = apparatus.parameters
     parameters = parameters.only([name for name in _OF_SENSOR if name in parameters])
     values = tuple(
@@ -203,10 +184,12 @@ def _completed(
     sections["sensor"] = {name: getattr(sensor, name) for name in names}
     sections["sensor"]["serial"] = sensor.serial_number
     for key in ("start_time", "end_time"):
-        conditions[key] = held.get(key) or getattr(apparatus, key)
-    if sensor.temperature is not None:
-        measured = Measured(sensor.temperature, sensor.temperature_uncertainty)
-        conditions["temperature"] = measured
+        conditions[key] = ""
+        with suppress(ValueError):  # a scan may state it in any words
+            date.fromisoformat((text := held.get(key) or getattr(apparatus, key))[:10])
+            conditions[key] = text
+    if (t := sensor.temperature) is not None:
+        conditions["temperature"] = Measured(t, sensor.temperature_uncertainty)
     if held["user"].name:
         sections.setdefault("person", {})["operator"] = held["user"].name
     listed = []
@@ -216,19 +199,6 @@ def _completed(
         listed += [{**item, "date": part.certificate_date, "kind": kind}] * any(item.values())
     listed += [dict(item) for item in laboratory.equipment if item.get("kind") not in KINDS]
     return sections, tuple(listed)
-
-
-def _require_dates(conditions: Mapping[str, Any]) -> None:
-    """Refuse times of the measurement that are none, or that run backwards."""
-    times = [conditions[key] for key in ("start_time", "end_time") if conditions[key]]
-    try:
-        dates = [date.fromisoformat(text[:10]) for text in times]
-    except ValueError:
-        dates = []
-    if not dates or dates != sorted(dates):
-        problem = f"The measurement is said to run from {' to '.join(times)}."
-        cure = "State its times in order, like 2026-11-20T09:30:00+01:00."
-        raise InputError(problem, why="A certificate states its date.", cure=cure)
 
 
 def _conformity(

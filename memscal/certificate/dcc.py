@@ -191,25 +191,19 @@ def _artifact(of: Certificate) -> Tree:
 def _conformity(of: Certificate) -> list[Tree]:
     statements: list[Tree] = []
     for item in of.conformity:
-        quantity = item.of.quantity
-        sizes = {
-            "Lower tolerance limit": (item.lower / quantity.scale, quantity.unit),
-            "Upper tolerance limit": (item.upper / quantity.scale, quantity.unit),
-            "Guard band": (item.guard_band / quantity.scale, quantity.unit),
-            "Conformance probability": (item.probability, "1"),
-        }
-        quantities = [
-            {"name": _words(name), "si:real": _real(*size)}
-            for name, size in sizes.items()
-            if np.isfinite(size[0])
-        ]
+        unit, scale = item.of.quantity.unit, item.of.quantity.scale
+        limits = {"Lower": item.lower, "Upper": item.upper}
+        sizes = {f"{k} tolerance limit": v for k, v in limits.items() if np.isfinite(v)}
+        sizes |= {"Guard band": item.guard_band}
+        named = [{"name": _words(k), "si:real": _real(v / scale, unit)} for k, v in sizes.items()]
+        p = {"name": _words("Conformance probability"), "si:real": _real(item.probability, "1")}
         statements.append(
             {
-                "name": _words(f"Conformity of the {quantity.words}"),
+                "name": _words(f"Conformity of the {item.of.quantity.words}"),
                 "norm": "JCGM 106:2012",
                 "declaration": _words(f"Decision rule: {of.decision}"),
                 "conformity": "pass" if item.accepted else "noPass",
-                "data": {"quantity": quantities},
+                "data": {"quantity": [*named, p]},
             }
         )
     return statements

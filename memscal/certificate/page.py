@@ -30,6 +30,9 @@ _FONTS = "'Liberation Sans', Arial, Helvetica, 'DejaVu Sans', sans-serif"
 def certificate_page(of: Certificate) -> str:
     """Return a certificate as a self-contained HTML page; what came from files is escaped."""
     laboratory, person = of.sections["laboratory"], of.sections["person"]
+    t, h = (of.sections["conditions"][key] for key in ("temperature", "humidity"))
+    keys = ("name", "serial", "certificate", "date")
+    heads = ("Instrument", "Serial number", "Certificate", "Date of certificate")
     alt = "G(r) with its expanded uncertainty as a band; the numbers are in the table beside it."
     caption = "G(r); band ± U (k = 2)."
     texts = {
@@ -43,15 +46,16 @@ def certificate_page(of: Certificate) -> str:
         "accreditation": of.accreditation,
         "setting": _setting(of),
         "origin": _origin(of),
-        "conditions": _conditions(of),
+        "celsius": _expanded(t.value - ZERO_CELSIUS, t.uncertainty, 1.0, "°C"),
+        "humidity": _expanded(h.value, h.uncertainty, 0.01, "%"),
         "resolved": f"{of.apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
     }
     blocks = {
         "fonts": _FONTS,
         "laboratory_css": "".join(map(_css, laboratory["name"])),
-        "warnings": "\n".join(f'<p class="note failed">{escape(t)}</p>' for t in of.warnings),
+        "warnings": "\n".join(f'<p class="note failed">{escape(text)}</p>' for text in of.warnings),
         "facts": _facts(of),
-        "equipment": _equipment(of),
+        "equipment": _table("", "", heads, [[i[key] for key in keys] for i in of.equipment]),
         "values": _values(of),
         "profile": _profile(of),
         "figure": html_figures([Picture(lambda: radial_figure(of.apparatus), alt, caption)]),
@@ -130,20 +134,6 @@ def _origin(of: Certificate) -> str:
     return f"{checks} Artifact: content digest {data.content_digest}.{scan}"
 
 
-def _equipment(of: Certificate) -> str:
-    keys = ("name", "serial", "certificate", "date")
-    rows = [[item[key] for key in keys] for item in of.equipment]
-    head = ("Instrument", "Serial number", "Certificate", "Date of certificate")
-    return _table("", "", head, rows)
-
-
-def _conditions(of: Certificate) -> str:
-    t, humidity = (of.sections["conditions"][key] for key in ("temperature", "humidity"))
-    celsius = _expanded(t.value - ZERO_CELSIUS, t.uncertainty, 1.0, "°C")
-    percent = _expanded(humidity.value, humidity.uncertainty, 0.01, "%")
-    return f"Temperature {celsius}; relative humidity {percent} (± U, k = 2)."
-
-
 def _values(of: Certificate) -> str:
     rows = []
     for i, (value, correlations) in enumerate(zip(of.values, of.correlation, strict=True)):
@@ -165,9 +155,10 @@ def _values(of: Certificate) -> str:
 
 
 def _profile(of: Certificate) -> str:
+    expanded = COVERAGE_FACTOR * np.sqrt(np.diag(of.profile.covariance))
     rows = [
         (f"{r / MM:.4g}", format_measured(g / PER_MM2, u / PER_MM2))
-        for r, g, u in zip(of.profile.r, of.profile.g, of.profile.expanded, strict=True)
+        for r, g, u in zip(of.profile.r, of.profile.g, expanded, strict=True)
     ]
     return _table("numbers", "", ("r in mm", "G(r) ± U in 1/mm² (k = 2)"), rows)
 

@@ -37,10 +37,9 @@ def command(
 ) -> int:
     """Write a certificate of calibration, if nothing that is mandatory is missing.
 
-    Who calibrated what for whom, with which equipment and when; the values with expanded
-    uncertainties (k = 2), their correlations and budget; G(r); and, if the laboratory's file gives
-    tolerances, a statement of conformity by its decision rule. It is no accredited certificate
-    unless that file states an accreditation.
+    Values with expanded uncertainties (k = 2), correlations, G(r) and budget; and, if the
+    laboratory's file gives tolerances, a statement of conformity by its decision rule. It is no
+    accredited certificate unless that file states an accreditation.
     """
     out.prove_writable(outputs, force=force, inputs=[artifact, laboratory])
     from memscal.apparatus import load_apparatus
@@ -65,8 +64,8 @@ def command(
             {"name": of.of.quantity.name, "conforms": of.accepted, "probability": of.probability}
             for of in certificate.conformity
         ]
-        head = {"schema_version": "1", "outputs": [str(path) for path in outputs]}
-        out.emit_json({**head, **result, "conformity": decided})
+        written = {"schema_version": "1", "outputs": [str(path) for path in outputs]}
+        out.emit_json({**written, **result, "conformity": decided})
     else:
         words = [(of.of.quantity.words, of.statement) for of in certificate.conformity]
         out.emit_tables(Table("Certificate", ("", ""), [*result.items(), *words]))

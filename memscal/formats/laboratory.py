@@ -109,10 +109,9 @@ class LaboratoryFile:
         for name in [name for name in added if getattr(part, name) not in ("", None)]:
             held, value = getattr(part, name), added.pop(name)
             if held != value:
+                what = f"{name} of the {subject}".replace("_", " ")
                 raise InputError(
-                    f"The {name} of the {subject} is {value!r} in {self.name}, but {held!r} in the "
-                    "scan or artifact.".replace("_", " "),
-                    why="Both describe one measurement.",
+                    f"The {what} is {value!r} in {self.name}, {held!r} in the scan or artifact.",
                     cure="Correct one of them, or leave it out of the laboratory's file.",
                 )
         return added

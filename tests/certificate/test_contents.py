@@ -16,19 +16,10 @@ from memscal.model.quantities import ESTIMATED
 LIMITS = "conversion_constant"
 
 
-def without(laboratory: LaboratoryFile, section: str, key: str) -> LaboratoryFile:
-    """The file without a key, of equipment without that of the first instrument."""
-    if section == "equipment":
-        first, *others = laboratory.equipment
-        return replace(
-            laboratory, equipment=({k: v for k, v in first.items() if k != key}, *others)
-        )
-    kept = {k: v for k, v in laboratory.sections[section].items() if k != key}
-    return replace(laboratory, sections={**laboratory.sections, section: kept})
-
-
 def stating(laboratory: LaboratoryFile, section: str, **values: object) -> LaboratoryFile:
-    changed = {**laboratory.sections[section], **values}
+    """The file with other values, or without those that are ``None``."""
+    held = {**laboratory.sections[section], **values}
+    changed = {key: value for key, value in held.items() if value is not None}
     return replace(laboratory, sections={**laboratory.sections, section: changed})
 
 
@@ -44,40 +35,40 @@ def test_an_empty_file_is_refused_with_every_mandatory_field_by_name(apparatus):
 
 @pytest.mark.parametrize(("section", "key"), [(s, key) for s in NEEDED for key in NEEDED[s]])
 def test_one_mandatory_field_that_is_missing_is_named_alone(apparatus, laboratory, section, key):
-    with pytest.raises(InputError) as refusal:
-        certify(apparatus, without(laboratory, section, key))
     place = "[[equipment]] 1" if section == "equipment" else f"[{section}]"
+    if section == "equipment":
+        first, *others = laboratory.equipment
+        changed = replace(laboratory, equipment=({**first, key: ""}, *others))
+    else:
+        changed = stating(laboratory, section, **{key: None})
+    with pytest.raises(InputError) as refusal:
+        certify(apparatus, changed)
     assert f"lacks 1 mandatory fields: {place} {key}." in refusal.value.problem
 
 
 def test_what_the_artifact_states_need_not_be_in_the_file(apparatus, laboratory, certificate):
     stated = replace(apparatus, **laboratory.additions(apparatus))
-    bare = LaboratoryFile("lab.toml", {
-        **laboratory.sections, "sensor": {}, "conditions": {
-            "humidity": laboratory.stated("conditions", "humidity"),
-        },
-    }, laboratory.equipment[2:])  # fmt: skip
-    made = certify(stated, bare)
+    humidity = {"humidity": laboratory.stated("conditions", "humidity")}
+    sections = {**laboratory.sections, "sensor": {}, "conditions": humidity}
+    made = certify(stated, LaboratoryFile("lab.toml", sections, laboratory.equipment[2:]))
     assert made.sections == certificate.sections
     assert made.equipment == certificate.equipment
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"sensor": memscal.StressSensor(serial_number="2")}, "'2' in the scan or artifact"),
+    ({"sensor": memscal.StressSensor(serial_number="2_2")}, "'2_2' in the scan or artifact"),
     ({"start_time": "2001-01-01T00:00:00Z"}, "start time of the measurement"),
     ({"user": memscal.User(affiliation="another laboratory")}, "affiliation of the user"),
 ])  # fmt: skip
-def test_an_artifact_that_says_otherwise_than_the_file_is_refused(
-    apparatus, laboratory, changes, words
-):
+def test_contradictions_of_artifact_and_file_are_refused(apparatus, laboratory, changes, words):
     with pytest.raises(InputError, match=words):
         certify(replace(apparatus, **changes), laboratory)
 
 
-@pytest.mark.parametrize(("begin", "end"), [("on Monday", ""), ("2026-02-03", "2026-02-02")])
-def test_times_that_are_none_or_run_backwards_are_refused(apparatus, laboratory, begin, end):
-    with pytest.raises(InputError, match=f"from {begin}"):
-        certify(apparatus, stating(laboratory, "conditions", start_time=begin, end_time=end))
+def test_a_time_in_other_words_than_iso_8601_counts_as_missing(apparatus, laboratory):
+    told = replace(apparatus, start_time="on Monday")
+    with pytest.raises(InputError, match=r"\[conditions\] start_time"):
+        certify(told, stating(laboratory, "conditions", start_time=None))
 
 
 def test_an_artifact_without_pascals_gets_no_certificate(laboratory):
@@ -86,30 +77,26 @@ def test_an_artifact_without_pascals_gets_no_certificate(laboratory):
         certify(relative, laboratory)
 
 
-def test_the_number_is_that_of_the_artifact_unless_the_file_gives_one(
-    apparatus, laboratory, certificate
-):
+def test_the_number_is_the_artifact_s_unless_the_file_gives_one(apparatus, laboratory, certificate):
     assert certificate.number == "EXAMPLE-" + apparatus.content_digest[:10].upper()
-    other = certify(replace(apparatus, load=2.0), laboratory)
-    assert other.number != certificate.number
+    assert certify(replace(apparatus, load=2.0), laboratory).number != certificate.number
     given_one = stating(laboratory, "laboratory", number="2026/17")
     assert certify(apparatus, given_one).number == "2026/17"
 
 
 def test_values_and_profile_are_those_of_the_artifact(apparatus, certificate):
-    parameters = apparatus.parameters
     for value in certificate.values:
-        assert value.value == parameters[value.quantity.name]
-        assert value.expanded == 2 * parameters.uncertainty(value.quantity.name)
+        assert value.value == apparatus.parameters[value.quantity.name]
+        assert value.expanded == 2 * apparatus.parameters.uncertainty(value.quantity.name)
     np.testing.assert_allclose(np.diag(certificate.correlation), 1.0)
     assert np.all(np.abs(certificate.correlation) <= 1 + 1e-12)
-    profile = certificate.profile
-    np.testing.assert_allclose(profile.g, apparatus.radial(profile.r), rtol=1e-9)
+    r, g, covariance = certificate.profile
+    np.testing.assert_allclose(g, apparatus.radial(r), rtol=1e-9)
     # The band between radii is interpolated here by its covariance, there by itself.
-    expected = 2 * apparatus.radial_uncertainty(profile.r)
-    np.testing.assert_allclose(profile.expanded, expected, rtol=0.02)
-    assert 5 <= profile.r.size <= 13
-    assert apparatus.radial(profile.r[-1]) < 0.03 * apparatus.radial(0.0)
+    errors = apparatus.radial_uncertainty(r)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), errors, rtol=0.02)
+    assert 5 <= r.size <= 13
+    assert apparatus.radial(r[-1]) < 0.03 * apparatus.radial(0.0)
 
 
 def conformity(y: float, u: float, lower: float, upper: float, guard: float = 0.0) -> Conformity:
@@ -126,14 +113,10 @@ def test_the_conformance_probability_is_that_of_a_normal_distribution(y, lower, 
     assert conformity(y, 0.1, lower, upper).probability == pytest.approx(expected, abs=1e-8)
 
 
-NUMBERS = st.floats(-10, 10)
-
-
-@given(NUMBERS, st.floats(1e-3, 3), NUMBERS, st.floats(0, 10))
+@given(st.floats(-10, 10), st.floats(1e-3, 3), st.floats(-10, 10), st.floats(0, 10))
 def test_what_is_accepted_with_a_guard_band_of_U_conforms_with_95_percent(y, u, lower, width):
     item = conformity(y, u, lower, lower + width, guard=2 * u)
-    if item.accepted:
-        assert item.probability >= 0.9544
+    assert not item.accepted or item.probability >= 0.9544
     assert replace(item, guard_band=0.0).accepted == (lower <= y <= lower + width)
 
 
@@ -157,8 +140,5 @@ def test_the_decision_is_that_of_its_rule(apparatus, laboratory, rule, factor, u
     ({LIMITS: {"lower": 1.0}}, "has no unit"),
 ])  # fmt: skip
 def test_limits_that_cannot_be_decided_on_are_refused(apparatus, laboratory, changes, words):
-    changed = stating(laboratory, "decision", **changes)
-    if changes.get("rule", "") is None:
-        changed = without(laboratory, "decision", "rule")
     with pytest.raises(InputError, match=words):
-        certify(apparatus, changed)
+        certify(apparatus, stating(laboratory, "decision", **changes))

@@ -17,8 +17,8 @@ from memscal.model.checks import QualityCheck
 NO_ACCREDITATION = "This is no accredited certificate"
 
 
-def text_of(page: str) -> str:
-    return re.sub(r"<[^>]+>", " ", page.partition("<body>")[2])
+def text_of(certificate: Certificate) -> str:
+    return re.sub(r"<[^>]+>", " ", certificate_page(certificate).partition("<body>")[2])
 
 
 def stating(certificate: Certificate, section: str, **values: str) -> Certificate:
@@ -27,39 +27,27 @@ def stating(certificate: Certificate, section: str, **values: str) -> Certificat
 
 
 @pytest.fixture(scope="module")
-def pdf(certificate: Certificate) -> bytes:
-    return certificate_pdf(certificate, certificate_page(certificate), certificate_xml(certificate))
-
-
-@pytest.fixture(scope="module")
-def reader(pdf: bytes) -> pypdf.PdfReader:
-    return pypdf.PdfReader(io.BytesIO(pdf))
+def reader(certificate: Certificate) -> pypdf.PdfReader:
+    page, xml = certificate_page(certificate), certificate_xml(certificate)
+    return pypdf.PdfReader(io.BytesIO(certificate_pdf(certificate, page, xml)))
 
 
 def test_the_page_states_every_value_of_the_file_and_ends_with_its_mark(certificate):
-    text = text_of(certificate_page(certificate))
-    stated = [certificate.number, certificate.issued]
+    text, stated = text_of(certificate), [certificate.number, certificate.issued]
     for section in ("laboratory", "customer", "person", "sensor"):
         stated += [v for k, v in certificate.sections[section].items() if k != "prefix"]
     for item in certificate.equipment:
         stated += [item[key] for key in ("name", "serial", "certificate", "date")]
+    # A = 1.01731(177)e-4 mV/Pa and σ = 0.5596(145) mm with k = 1 in the shipped artifact.
+    stated += ["(1.017 ± 0.035)×10⁻⁴ mV/Pa", "(0.560 ± 0.029) mm", "y ± U (k = 2)"]
+    stated += ["(23.00 ± 0.60) °C", "(45.0 ± 6.0) %"]
     assert [value for value in stated if value not in text] == []
-    assert "(23.00 ± 0.60) °C" in text
-    assert "(45.0 ± 6.0) %" in text
     assert text.strip().endswith(f"— End of certificate {certificate.number} —")
 
 
-def test_the_values_have_their_expanded_uncertainties(certificate):
-    # A = 1.01731(177)e-4 mV/Pa and σ = 0.5596(145) mm with k = 1 in the shipped artifact.
-    text = text_of(certificate_page(certificate))
-    for shown in ("(1.017 ± 0.035)×10⁻⁴ mV/Pa", "(0.560 ± 0.029) mm", "y ± U (k = 2)"):
-        assert shown in text
-
-
 def test_it_is_no_accredited_certificate_unless_the_laboratory_says_otherwise(certificate):
-    assert NO_ACCREDITATION in text_of(certificate_page(certificate))
-    accredited = stating(certificate, "laboratory", accreditation="body X, number 5")
-    text = text_of(certificate_page(accredited))
+    assert NO_ACCREDITATION in text_of(certificate)
+    text = text_of(stating(certificate, "laboratory", accreditation="body X, number 5"))
     assert NO_ACCREDITATION not in text
     assert "as the laboratory states it: body X, number 5" in text
 
@@ -74,11 +62,10 @@ def test_hostile_names_stay_text(certificate):
 
 
 def test_synthetic_data_and_failed_checks_are_said_first(apparatus, laboratory, certificate):
-    assert "SYNTHETIC DATA" in text_of(certificate_page(certificate))[:600]
+    assert "SYNTHETIC DATA" in text_of(certificate)[:600]
     failed = QualityCheck("symmetry", 2.0, 1.0, False, "Left and right differ.")
     process = replace(apparatus.process, messages=())
-    changed = replace(apparatus, checks=(failed,), process=process)
-    text = text_of(certificate_page(certify(changed, laboratory)))
+    text = text_of(certify(replace(apparatus, checks=(failed,), process=process), laboratory))
     assert "SYNTHETIC" not in text
     assert "checks of the calibration that failed: symmetry." in text[:600]
 
@@ -88,9 +75,8 @@ def test_the_pdf_has_two_pages_of_a4_with_the_number_on_each(reader, certificate
     for i, page in enumerate(reader.pages, 1):
         assert [float(x) for x in page.mediabox[2:]] == pytest.approx([595.28, 841.89], abs=0.1)
         text = page.extract_text()
-        assert f"Certificate {certificate.number}" in text
-        assert f"Page {i} of 2" in text
-        assert "SYNTHETIC DATA: NOTHING WAS MEASURED" in text
+        said = (f"Certificate {certificate.number}", f"Page {i} of 2", "NOTHING WAS MEASURED")
+        assert [words for words in said if words not in text] == []
 
 
 def test_the_pdf_is_a_tagged_pdf_a_3_with_embedded_fonts(reader):
@@ -100,15 +86,11 @@ def test_the_pdf_is_a_tagged_pdf_a_3_with_embedded_fonts(reader):
     assert re.search(r"pdfaid:conformance(=\"|>)A", xmp)
     assert catalog["/MarkInfo"]["/Marked"]
     assert catalog["/Lang"] == "en"
-    assert catalog["/OutputIntents"]
-    assert "/StructTreeRoot" in catalog
-    fonts = [
-        font.get_object()["/DescendantFonts"][0].get_object()["/FontDescriptor"].get_object()
-        for page in reader.pages
-        for font in page["/Resources"]["/Font"].values()
-    ]
-    assert fonts
-    assert all({"/FontFile2", "/FontFile3"} & set(font) for font in fonts)
+    assert {"/OutputIntents", "/StructTreeRoot"} <= set(catalog)
+    fonts = [font for page in reader.pages for font in page["/Resources"]["/Font"].values()]
+    inner = [font.get_object()["/DescendantFonts"][0].get_object() for font in fonts]
+    described = [font["/FontDescriptor"].get_object() for font in inner]
+    assert all({"/FontFile2", "/FontFile3"} & set(font) for font in described)
 
 
 def test_the_pdf_holds_the_same_xml_as_its_alternative(reader, certificate):
@@ -125,11 +107,10 @@ def test_the_same_contents_and_date_give_the_same_bytes(apparatus, laboratory, m
     made = []
     for _ in range(2):
         certificate = certify(apparatus, laboratory)
-        assert certificate.issued == "2026-01-01"
         page, xml = certificate_page(certificate), certificate_xml(certificate)
         made.append((page, xml, certificate_pdf(certificate, page, xml)))
     assert made[0] == made[1]
-    assert b"2026-01-01" in made[0][1]
+    assert b">2026-01-01<" in made[0][1]
 
 
 def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
@@ -142,13 +123,12 @@ def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
     assert certificate_pdf(certificate, page, b"<a/>").startswith(b"%PDF")
 
 
-def test_other_scans_get_certificates_of_two_pages_too(laboratory):
-    scan = memscal.simulate(load=(0.1, 1.0), points=33, seed=3)
-    bare = replace(scan, sensor=memscal.StressSensor(), unit="A")
+def test_scans_at_several_loads_in_another_unit_get_two_pages_too(laboratory):
+    scan = replace(memscal.simulate(load=(0.1, 1.0), points=33, seed=3), unit="A")
+    bare = memscal.calibrate(replace(scan, sensor=memscal.StressSensor())).apparatus
     kept = {k: v for k, v in laboratory.sections.items() if k != "decision"}
-    made = certify(memscal.calibrate(bare).apparatus, replace(laboratory, sections=kept))
-    page = certificate_page(made)
-    assert "loads 0.1 to 1 N" in text_of(page)
-    assert "No statement of conformity was agreed." in text_of(page)
-    pages = pypdf.PdfReader(io.BytesIO(certificate_pdf(made, page, certificate_xml(made)))).pages
-    assert len(pages) == 2
+    made = certify(bare, replace(laboratory, sections=kept))
+    assert "loads 0.1 to 1 N" in text_of(made)
+    assert "No statement of conformity was agreed." in text_of(made)
+    pdf = certificate_pdf(made, certificate_page(made), certificate_xml(made))
+    assert len(pypdf.PdfReader(io.BytesIO(pdf)).pages) == 2

@@ -1,6 +1,7 @@
 """``memscal certificate``."""
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,40 +23,33 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
 def test_one_certificate_is_written_in_all_its_forms(run: Run, inputs):
     outputs = ("-o", "c.html", "-o", "c.pdf", "-o", "c.xml")
     made = run("certificate", *inputs, *outputs).exits(0, "Written: c.html, c.pdf, c.xml")
-    assert "EXAMPLE-" in made.out
     assert "conversion constant  conforms" in made.out
     begins = {"c.html": b"<!DOCTYPE html>", "c.pdf": b"%PDF-1.7", "c.xml": b"<?xml"}
-    for name, begin in begins.items():
-        assert Path(name).read_bytes().startswith(begin)
-
-
-def test_the_json_has_the_number_and_the_decision(run: Run, inputs):
-    made = run("certificate", *inputs, "-o", "c.xml", "--json").exits(0).json
+    assert [n for n, begin in begins.items() if not Path(n).read_bytes().startswith(begin)] == []
+    run("certificate", *inputs, "-o", "c.xml").exits(4, "c.xml")
+    made = run("certificate", *inputs, "-o", "c.xml", "--force", "--json").exits(0).json
     assert made["number"].encode() in Path("c.xml").read_bytes()
     (item,) = made["conformity"]
     assert (item["name"], item["conforms"]) == ("conversion_constant", True)
-    run("certificate", *inputs, "-o", "c.xml").exits(4, "c.xml")
 
 
 def test_missing_fields_are_all_named_and_nothing_is_written(run: Run, inputs):
     Path("lab.toml").write_text('[laboratory]\nname = "a"\n', "utf-8")
-    refused = run("certificate", *inputs, "-o", "c.pdf").exits(3, "lab.toml")
-    for key in ("[laboratory] city", "[customer] name", "[person] role", "[sensor] serial",
-                "[conditions] humidity", "[conditions] start_time", "load cell"):  # fmt: skip
-        assert key in refused.err
+    refused = run("certificate", *inputs, "-o", "c.pdf").exits(3, "lab.toml", "load cell")
+    keys = "[laboratory] city", "[customer] name", "[sensor] serial", "[conditions] start_time"
+    assert [key for key in keys if key not in refused.err] == []
     assert names(Path()) == ["lab.toml", "scan.apparatus.h5"]
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
-    (("-o", "c.txt"), 2, "'c.txt' does not end in .html, .pdf, .xml"),
-    (("-o", "lab.toml.xml", "-o", "lab.toml.xml"), 2, "same name"), ((), 2, "--output"),
-    (("-o", "nowhere/c.xml"), 4, "nowhere"),
+    (("-o", "c.txt"), 2, "'c.txt' does not end in .html, .pdf, .xml"), ((), 2, "--output"),
+    (("-o", "a.xml", "-o", "a.xml"), 2, "same name"), (("-o", "nowhere/c.xml"), 4, "nowhere"),
 ])  # fmt: skip
 def test_wrong_outputs_are_refused_first(run: Run, inputs, arguments, code, words):
     run("certificate", *inputs, *arguments).exits(code, words)
 
 
 def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run: Run, inputs, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "weasyprint", None)
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
     run("certificate", *inputs, "-o", "c.pdf").exits(3, "memscal[certificate]")
     run("certificate", *inputs, "-o", "c.html").exits(0)
