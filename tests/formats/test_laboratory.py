@@ -104,7 +104,7 @@ def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_pa
 
 def test_a_scan_that_says_otherwise_than_the_file_is_refused(tmp_path: Path, capsys):
     assert imported(tmp_path, "--sensor-name", "another") == 3
-    assert "name of the sensor is 'example sensor'" in capsys.readouterr().err
+    assert "name of the sensor is 'a simulated sensor'" in capsys.readouterr().err
 
 
 def test_the_file_belongs_to_scans_and_is_not_written_over(tmp_path: Path):
@@ -117,5 +117,5 @@ def test_a_simulated_rod_scan_takes_the_file_and_an_experiment_does_not(tmp_path
     path = tmp_path / "scan.h5"
     assert main(["simulate", "-o", str(path), "--points", "9", "--lab", str(SHIPPED)]) == 0
     assert memscal.read_scan(path).load_cell.serial_number == "LC-PLACEHOLDER"
-    assert memscal.read_scan(path).sensor.name == "example sensor"
+    assert memscal.read_scan(path).sensor.name == "a simulated sensor"
     assert main(["simulate", "--experiment", "sphere", "--lab", str(SHIPPED)]) == 2
