@@ -136,7 +136,8 @@ class Certificate:
         if stated.get("rule") == RULES[0]:
             return "Simple acceptance (JCGM 106:2012, 8.2): the value lies within its tolerance."
         rule = "Guarded acceptance (JCGM 106:2012, 8.3.2): the value lies within its tolerance"
-        return f"{rule}, and clear of its limits by w = {stated.get('guard_band', 1.0):g} U."
+        band = f"the guard band w = {stated.get('guard_band', 1.0):g} U"
+        return f"{rule}, and clear of its limits by {band}."
 
 
 def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certificate:
