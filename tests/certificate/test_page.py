@@ -27,7 +27,7 @@ def stating(certificate: Certificate, section: str, **values: str) -> Certificat
 
 
 @pytest.fixture(scope="module")
-def reader(certificate: Certificate) -> pypdf.PdfReader:
+def reader(certificate: Certificate, pango: None) -> pypdf.PdfReader:
     page, xml = certificate_page(certificate), certificate_xml(certificate)
     return pypdf.PdfReader(io.BytesIO(certificate_pdf(certificate, page, xml)))
 
@@ -102,6 +102,7 @@ def test_the_pdf_holds_the_same_xml_as_its_alternative(reader, certificate):
     assert held.get_data() == certificate_xml(certificate)
 
 
+@pytest.mark.usefixtures("pango")
 def test_the_same_contents_and_date_give_the_same_bytes(apparatus, laboratory, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1767225600")
     made = []
@@ -113,6 +114,7 @@ def test_the_same_contents_and_date_give_the_same_bytes(apparatus, laboratory, m
     assert b">2026-01-01<" in made[0][1]
 
 
+@pytest.mark.usefixtures("pango")
 def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
     def refuse(*_: object) -> None:
         raise AssertionError("a connection was asked for")
@@ -123,6 +125,7 @@ def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
     assert certificate_pdf(certificate, page, b"<a/>").startswith(b"%PDF")
 
 
+@pytest.mark.usefixtures("pango")
 def test_scans_at_several_loads_in_another_unit_get_two_pages_too(laboratory):
     scan = replace(memscal.simulate(load=(0.1, 1.0), points=33, seed=3), unit="A")
     bare = memscal.calibrate(replace(scan, sensor=memscal.StressSensor())).apparatus

@@ -19,6 +19,7 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     return ("scan.apparatus.h5", "--lab", "lab.toml")
 
 
+@pytest.mark.usefixtures("pango")
 def test_one_certificate_is_written_in_all_its_forms(run: Run, inputs):
     outputs = ("-o", "c.html", "-o", "c.pdf", "-o", "c.xml")
     made = run("certificate", *inputs, *outputs).exits(0, "Written: c.html, c.pdf, c.xml")
