@@ -2,7 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import combinations, starmap
 
@@ -19,7 +19,7 @@ from matplotlib.transforms import Bbox
 import memscal
 from memscal.cli.compare import figure_stems
 from memscal.figures.calibration import calibration_figure
-from memscal.figures.style import render_figure
+from memscal.figures.style import house_style, render_figure
 from memscal.model.fleet import FleetResults
 
 STATES = ("dry", "lubricated")
@@ -68,11 +68,12 @@ def contacts() -> list[memscal.Contact]:
 
 
 @pytest.fixture(name="figure", scope="module", params=FIGURES)
-def figure_fixture(request, make_apparatus) -> Figure:
+def figure_fixture(request, make_apparatus) -> Iterator[Figure]:
     figure = FIGURES[request.param](make_apparatus)
     figure.set_label(request.param)
-    figure.draw_without_rendering()
-    return figure
+    with house_style():  # as it is rendered: the number of ticks depends on their size
+        figure.draw_without_rendering()
+        yield figure
 
 
 def words(figure: Figure) -> list[Text]:
