@@ -290,11 +290,12 @@ class TextTable(NamedColumns):
         apart = sheet or f"{apart}, with a decimal {mark}"
         line, headed = self._header
         units = ", a row of units below it" if self._unit_row else ""
+        found = headed and bool(units or not all(map(_is_comment, self._said)))
         self.notes = (
             f"Imported from {self._name} (sha256 {sha256}).",
             *["The table is not UTF-8; it was read as Latin-1."] * self._latin,
             *self._sayings(),
-            *[f"The header is {self._row} {line}{units}."] * (headed and line > bool(not units)),
+            *[f"The header is {self._row} {line}{units}."] * found,
             f"Read {count} rows of {self._width} columns {apart}.",
         )
 
