@@ -17,7 +17,6 @@ from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
-from memscal.measurement.single_loads import load_of, single_loads
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
@@ -182,7 +181,7 @@ def measure_stress(
     for data in scans:
         require_span(data)
     origins = tuple(one_load.measured_scan(data) for data in scans)
-    singles = [single_loads(data) for data in scans]
+    singles = [restore.single_loads(data) for data in scans]
     for single in chain(*singles):
         restore.require_contact_size(single, MOST_OF_CONTACT)
     loads = (
@@ -287,7 +286,7 @@ def _prepared(
 
 
 def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
-    problem = f"{load_of(scan)}: {failure.problem}"
+    problem = f"{restore.load_of(scan)}: {failure.problem}"
     return type(failure)(problem, why=failure.why, cure=failure.cure)
 
 

@@ -27,8 +27,7 @@ from memscal.measurement.posterior import (
     shared_changes,
 )
 from memscal.measurement.restoration import Restoration
-from memscal.measurement.restore import gaussian_pressure, plain_pressure
-from memscal.measurement.single_loads import load_of
+from memscal.measurement.restore import gaussian_pressure, load_of, plain_pressure
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
 from memscal.model.correlation import scaled

@@ -67,7 +67,7 @@ def answer(result: Calibrated) -> str:
     by = f" (method {method})" if method else ""
     a = measured_text(parameters, "conversion_constant")
     a = a.replace("(relative)", "(relative: the load is not known)")
-    return f"Use A = {a}{by}. {verdict(apparatus.checks)}\n{which}{_of_the_law(apparatus)}"
+    return f"{_of_the_law(apparatus)}Use A = {a}{by}. {verdict(apparatus.checks)}\n{which}"
 
 
 def _of_the_law(apparatus: ApparatusData) -> str:
@@ -79,8 +79,8 @@ def _of_the_law(apparatus: ApparatusData) -> str:
     if not dominated or apparatus.film is None or apparatus.film.law:
         return ""
     return (
-        "\nThe film's law, which is not stated, dominates the uncertainty: it makes up "
-        f"{' and '.join(dominated)}."
+        "The film's law, which is not stated, dominates the uncertainty: it makes up "
+        f"{' and '.join(dominated)}.\n"
     )
 
 

@@ -237,29 +237,30 @@ def _parts(
         max(least, min(_PROSE, max(map(len, column[1:]), default=0)))
         for least, column in zip(tight, columns, strict=True)
     ]
+
+    def widened(part: Sequence[int]) -> list[tuple[Sequence[str], int]]:
+        """Return the columns of a part with widths that use the room there is, labels first."""
+        least = folding if needed(part) <= width else tight
+        room = width - sum(least[i] + len(_GAP) for i in part)
+        widths = {i: least[i] for i in part}
+        missing = {i: max(map(len, columns[i])) - least[i] for i in part}
+        for i in sorted(part, key=lambda i: (i > 0, missing[i])):
+            more = max(min(missing[i], room), 0)
+            widths[i] += more
+            room -= more
+        return [(columns[i], widths[i]) for i in part]
+
+    def needed(part: Sequence[int]) -> int:
+        return sum(folding[i] + len(_GAP) for i in part)
+
     part = [*range(labels)]
     for j in range(labels, len(columns)):
-        if len(part) > labels and sum(folding[i] + len(_GAP) for i in [*part, j]) > width:
-            yield _widened(columns, folding, part, width)
+        if len(part) > labels and needed([*part, j]) > width:
+            yield widened(part)
             part = [*range(labels)]
         part.append(j)
-    enough = sum(folding[i] + len(_GAP) for i in part) <= width
-    yield _widened(columns, folding if enough else tight, part, width)
+    yield widened(part)
 
 
 def _longest_chunk(cell: str) -> int:
     return max(map(len, _BETWEEN_WORDS.split(cell)))
-
-
-def _widened(
-    columns: Sequence[Sequence[str]], least: Sequence[int], part: Sequence[int], width: int
-) -> list[tuple[Sequence[str], int]]:
-    """Return the columns of a part with widths that use the room that is left, labels first."""
-    room = width - sum(least[i] + len(_GAP) for i in part)
-    missing = {i: max(map(len, columns[i])) - least[i] for i in part}
-    widths = dict(zip(part, (least[i] for i in part), strict=True))
-    for i in sorted(part, key=lambda i: (i > 0, missing[i])):
-        more = max(min(missing[i], room), 0)
-        widths[i] += more
-        room -= more
-    return [(columns[i], widths[i]) for i in part]

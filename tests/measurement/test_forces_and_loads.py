@@ -11,7 +11,7 @@ import memscal
 from memscal import MeasuredStress, SourceFile
 from memscal.errors import InputError
 from memscal.measurement.measure_stress import pooled_force
-from memscal.measurement.single_loads import single_loads
+from memscal.measurement.restore import single_loads
 
 SENSOR = known_apparatus()
 QUIET = {"noise": 0.001, "load_scatter": 0.002, "position_error": 0.0}

@@ -14,8 +14,7 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.measurement.measure_stress import joined_stress
 from memscal.measurement.measured_profile import contact_signal, prepared_scan
-from memscal.measurement.restore import restore_known
-from memscal.measurement.single_loads import single_loads
+from memscal.measurement.restore import restore_known, single_loads
 
 QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
 SEEDS = 5
