@@ -5,6 +5,7 @@ import inspect
 import re
 import runpy
 import shlex
+import shutil
 from pathlib import Path
 
 import jupytext
@@ -76,6 +77,14 @@ def test_every_option_in_the_documentation_exists() -> None:
             given = {word for word in arguments if re.match("--?[a-z]", word)}
             unknown += [(page.name, line, option) for option in given - known]
     assert unknown == []
+
+
+def test_the_page_on_tables_imports_the_shipped_ones(tmp_path: Path, monkeypatch) -> None:
+    for table in DOCS.with_name("calibration_data").glob("tables/*.csv"):
+        shutil.copy(table, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for line in "".join(blocks("import_tables.md", "console")).splitlines():
+        assert main(shlex.split(line)[1:]) == 0, line
 
 
 def test_the_citation_names_the_version() -> None:

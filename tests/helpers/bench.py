@@ -20,7 +20,6 @@ class Answers(Adapter):
         self.answer = self.does(command)
 
     def _read(self, **_: object) -> str:
-        assert self.answer is not None
         return self.answer
 
 
@@ -37,14 +36,10 @@ class Bench:
 
     def move(self, command: str) -> str | None:
         """Newport ESP 300: MO and MF enable and disable, PA moves, TP and MD? answer."""
-        parts = re.fullmatch(r"(\d)([A-Z]{2}\??)(-?[\d.]*)", command)
-        assert parts, command
-        axis, name, number = parts.groups()
-        if name == "MO":
-            self.enabled.add(axis)
-        elif name == "MF":
-            self.enabled.remove(axis)
-        elif name == "PA":
+        axis, name, number = re.fullmatch(r"(\d)([A-Z]{2}\??)(-?[\d.]*)", command).groups()
+        if name in ("MO", "MF"):
+            self.enabled ^= {axis}
+        if name == "PA":
             assert axis in self.enabled
             self.dragged += axis == "1" and self.position["2"] <= 0
             self.position[axis] = float(number)
