@@ -390,7 +390,7 @@ print(f"mean square of residual / noise: {np.mean(residual**2):.2f}")
 # `memscal.calibrate` does all of this. Beyond the steps above its spline is stiffer where the
 # film's stress has decayed, and it weighs outliers, chooses the grid, propagates the uncertainties
 # of noise, load, film and rod, and checks the result. It also computes the Bayesian estimate, which
-# divides nothing and stands below as a second table. The first line says which A and which
+# divides nothing and stands below as a second table. The first two lines say which A and which
 # description of $G$ to use.
 
 # %%
