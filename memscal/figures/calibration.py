@@ -22,7 +22,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES, failed_check_messages
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
-from memscal.model.places import even_lattice
+from memscal.model.positions import even_lattice
 from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
