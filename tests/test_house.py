@@ -27,11 +27,11 @@ USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "friction", "m
 ONLY_IN = {
     "h5py": {"formats"}, "pint": {"formats"}, "meshio": {"formats"}, "matplotlib": {"figures"},
     "click": {"cli"}, "rich": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"},
-    "pyarrow": {"formats"}, "distributed": {"parallel"},
+    "pyarrow": {"formats"}, "openpyxl": {"formats"}, "distributed": {"parallel"},
 }  # fmt: skip
 
 SLOW = {
-    "distributed", "matplotlib", "meshio", "pint", "pyarrow", "skfem", "skimage",
+    "distributed", "matplotlib", "meshio", "openpyxl", "pint", "pyarrow", "skfem", "skimage",
     "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats",
 }  # fmt: skip
 LONGEST, SHORT = 600, 120
