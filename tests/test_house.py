@@ -28,12 +28,12 @@ USERS_OF_FORMATS = {
 
 ONLY_IN = {
     "h5py": {"formats"}, "pint": {"formats"}, "meshio": {"formats"}, "matplotlib": {"figures"},
-    "click": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"},
-    "pyarrow": {"formats"}, "distributed": {"parallel"}, "weasyprint": {"certificate"},
+    "click": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"}, "pyarrow": {"formats"},
+    "openpyxl": {"formats"}, "distributed": {"parallel"}, "weasyprint": {"certificate"},
 }  # fmt: skip
 
 SLOW = {
-    "distributed", "matplotlib", "meshio", "pint", "pyarrow", "skfem", "skimage",
+    "distributed", "matplotlib", "meshio", "openpyxl", "pint", "pyarrow", "skfem", "skimage",
     "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats", "weasyprint",
 }  # fmt: skip
 LONGEST, SHORT = 600, 120

@@ -24,7 +24,7 @@ from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Rod
-from memscal.model.plausibility import mistaken_unit
+from memscal.model.positions import mistaken_unit
 from memscal.model.scan import Scan
 
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.

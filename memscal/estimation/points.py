@@ -22,8 +22,7 @@ from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
 from memscal.model.correlation import across, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.places import Places, places_of
-from memscal.model.plausibility import rise_of
+from memscal.model.positions import Places, places_of, rise_of
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
 from memscal.model.scan import Scan

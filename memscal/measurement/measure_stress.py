@@ -21,7 +21,7 @@ from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
-from memscal.model.plausibility import require_span
+from memscal.model.positions import require_span
 from memscal.model.provenance import Process, accepted_alterations, timestamp
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT

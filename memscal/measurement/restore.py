@@ -25,7 +25,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
-from memscal.model.plausibility import require_span
+from memscal.model.positions import require_span
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan

@@ -33,7 +33,7 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
-from memscal.model.plausibility import require_plausible
+from memscal.model.positions import require_plausible
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded

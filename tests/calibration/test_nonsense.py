@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,9 @@ def altered(scan: Scan = SCAN, film: float = 1.0, x: float = 1.0, rod: float = 0
     """Return a scan with thickness and positions times a factor, and a rod of another radius."""
     film_ = replace(scan.film, thickness=film * scan.film.thickness)
     rod_ = memscal.Rod(radius=rod or scan.indenter.radius)
-    return replace(scan, film=film_, x=x * scan.x, indenter=rod_)
+    with warnings.catch_warnings():  # of films that none has
+        warnings.simplefilter("ignore")
+        return replace(scan, film=film_, x=x * scan.x, indenter=rod_)
 
 
 def refused(scan: Scan, **options: Any) -> str:

@@ -21,8 +21,8 @@ from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.tables import text_table
 from memscal.formats.tables.scan import import_table
 from memscal.formats.tables.text_table import TextTable, Wanted
-from memscal.model import places as places_module
-from memscal.model.places import places_of
+from memscal.model import positions as places_module
+from memscal.model.positions import places_of
 from memscal.model.scan import BRANCHES
 
 COLUMNS = {"x": Wanted("x", "mm", "length"), "u": Wanted("u"), "n": Wanted("n", words=BRANCHES)}

@@ -17,8 +17,7 @@ from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.holds import find_holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
-from memscal.model.places import places_of
-from memscal.model.plausibility import require_plausible, require_span
+from memscal.model.positions import places_of, require_plausible, require_span
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers
