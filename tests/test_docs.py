@@ -69,7 +69,7 @@ def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives() -
 def test_every_option_in_the_documentation_exists() -> None:
     unknown = []
     for page in (*DOCS.glob("*.md"), DOCS.with_name("README.md")):
-        text = page.read_text(encoding="utf-8")
+        text = page.read_text(encoding="utf-8").replace("\\\n", "")
         for line in re.findall(r"^memscal .*", text, flags=re.MULTILINE):
             name, *arguments = shlex.split(line.split(" > ")[0], comments=True)[1:]
             command = program.get_command(None, name)

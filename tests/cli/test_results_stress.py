@@ -41,7 +41,7 @@ def planned() -> memscal.Design:
 
 
 @pytest.mark.parametrize(("name", "words"), [
-    ("stress", ["2.75 N  dry", "total force", "maximum", "kPa", "applied force all"]),
+    ("stress", ["2.75 N", "dry", "total force", "maximum", "kPa", "applied force all"]),
     ("restored", ["total force", "stress on the axis", "calculated", "restored force", "kPa"]),
     ("contact", ["friction 0.3, incremental loading (hankel)", "stick", "radius", "(mm)"]),
     ("planned", ["nothing was measured", "film thickness", "Gaussian width sigma", "resolved"]),
