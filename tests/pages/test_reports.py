@@ -1,4 +1,4 @@
-"""Every report in a browser: alone, silent, accessible, and whole on paper."""
+"""Every report and a certificate in a browser: alone, silent, accessible, and whole on paper."""
 
 import re
 from collections.abc import Callable
@@ -24,9 +24,9 @@ LONG = "a_name_without_a_place_to_break_it_" * 4 + "<b>&amp;"
 
 @pytest.fixture(scope="session")
 def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The report of each command, those of batch and calibrate with failures."""
+    """The report of each command, those of batch and calibrate with failures; a certificate."""
     folder = tmp_path_factory.mktemp("reports")
-    pages = {kind: folder / f"{kind}.html" for kind in KINDS}
+    pages = {kind: folder / f"{kind}.html" for kind in (*KINDS, "certificate")}
     files = {name: str(folder / f"{name}.h5") for name in ("artifact", "stress", "known", "one")}
     scans = [str(DATA / "sphere_experiment" / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
     memscal.write_scan(sphere_scan(pressed(), seed=5), files["one"])
@@ -52,6 +52,8 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     codes = {kind: main([*run, "--report", str(pages[kind])]) for kind, run in runs.items()}
     failing = ("batch", "calibrate")
     assert codes == {kind: int(kind in failing) for kind in runs}
+    certify = ["certificate", files["artifact"], "--lab", str(DATA / "lab.toml")]
+    assert main([*certify, "-o", str(pages["certificate"])]) == 0
     return pages
 
 
@@ -74,6 +76,14 @@ def test_nothing_is_cut_on_a4(reports, opened: Callable[..., Any], kind):
     length = page.evaluate("document.documentElement.scrollHeight") / PAPER["height"]
     sheets = len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
     assert length <= sheets <= 2 * length + 2
+
+
+def test_a_certificate_is_accessible_and_prints_on_two_sheets(reports, opened, axe):
+    page = opened(reports["certificate"], viewport={"width": 1100, "height": 900})
+    assert violations(page, axe) == {}
+    page.set_viewport_size(PAPER)
+    assert cut(page) == []
+    assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True))) == 2
 
 
 def test_every_figure_is_drawn(reports, opened: Callable[..., Any]):
