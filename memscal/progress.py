@@ -163,7 +163,7 @@ def counted(
 
 def _bar() -> Callable[[Progress], None]:
     """Return what shows a bar in a notebook, or else a line on standard error."""
-    if "ipykernel" in sys.modules:
+    if "ipykernel" in sys.modules and hasattr(sys.modules["IPython"].get_ipython(), "kernel"):
         from IPython.display import HTML, display
 
         shown = display(HTML(""), display_id=True)

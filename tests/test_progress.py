@@ -2,7 +2,6 @@
 
 import logging
 import math
-import sys
 import types
 
 import pytest
@@ -86,11 +85,12 @@ def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) 
     with reporting(True):
         list(counted("ab", "<draws>", 2))
     assert capsys.readouterr().err.endswith(f"\r{'2 of 2 <draws>':<60}\n")
-    display = pytest.importorskip("IPython.display")
+    pytest.importorskip("ipykernel")
+    shell = types.SimpleNamespace(kernel=None)
+    monkeypatch.setattr("IPython.get_ipython", lambda: shell)
     shown: list[str] = []
     handle = types.SimpleNamespace(update=lambda page: shown.append(page.data))
-    monkeypatch.setattr(display, "display", lambda *_, **__: handle)
-    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
+    monkeypatch.setattr("IPython.display.display", lambda *_, **__: handle)
     with reporting(True):
         list(counted("ab", "<draws>", 2))
     assert shown[-1] == '<progress value="2" max="2"></progress> 2 of 2 &lt;draws&gt;'
