@@ -103,7 +103,9 @@ def upper_end(interval: Interval) -> float:
 def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(beside: bool) -> None:
     # Lubricated loads beside the dry ones, or apart.
     found = [(one.truth, one.joint if beside else one.apart) for one in outcomes(*FRICTIONS)]
-    assert all(bool(joint.beside) == beside for _, joint in found) or not beside
+    # Where a check finds friction in the lubricated ones, one of a thousand times, they are apart.
+    alone = sum(not joint.beside for _, joint in found)
+    assert not beside or alone <= binom.ppf(1 - CHANCE, len(found), 1e-3)
     held = [joint.interval.holds(truth) for truth, joint in found]
     low, high = binom.ppf([CHANCE, 1 - CHANCE], len(held), [0.93, 0.98])
     assert low <= sum(held) <= high
