@@ -69,7 +69,8 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
         return _scaled(numbers, power)
     if unit.strip() in _CANONICAL:
         raise _wrong_dimension(where, unit, dimension)
-    return np.asarray(numbers * _pint_factor(unit, dimension, where))
+    with np.errstate(over="ignore"):  # what is infinite then is refused by who knows its place
+        return np.asarray(numbers * _pint_factor(unit, dimension, where))
 
 
 def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:

@@ -81,3 +81,8 @@ def test_pint_is_imported_only_for_other_units():
         "assert 'pint' in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+@pytest.mark.parametrize("unit", ["km", "furlong"])
+def test_a_value_that_no_number_holds_in_si_is_infinite_without_a_warning(unit: str) -> None:
+    assert to_si(np.finfo(np.float64).max, unit, "length", "x") == np.inf
