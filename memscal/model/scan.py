@@ -403,6 +403,9 @@ class Scan:
         if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
             problem = "normal_load holds a load that is infinite or not above zero."
             raise InputError(problem, cure="Mark points without contact as missing (NaN).")
+        if loads is not None and np.isnan(loads).all():
+            cure = "Leave it out, and state the one load of all points."
+            raise InputError("normal_load is missing (NaN) at every point.", cure=cure)
 
     def _check_positions(self) -> None:
         if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):

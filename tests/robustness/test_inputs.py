@@ -157,6 +157,7 @@ CORPUS = (
     ("scan", Edit("units", _X, unit="m")), ("scan", Edit("scale", _X, 1e200)),
     ("scan", Edit("sparse", _U)), ("scan", Edit("sparse", _X, dtype="i1")),
     ("scan", Edit("fill", "/entry/sample/film/poisson_ratio", 5e-324)),
+    ("raster", Edit("fill", "/entry/data/normal_load", float("nan"))),
     ("artifact", Edit("text", _OPTIONS, text='{"A": NaN}')),
     ("artifact", Edit("text", _OPTIONS, text="[1e999]")),
     ("artifact", Edit("fill", _LIMIT, float("inf"))),
