@@ -33,12 +33,11 @@ SETTINGS = {"help_option_names": ["--help", "-h"], "max_content_width": 100}
 class LazyGroup(click.Group):
     """Commands whose modules are imported when they are used."""
 
-    # click passes its context to each of these methods, whether it is needed or not.
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click passes it
         """Return the names in the order of use."""
         return list(COMMANDS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click passes it
         """Import a command."""
         if cmd_name not in COMMANDS:
             return None
@@ -58,7 +57,7 @@ class LazyGroup(click.Group):
             ctx.fail(f"There is no command {name!r}. {hint}".strip())
         return super().resolve_command(ctx, args)
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click passes it
         """List the commands from what stands here, without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, about) for name, (_, about) in COMMANDS.items()])

@@ -43,9 +43,8 @@ def main() -> None:
     _stand_in_for_h5py(heavy)
     import meshio
 
-    # numpy takes what has a file's methods for a file, in which it would have to seek. The pipe
-    # stays open until the process ends.
-    answer = types.SimpleNamespace(write=open(os.dup(1), "wb").write)  # noqa: SIM115
+    # numpy takes what has a file's methods for a file, in which it would have to seek.
+    answer = types.SimpleNamespace(write=open(os.dup(1), "wb").write)  # noqa: SIM115 - to the end
     arrays: list[Any] = []
     _forbid_files()
     try:
