@@ -58,10 +58,14 @@ class Progress:
     kept: float = 0.0
 
     @property
+    def rate(self) -> float:
+        """How many are done in a second; of what was done before, none."""
+        return (self.done - self.kept) / max(self.seconds, 1e-9)
+
+    @property
     def left(self) -> float:
         """Seconds that the rest takes at the pace so far; infinite before anything is done."""
-        done = self.done - self.kept
-        return self.seconds * (self.total - self.done) / done if done else float("inf")
+        return (self.total - self.done) / self.rate if self.rate else float("inf")
 
     def __str__(self) -> str:
         """Return the count with the time left."""

@@ -137,6 +137,6 @@ def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Itera
         else:
             count = workers or cores()
             executor, most = stack.enter_context(worker_pool(count)), lambda: 2 * count
-        stack.enter_context(out.working("Calibrating"))
+        stack.enter_context(out.working("Calibrating", rate=True))
         size, kept = attrgetter("scans"), attrgetter("kept")
         yield from counted(batch.run(executor, most), "scans", batch.count, size, kept)

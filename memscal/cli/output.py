@@ -17,7 +17,6 @@ import click
 from memscal.errors import OutputError
 from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import Message
-from memscal.model.result import Result
 from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, text_of
 
 if TYPE_CHECKING:
@@ -125,8 +124,8 @@ _CLEAR = "\r\x1b[K"
 
 
 @contextmanager
-def working(task: str) -> Iterator[None]:
-    """Show on standard error that a task takes long, how much of it is done, and the time left."""
+def working(task: str, *, rate: bool = False) -> Iterator[None]:
+    """Show on standard error how much of a long task is done, the time left and the rate."""
     if sys.stderr is None:
         yield
         return
@@ -154,6 +153,8 @@ def working(task: str) -> Iterator[None]:
 
     def hear(progress: Progress) -> None:
         counts[0] = f": {progress}"
+        if rate and progress.rate:
+            counts[0] += f", {progress.rate:.3g} a second"
 
     thread = Thread(target=show, daemon=True)
     thread.start()

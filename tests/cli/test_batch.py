@@ -168,7 +168,7 @@ def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
     rows = tables(copy / "results")
     assert list(rows["place"]) == list(range(COUNT))
     assert rows["conversion_constant_errors"][7] > 5 * rows["conversion_constant_errors"][6]
-    anew = run(*line, "--method", "bayesian").exits(1, "2 of 12 scans, ", " s left")
+    anew = run(*line, "--method", "bayesian").exits(1, "2 of 12 scans, ", " s left, ", " a second")
     assert shards_of(anew) == (6, 0)
 
 
