@@ -1,7 +1,8 @@
 """Progress of long work: how much of it is done, to a callback, to the log, or as a bar.
 
-What takes long counts its parts (:func:`counted`, :func:`counter`), wherever in a call it is; a
-public function tells the ``progress`` that it was given of all of them (:func:`reported`).
+What takes long counts its parts (:func:`counted`, :func:`counter`) or the steps that are done
+(:func:`in_steps`, :func:`done_with`), wherever in a call it is; a public function tells the
+``progress`` that it was given of all of them (:func:`reported`).
 """
 
 import logging
@@ -70,7 +71,7 @@ class Progress:
     def __str__(self) -> str:
         """Return the count with the time left."""
         share = f"{self.done:.0%} of {self.task}"
-        text = share if self.total == 1 else f"{self.done:g} of {self.total:g} {self.task}"
+        text = share if self.total == 1 else f"{self.done:,.0f} of {self.total:,.0f} {self.task}"
         return f"{text}, {span(self.left)} left" if self.kept < self.done < self.total else text
 
 
@@ -78,6 +79,7 @@ Listener: TypeAlias = Callable[[Progress], None] | Literal[True] | None
 """What is told of progress: a callback, or ``True`` for a bar; ``None`` for what is told now."""
 
 _LISTENER: ContextVar[Callable[[Progress], None] | None] = ContextVar("listener", default=None)
+_STEPS: ContextVar[Callable[[str], None] | None] = ContextVar("steps", default=None)
 
 
 def _nobody(_: Progress) -> None:
@@ -103,6 +105,37 @@ def reporting(listener: Listener) -> Iterator[None]:
         yield
     finally:
         _LISTENER.reset(token)
+
+
+@contextmanager
+def hushed() -> Iterator[None]:
+    """Tell nobody of the tasks within: they are parts of one that is counted."""
+    with reporting(_nobody):
+        yield
+
+
+@contextmanager
+def in_steps(*steps: str) -> Iterator[None]:
+    """Begin a task of named steps; what is called within says which it is done with."""
+    tell, done = counter("steps", len(steps)), 0
+
+    def hear(step: str) -> None:
+        # What is repeated within a later step, as by another law of the film, counts for nothing.
+        nonlocal done
+        if (number := steps.index(step) + 1) > done:
+            tell(done := number)
+
+    token = _STEPS.set(hear)
+    try:
+        yield
+    finally:
+        _STEPS.reset(token)
+
+
+def done_with(step: str) -> None:
+    """Tell that a step is done, of a task in steps if there is one."""
+    if (hear := _STEPS.get()) is not None:
+        hear(step)
 
 
 def reported(function: _Function) -> _Function:
@@ -150,13 +183,11 @@ def counted(
         done: float = 0
         before: float = 0
         while True:
-            token = _LISTENER.set(_nobody)
             try:
-                item = next(rest)
+                with hushed():
+                    item = next(rest)
             except StopIteration:
                 return
-            finally:
-                _LISTENER.reset(token)
             done += size(item)
             before += size(item) if kept(item) else 0
             tell(done, before)

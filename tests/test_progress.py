@@ -22,7 +22,9 @@ def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
 @pytest.mark.parametrize(("arguments", "text"), [
     (("contacts", 137, 500, 30.0), "137 of 500 contacts, 79 s left"),
     (("contacts", 1, 500, 30.0), "1 of 500 contacts, 4.2 h left"),
-    (("contacts", 500, 500, 30.0), "500 of 500 contacts"), (("draws", 0, 9, 0.1), "0 of 9 draws"),
+    (("contacts", 500, 500, 30.0), "500 of 500 contacts"),
+    (("rows", 1.5e6, 2e6, 3.0), "1,500,000 of 2,000,000 rows, 1 s left"),
+    (("draws", 0, 9, 0.1), "0 of 9 draws"),
     (("scans", 90, 100, 1.0, 90), "90 of 100 scans"),
     (("scans", 92, 100, 5.0, 90), "92 of 100 scans, 20 s left"),
     (("the loading", 0.25, 1.0, 60.0), "25% of the loading, 3 min left"),
@@ -68,7 +70,28 @@ def test_public_functions_tell_their_callback(tmp_path) -> None:
     assert told(heard) == [("scans", 1, 2), ("scans", 2, 2)]
     heard.clear()
     memscal.calibrate(memscal.simulate(seed=1, points=17), progress=heard.append)
-    assert [one.task for one in heard] == ["uncertain inputs"] * 3
+    inputs = [("uncertain inputs", done, 3) for done in (1, 2, 3)]
+    assert told(heard) == [
+        *(("steps", done, 5) for done in (1, 2, 3)), *inputs, ("steps", 4, 5), ("steps", 5, 5)
+    ]  # fmt: skip
+    heard.clear()
+    with reporting(heard.append):
+        memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")
+    assert {one.task for one in heard} == {"plans"}
+    assert 2 <= heard[-1].done <= heard[-1].total
+
+
+def test_what_takes_long_within_a_step_counts_its_parts() -> None:
+    heard: list[memscal.Progress] = []
+    table = {"x [mm]": [-1.0, 0.0, 1.0], "U [mV]": [1.0, 3.0, 1.0]}
+    memscal.import_table(table, x="x", u="U", progress=heard.append)
+    assert told(heard) == [("rows", 3, 3)]
+    raster = memscal.simulate(seed=1, points=17, raster=True, half_range=3e-3)
+    memscal.calibrate(raster, progress=heard.append)
+    memscal.indent(FILM, SPHERE, load=0.2, rings=24, backend="fem", progress=heard.append)
+    for task, least in (("kernels", 10), ("tractions", 2 * 24)):
+        last = [one for one in heard if one.task == task][-1]
+        assert last.done == last.total >= least
 
 
 def test_the_log_has_a_line_now_and_then(caplog, monkeypatch) -> None:

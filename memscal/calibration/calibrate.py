@@ -56,7 +56,7 @@ from memscal.model.scan import Scan, common_circumstances
 from memscal.model.sizes import MOST_OF_LINES
 from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
-from memscal.progress import Listener, reported
+from memscal.progress import Listener, done_with, in_steps, reported
 from memscal.version import __version__
 
 #: Parameters that differ between a division and the Bayesian estimate.
@@ -74,8 +74,8 @@ def assemble(
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are as ``stated`` by the scan where nothing was calculated with them.
-    scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
-    reference = _table(stress)
+    scan, reference = solution.scan, _table(solution.stress)
+    channel = solution.estimate.points.channel
     versions = {"numpy": np.__version__, "scipy": scipy.__version__}
     record: dict[str, Any] = {
         **configuration,
@@ -254,6 +254,7 @@ class Calibration(Result):
 
 
 @reported
+@in_steps("Gaussian fit", "departures", "division", "uncertainties", "checks")
 @single_threaded()
 def calibrate(
     scan: Scans,
@@ -338,7 +339,7 @@ def calibrate(
     other : bool, default True
         Whether ``.apparatus.other``, the estimate by the other route, is calculated, too.
     progress : callable or True, optional
-        Told how far it is where film or inputs take long: :class:`memscal.Progress`.
+        Told of the steps that are done, and of parts of long ones: :class:`memscal.Progress`.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -393,10 +394,11 @@ def calibrate(
     if (other or results.division is None) and solution.other is not None:
         beside = uncertainties(solution, solution.other, effects, pairs, reading)
     division = results.division or (beside.division if beside else None)
+    done_with("uncertainties")
     checks = quality_checks(solution, results, division)
+    done_with("checks")
     messages = calibration_messages(solution, results, checks)
-    of_method: Any = chosen
-    settings = asdict(of_method) if is_dataclass(chosen) else {}
+    settings = asdict(chosen) if is_dataclass(chosen) and not isinstance(chosen, type) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
     configuration |= {"reference_unit": reading.per} if reading.per != "Pa" else {}
     if reading.per == "Pa" and any(s.load is None and s.normal_load is None for s in as_stated):

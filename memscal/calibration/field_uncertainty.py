@@ -32,6 +32,7 @@ from memscal.calibration.uncertainty import InputEffect, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import FloatArray
+from memscal.progress import counted
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 
@@ -215,7 +216,7 @@ class _OfParameters:
         count = estimate.basis.integrals.size
         lost, beside = np.empty((inside.size, count + 1)), np.empty((inside.size, count))
         sums, of_frame = np.empty(count + 1), np.empty(count)
-        for some in _chunks(count):
+        for some in counted(_chunks(count), "kernels", count, lambda some: some.stop - some.start):
             columns = kernels(unit := np.eye(count)[:, some])
             passed = band.passed(columns)
             voltages = estimate.basis.voltages(estimate.model, estimate.gaussian, unit)

@@ -30,6 +30,7 @@ from memscal.mechanics.contact import BaseStress
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
+from memscal.progress import done_with
 
 #: Whose centre is fitted: a scan's, or each repeat's.
 COMMON, PER_REPEAT = "common", "per-repeat"
@@ -66,6 +67,7 @@ def solve(
             if centre == PER_REPEAT:
                 raise
     solution = solved(scans, stresses, estimate, method)
+    done_with("division")
     return replace(solution, owners=owners, apart=apart)
 
 

@@ -96,8 +96,11 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
     settings |= {name: options[name] for name in ("load", "repeats", "method")}
     settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
-    planned = design(kernel=common.kernel_from(options), want=dict(targets), vary=vary, **settings)
-    drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
+    settings |= {"kernel": common.kernel_from(options), "want": dict(targets)}
+    with out.working("Planning"):
+        planned = design(vary=vary, **settings)
+    with out.working("Drawing"):
+        drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
     with together():
         out.write_files(drawn, force=force)
         if as_json:

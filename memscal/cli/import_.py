@@ -242,7 +242,8 @@ def command(
         if kind == "scan":
             from memscal.formats.scan import write_scan
 
-            scan = _read_scan(table, options)
+            with out.working("Reading"):
+                scan = _read_scan(table, options)
             notes = scan.messages
             write_scan(common.with_laboratory(laboratory, scan), output, overwrite=force)
             if scan.holds is not None:

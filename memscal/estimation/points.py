@@ -184,6 +184,17 @@ class ScanPoints:
         scaled = values * (root if values.ndim == 1 else root[:, None])
         return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
 
+    def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
+        """Return the points with further errors in common, and what these add to ln det.
+
+        ``changes`` S (n, q), standardised, are what one deviation of each does: values are then
+        standardised by the root of :math:`1 + S S^T`, too.
+        """
+        left, singular, _ = np.linalg.svd(changes, full_matrices=False)
+        factor = self.decorrelation or Decorrelation(())
+        factor = replace(factor, common=left, growth=np.hypot(1, singular))
+        return replace(self, decorrelation=factor), float(np.log1p(singular**2).sum())
+
     def standardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
         """Return :meth:`standardised` of columns (n, m), which are overwritten."""
         columns *= np.sqrt(weights)[:, None]

@@ -12,7 +12,6 @@ from memscal.errors import FitError
 from memscal.estimation import bayesian
 from memscal.estimation.angular import AngularRings, angular_departures, isolated, raster_noise
 from memscal.estimation.bayesian import WeighedFit
-from memscal.estimation.decorrelation import Decorrelation
 from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
 from memscal.estimation.gaussian import (
@@ -24,6 +23,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
+from memscal.progress import done_with
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
@@ -243,6 +243,7 @@ def estimate_profile(
     for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
+        done_with("Gaussian fit")
         if angular:
             noise = raster_noise(points, residual) or noise
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
@@ -254,6 +255,7 @@ def estimate_profile(
         if rounds_left:
             # Of many points there is room for one.
             del weighed
+    done_with("departures")
     within = bayesian.supported(basis, weighed)
     raster = raster_noise(points, residual) if angular else None
     estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis, raster)
@@ -303,13 +305,7 @@ def log_marginal_likelihood(
     # Gaussian of unit variance that is integrated, beside ``noise``, that of a point of weight one.
     points, weights, volume = estimate.points, estimate.weights, 0.0
     if inputs is not None and inputs.size:
-        # The covariance 1 + S S^T of standardised voltages is made white by its inverse root.
-        changes = points.standardised(inputs, weights) / noise
-        left, singular, _ = np.linalg.svd(changes, full_matrices=False)
-        factor = points.decorrelation or Decorrelation(())
-        factor = replace(factor, common=left, growth=np.hypot(1, singular))
-        points = replace(points, decorrelation=factor)
-        volume = float(np.log1p(singular**2).sum())
+        points, volume = points.sharing(points.standardised(inputs, weights) / noise)
     model = forward_model(points, estimate.model.references)
     fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     if not fit.has_width(weights, noise):

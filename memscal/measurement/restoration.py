@@ -105,10 +105,10 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
     ratio = 1 / estimate.noise_scale if stated else posterior.noise_ratio
-    root = ratio * estimate.drawn_noise(np.eye(points.u.size))
-    whiten = np.linalg.inv(np.linalg.cholesky(root @ root.T + added @ added.T))
-    flat = np.linalg.qr(whiten @ np.hstack(columns))[0]
-    left = whiten @ (points.u - signal)
+    weights = estimate.weights / (ratio * estimate.noise_scale) ** 2
+    points, _ = points.sharing(points.standardised(added, weights))
+    flat = np.linalg.qr(points.standardised(np.hstack(columns), weights))[0]
+    left = points.standardised(points.u - signal, weights)
     left = left - flat @ (flat.T @ left)
     return float(left @ left), left.size - flat.shape[1]
 

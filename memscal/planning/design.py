@@ -37,6 +37,7 @@ from memscal.model.positions import require_plausible
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
+from memscal.progress import counted, counter, hushed
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 
 #: As many as a simulated scan may have.
@@ -298,15 +299,18 @@ def least_design(
     """Find the coarsest step, the shortest range or the fewest repeats that reach the targets."""
     what, fewest, most, planned = _search(plan, vary)
     tried: dict[int, Design | None] = {}
+    # As many as it can take to pass the number that is searched, and to close in on it.
+    tell = counter("plans", math.ceil(math.log(most / fewest, _GROWTH) + math.log2(most)))
 
     def meets(count: int) -> bool:
         if count not in tried:
             # None where the plan determines nothing, or does not sample G.
             tried[count], attempt = None, planned(count)
-            with suppress(FitError):
+            with suppress(FitError), hushed():
                 design = evaluate(attempt)
                 samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
                 tried[count] = design if samples else None
+            tell(len(tried))
         found = tried[count]
         return found is not None and all(_met(found, *target) for target in targets.items())
 
@@ -482,8 +486,8 @@ def design(
 def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[Design]:
     """Return the designs with one number of the plan (SI) replaced; unusable plans are left out."""
     designs = []
-    for value in values:
+    for value in counted(values, "plans", len(values)):
         changes: dict[str, Any] = {vary: int(value) if vary == "repeats" else float(value)}
-        with suppress(FitError):
+        with suppress(FitError), hushed():
             designs.append(evaluate(replace(planned.plan, **changes), planned.method))
     return designs

@@ -46,7 +46,7 @@ def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3, 9e-3])
     np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3, np.nan])
     assert "The table says: Rod 12" in scan.notes
-    assert "1 values of u_zz are missing (NaN), row 8." in scan.notes
+    assert "u_zz is missing (NaN) in row 8." in scan.notes
     with pytest.raises(InputError, match=r"'Info' of rod\.xlsx has no row(.|\n)*Info, Daten"):
         memscal.import_table(book, x="x", u="U")
     with pytest.raises(InputError, match=r"no sheet 'Data'(.|\n)*Info, Daten"):

@@ -75,7 +75,7 @@ def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, tex
 def test_what_is_missing_is_counted(tmp_path: Path):
     found = scan_table(tmp_path, "x,u,n\n0,1,1\n1,,1\n2,3,1\n0,1,2\n2,5,2\n", repeat="n")
     texts = [note.text for note in found.messages]
-    assert "1 values of u_zz are missing (NaN), line 3." in texts
+    assert "u_zz is missing (NaN) in line 3." in texts
     assert "1 more would make every repeat complete." in texts
 
 
@@ -160,10 +160,10 @@ def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Pa
     assert scan_table(tmp_path, text, load=None).load is None
 
 
-def test_rows_without_a_position_are_left_out_and_counted_and_a_header_may_be(tmp_path: Path):
+def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_path: Path):
     found = scan_table(tmp_path, "0,9,1\n,7,7\n1,8,\n", x="1", u=3)
     np.testing.assert_array_equal(found.u_zz, [1e-3, np.nan])
-    assert any("1 rows without a position" in note.text for note in found.messages)
+    assert any("they have no position: line" in note.text for note in found.messages)
 
 
 @pytest.mark.parametrize(("text", "decimal"), [
@@ -206,8 +206,8 @@ def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, enco
     np.testing.assert_allclose(scan.u_zz, [100.5e-6, np.nan, np.nan, 200e-6])
     for words in (
         "The table says: Last;1,0;N\n", "header is line 5, a row of units below it",
-        "u_zz in µV, x in um", "2 values of u_zz are missing (NaN), lines 8, 10.",
-        "1 rows without a position were left out, line 9.",
+        "u_zz in µV, x in um", "u_zz is missing (NaN) in lines 8, 10.",
+        "Left out, for they have no position: line 9.",
     ):  # fmt: skip
         assert words in scan.notes, scan.notes
     if mark:

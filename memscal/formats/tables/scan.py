@@ -21,6 +21,7 @@ from memscal.model.positions import places_of, require_plausible, require_span
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers
+from memscal.progress import Listener, reported
 
 Column = str | int
 Columns = dict[str, NDArray[Any]]
@@ -47,6 +48,7 @@ class ImportedScan(Scan):
     holds: Any = None  # memscal.model.holds.Holds, where they were asked for
 
 
+@reported
 def import_table(
     source: Any, *, u: Column, x: Column | None = None, y: Column | None = None,
     x_unit: str | None = None, u_unit: str | None = None,
@@ -56,7 +58,9 @@ def import_table(
     repeat: Column | Sequence[Column] | None = None, branch: Column | None = None,
     u_xz: Column | None = None, u_yz: Column | None = None, u_sign: int = 1, holds: bool = False,
     sheet: str | None = None, skip_rows: int = 0, missing: Sequence[str] = (),
-    delimiter: str | None = None, decimal: str | None = None, **stated: Any,
+    delimiter: str | None = None, decimal: str | None = None,
+    progress: Listener = None,  # noqa: ARG001 - @reported
+    **stated: Any,
 ) -> ImportedScan:  # fmt: skip
     """Read a scan from a table with one row for each reading.
 
@@ -91,6 +95,8 @@ def import_table(
     sheet, skip_rows, missing, delimiter, decimal
         Sheet of a workbook; lines before the header; words, or numbers as text, that mean a
         missing value; what separates cells; decimal mark.
+    progress : callable or True, optional
+        Told how many rows are read: :class:`memscal.Progress`.
     **stated
         Further fields of :class:`memscal.Scan`: ``film``, ``indenter``, ``sensor``, ``title`` ...
 
@@ -290,10 +296,10 @@ def _placed(columns: Columns, notes: list[str], of_rows: Callable[[Any], str]) -
         raise InputError("No row of the table has a position.", cure="Check the columns.")
     for name, values in columns.items():
         if (rows := np.flatnonzero(finite & np.isnan(values))).size:
-            notes.append(f"{rows.size} values of {name} are missing (NaN), {of_rows(rows)}.")
+            notes.append(f"{name} is missing (NaN) in {of_rows(rows)}.")
     if not finite.all():
         rows = np.flatnonzero(~finite)
-        notes.append(f"{rows.size} rows without a position were left out, {of_rows(rows)}.")
+        notes.append(f"Left out, for they have no position: {of_rows(rows)}.")
         columns = {name: values[finite] for name, values in columns.items()}
     if "repeat" in columns:
         columns["repeat"] = np.unique(columns["repeat"], return_inverse=True)[1]

@@ -153,11 +153,11 @@ class FrameTable(NamedColumns):
         self.source, self.decimal, self._unit_row = source, decimal, tuple(units)
         self._rows, self._column = rows, column
 
-    def _room(self, columns: int) -> int:
+    def _room(self, columns: int) -> tuple[int, int]:
         if self._rows > (most := self._most(columns)):
             of, cure = f"rows of {columns} columns", "Average neighbouring readings."
             raise too_large(self._name, self._rows, most, of, cure=cure)
-        return self._rows
+        return self._rows, self._rows
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
         lines = range(1, self._rows + 1)

@@ -28,6 +28,7 @@ from memscal.model.sizes import (
     MOST_TABLE_BYTES,
     too_large,
 )
+from memscal.progress import counted
 
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
@@ -81,9 +82,10 @@ class NamedColumns:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        room, count = self._room(len(wanted)), 0
+        (rows, room), count = self._room(len(wanted)), 0
         values = [np.empty(room) for _ in wanted]
-        for lines, part in self._parts([*wanted.values()]):
+        parts = self._parts([*wanted.values()])
+        for lines, part in counted(parts, "rows", rows, lambda part: len(part[0])):
             if count + len(lines) > room:
                 cure = "Import it when it is complete."
                 raise FormatError(f"{self._name} grew while it was read.", cure=cure)
@@ -155,8 +157,8 @@ class NamedColumns:
         # A scan has up to three arrays more than columns, and its file must be read again.
         return min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
 
-    def _room(self, columns: int) -> int:
-        """Return for how many rows there must be room; refuse a table of too many."""
+    def _room(self, columns: int) -> tuple[int, int]:
+        """Return how many rows to expect, and for how many there must be room; refuse too many."""
         raise NotImplementedError
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
@@ -310,13 +312,14 @@ class TextTable(NamedColumns):
         if len(said) > _MAX_COMMENTS:
             yield f"{len(said) - _MAX_COMMENTS} more lines above the table were left out."
 
-    def _room(self, columns: int) -> int:
+    def _room(self, columns: int) -> tuple[int, int]:
         most = self._most(columns)
         lines = sum(piece.count(b"\n") or piece.count(b"\r") for piece in self._raw())
         if lines > most:
             cure = "Average neighbouring readings, or cut the table into several."
             raise too_large(self._name, lines, most, f"lines of {columns} columns", cure=cure)
-        return 2 * lines + _SAMPLE  # some may have other ends; room that stays empty is no memory
+        # Some may have other ends; room that stays empty is no memory.
+        return lines, 2 * lines + _SAMPLE
 
     def _raw(self) -> Iterator[bytes]:
         if self._sheet:

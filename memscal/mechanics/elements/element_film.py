@@ -38,6 +38,7 @@ from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
+from memscal.progress import counter
 
 _DEGREE = 4
 _SMOOTH_DEGREE = 5
@@ -303,12 +304,14 @@ class ElementFilm:
         hats, seen = line.loads_of_hats(rings).tocsc(), line.at(rings)
         scale = self.film.thickness / self.film.shear_modulus
         moved = np.empty((2, 2, rings.size, rings.size))
+        tell, done = counter("tractions", 2 * rings.size), 0
         for source, unknowns in enumerate((inward, outward)):
             for start in range(0, rings.size, _BATCH):
                 batch = slice(start, start + _BATCH)
                 solution = system.solve(unknowns, hats[:, batch].toarray())
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
+                tell(done := done + rings[batch].size)
         return SurfaceCompliance(self.r, moved[0, 0], moved[1, 0], moved[0, 1], moved[1, 1])
 
     @property
