@@ -53,10 +53,11 @@ def command(
     if forms - {".xml"}:
         from memscal.certificate.page import certificate_page, certificate_pdf
 
-        page = certificate_page(certificate)
-        made[".html"] = page.encode("utf-8")
-        if ".pdf" in forms:
-            made[".pdf"] = certificate_pdf(certificate, page, made[".xml"])
+        with out.working("Drawing"):
+            page = certificate_page(certificate)
+            made[".html"] = page.encode("utf-8")
+            if ".pdf" in forms:
+                made[".pdf"] = certificate_pdf(certificate, page, made[".xml"])
     out.write_files({path: made[path.suffix.lower()] for path in outputs}, force=force)
     result = {"number": certificate.number, "issued": certificate.issued}
     if as_json:

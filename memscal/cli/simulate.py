@@ -14,7 +14,7 @@ from click.core import ParameterSource
 from memscal.cli import options as common
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, PAPER_FILM, Quantity, option, options_of, output_options, si
-from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
+from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable, working
 from memscal.cli.reference import interface_of, interface_options
 from memscal.formats.files import together
 from memscal.summaries.table import Table
@@ -247,13 +247,14 @@ def command(
     from memscal.simulation.rod_scan import simulate
 
     loads = options["loads"] or (1.0,)
-    scan = simulate(
-        load=loads[0] if len(loads) == 1 else loads,
-        half_range=si(options["half_range"], -3),
-        points=options["points"],
-        raster=options["raster"],
-        **_shared_settings(options),
-    )
+    with working("Simulating"):
+        scan = simulate(
+            load=loads[0] if len(loads) == 1 else loads,
+            half_range=si(options["half_range"], -3),
+            points=options["points"],
+            raster=options["raster"],
+            **_shared_settings(options),
+        )
     if laboratory:
         scan = common.with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
     with together():
@@ -298,17 +299,18 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
     of_sphere = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
     settings["sphere"] = common.indenter_from("sphere", of_sphere)
-    made = simulate_experiment(
-        interface=interface_of(options),
-        rod_points=options["points"],
-        loads=options["loads"] or _LOADS,
-        points=options["contacts"],
-        spacing=si(options["spacing"], -3),
-        load_scatter=si(options["load_scatter"], -2),
-        position_error=si(options["position_error"], -6),
-        thickness_factor=options["thickness_factor"],
-        **settings,
-    )
+    with working("Simulating"):
+        made = simulate_experiment(
+            interface=interface_of(options),
+            rod_points=options["points"],
+            loads=options["loads"] or _LOADS,
+            points=options["contacts"],
+            spacing=si(options["spacing"], -3),
+            load_scatter=si(options["load_scatter"], -2),
+            position_error=si(options["position_error"], -6),
+            thickness_factor=options["thickness_factor"],
+            **settings,
+        )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     with together(folder):
         write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
