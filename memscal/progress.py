@@ -33,7 +33,8 @@ class Progress:
     task : str
         What is counted: ``"draws"``, ``"contacts"``, ``"loads"``, ``"scans"``, ...
     done, total : float
-        How many are done, and of how many; of ``"finite strain"`` the share of the work, of 1.
+        How many are done, and of how many, 0 if that is not known; of ``"the loading"`` the share
+        of the work, of 1.
     seconds : float
         Since the task began.
     kept : float
@@ -70,8 +71,11 @@ class Progress:
 
     def __str__(self) -> str:
         """Return the count with the time left."""
-        share = f"{self.done:.0%} of {self.task}"
-        text = share if self.total == 1 else f"{self.done:,.0f} of {self.total:,.0f} {self.task}"
+        if self.total == 1:
+            text = f"{self.done:.0%} of {self.task}"
+        else:
+            total = f" of {self.total:,.0f}" if self.total else ""
+            text = f"{self.done:,.0f}{total} {self.task}"
         return f"{text}, {span(self.left)} left" if self.kept < self.done < self.total else text
 
 

@@ -29,6 +29,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_FILE_BYTES, MOST_OTHER_TAGS, MOST_TAGS, too_large
+from memscal.progress import counted
 
 _KINDS = dict.fromkeys((".xlsx", ".xlsm"), "workbook") | dict.fromkeys(
     (".parquet", ".pq"), "Parquet"
@@ -89,9 +90,10 @@ def _sheet_table(
         why = f"Its sheets are: {', '.join(book.sheetnames)}."
         raise InputError(f"{name} has no sheet {sheet!r}.", why=why, cure="Give one of them.")
     chosen = book[sheet] if sheet else book.worksheets[0]
+    claimed = chosen.max_row or 0
     chosen.reset_dimensions()  # which may claim billions of cells
     text, cells = io.BytesIO(), 0
-    for row in chosen.iter_rows(values_only=True):
+    for row in counted(chosen.iter_rows(values_only=True), "rows", claimed):
         cells += max(len(row), 1)
         if cells > MOST_TAGS:
             raise too_large(name, cells, MOST_TAGS, "cells", cure="Save it as CSV.")
