@@ -31,6 +31,7 @@ from robustness.damage import (
 
 import memscal
 from memscal.cli import main
+from memscal.errors import UnitWarning
 from memscal.formats.artifact import write_artifact
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
@@ -107,8 +108,9 @@ def survives(folder: Path, data: bytes, *commands: tuple[str, ...], name: str = 
         said, shown = io.StringIO(), io.StringIO()
         start = time.process_time()
         with warnings.catch_warnings(), contextlib.chdir(folder), little_memory():
-            # What a user would see of numpy, scipy or h5py.
+            # What a user would see of numpy, scipy or h5py; of a wrong unit they are to see it.
             warnings.simplefilter("error")
+            warnings.simplefilter("default", UnitWarning)
             with contextlib.redirect_stderr(said), contextlib.redirect_stdout(shown):
                 code = main([*command])
         words = said.getvalue() + shown.getvalue()
@@ -158,6 +160,7 @@ CORPUS = (
     ("scan", Edit("sparse", _U)), ("scan", Edit("sparse", _X, dtype="i1")),
     ("scan", Edit("fill", "/entry/sample/film/poisson_ratio", 5e-324)),
     ("raster", Edit("fill", "/entry/data/normal_load", float("nan"))),
+    ("raster", Edit("scale", "/entry/sample/film/young_modulus", 1e-9)),
     ("artifact", Edit("text", _OPTIONS, text='{"A": NaN}')),
     ("artifact", Edit("text", _OPTIONS, text="[1e999]")),
     ("artifact", Edit("fill", _LIMIT, float("inf"))),
