@@ -578,7 +578,7 @@ def _effects(
     if "model_form" in effects and (others or contacts):
         # Two laws differ by too much for the first order: calibrated by the other one, too.
         with suppress(MemscalError):
-            others = others or [press_neo_hookean(scan) for scan in scans]
+            others = others or [press_neo_hookean(scan.set_up) for scan in scans]
             exact = solve(scans, others, solution.method, estimate.points.channel)
             effects["model_form"] = replace(effects["model_form"], exact=exact)
     return effects

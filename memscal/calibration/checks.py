@@ -1,7 +1,6 @@
 """Quality checks of a calibration: value, limit, and what a failure means."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -414,9 +413,9 @@ def _indentation(solution: Solution, results: Results) -> QualityCheck:
     """Compare the depth with the thickness: beyond the limit a linear film is formal."""
     film, depths = solution.scan.set_up.film, []
     pairs = zip(solution.scans, solution.stresses, strict=True)
-    for (below, *rod), stress in ((scan.set_up, stress) for scan, stress in pairs if scan.film):
-        linear = replace(below, law=LINEAR, mooney_rivlin_ratio=None)
-        depths.append((stress.depth or press_rod(linear, *rod).depth) / below.thickness)
+    for set_up, stress in ((scan.set_up, stress) for scan, stress in pairs if scan.film):
+        depth = stress.depth or press_rod(*set_up.under(LINEAR)).depth
+        depths.append(depth / set_up.film.thickness)
     meaning = "Largest depth of the rod over the film's thickness. "
     formal = film.law == LINEAR or not (film.law or "model_form" in results.changes)
     if formal:

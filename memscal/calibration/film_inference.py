@@ -116,7 +116,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
         if law == reference:
             solved[law] = replace(solution, scans=tuple(scans))
             continue
-        keys = [(*s.set_up, s.rod_friction) for s in scans]
+        keys = [scan.set_up for scan in scans]
         # Finite elements take long: other laws are weighed where closed form or table has them.
         if law == LINEAR or all(is_tabulated(*key) for key in keys):
             stresses = [press_rod(*key) for key in keys]
@@ -257,7 +257,7 @@ def free_thickness(solution: Solution) -> FreeThickness:
     def log_posterior(z: FloatArray) -> FloatArray:
         pairs = zip(films, stated + z * u, strict=True)
         at = {film: replace(film, thickness=float(h)) for film, h in pairs}
-        rods = [press_rod(at[s.set_up.film], *s.set_up[1:], s.rod_friction) for s in scans]
+        rods = [press_rod(at[film], *rest) for film, *rest in (scan.set_up for scan in scans)]
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
         both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
         return np.asarray(both - z @ z / 2)

@@ -139,13 +139,14 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     film = solution.scan.set_up.film
     law, changes = film.law, results.changes
     if law == LINEAR:
-        rubber_films = [replace(s.set_up.film, law=NEO_HOOKEAN) for s in solution.scans]
-        pairs = list(zip(solution.scans, rubber_films, strict=True))
-        if not all(is_tabulated(f, *s.set_up[1:], s.rod_friction) for s, f in pairs):
+        rubbers = [scan.set_up.under(NEO_HOOKEAN) for scan in solution.scans]
+        if not all(is_tabulated(*rubber) for rubber in rubbers):
             text = "The film is taken as linear elastic, as stated; no other law is counted."
             return [Message("film_law", text)]
         changes = _changes(
-            solution, results, [replace(scan, film=replace(f, law="")) for scan, f in pairs]
+            solution,
+            results,
+            [replace(scan, film=replace(scan.set_up.film, law="")) for scan in solution.scans],
         )
 
     def changed(by: str, sign: int) -> str:

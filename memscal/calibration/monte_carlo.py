@@ -22,7 +22,6 @@ from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
 from memscal.estimation.reference import (
     RECTANGLE,
-    expected_film,
     law_at_once,
     relative,
     rod_spectrum,
@@ -181,14 +180,14 @@ class DrawnScans:
 
 
 def _expected(scan: Scan) -> Scan:
-    return expected_film(scan) if scan.film else scan
+    return replace(scan, film=scan.film.expected) if scan.film else scan
 
 
 def _rod(scan: Scan, reference: RadialSpectrum, own: Scan) -> FloatArray:
     """Transform of a scan's rod, by the law of its own; zero where nothing hangs on a film."""
     if own.film is None:
         return np.zeros_like(reference.values)
-    return rod_spectrum(scan, reference, law_at_once(own))
+    return rod_spectrum(scan.set_up, reference, law_at_once(own.set_up))
 
 
 def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:

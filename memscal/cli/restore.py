@@ -72,7 +72,7 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
         if stress is None:
             # The calculated contact is shown beside it; one that has no solution is left out.
             try:
-                contact = press_rod(*restored.scan.set_up, data.rod_friction)
+                contact = press_rod(*restored.scan.set_up)
                 restored = replace(restored, comparison=restored.compare(contact))
             except MemscalError as failure:
                 out.note(f"No contact is shown beside the result: {failure.problem}")

@@ -20,7 +20,7 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.indenter import Rod
 from memscal.model.positions import require_plausible
 from memscal.model.records import FILM, INDENTER, LOAD
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, SetUp
 from memscal.model.stress import StressProfile
 from memscal.progress import counted
 
@@ -186,7 +186,7 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
 def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     """Choose the reference: the argument, the scan's own, or the rod on the expected film."""
     known = reference or scan.reference
-    return known or press_rod(*expected_film(scan).set_up, scan.rod_friction)
+    return known or press_rod(*scan.set_up.expected)
 
 
 def expected_spectra(
@@ -198,15 +198,10 @@ def expected_spectra(
         film, made_on = scan.film, film_of(stress)
         stated = film is not None and made_on is not None and film.expected != film
         if stated and film and made_on and film.poisson_ratio == made_on.poisson_ratio:
-            change = _difference(scan, reference, (expected_film(scan), scan))
+            change = _difference(scan.set_up, reference, (scan.set_up.expected, scan.set_up))
             reference = replace(reference, values=reference.values + change)
         moved.append(reference)
     return tuple(moved)
-
-
-def expected_film(scan: Scan) -> Scan:
-    """Return a scan on the film that is expected, of a Poisson's ratio of at most 1/2."""
-    return replace(scan, film=scan.set_up.film.expected)
 
 
 def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
@@ -347,7 +342,7 @@ def reference_sensitivities(
     of_inputs = film_sensitivities, rod_sensitivities, law_sensitivities
     inputs = zip(of_inputs, ("film", "indenter", "law"), strict=True)
     todo = [(function, of, i) for function, of in inputs for i in range(len(scans))]
-    found = (f(scans[i], references[i]) if scans[i].film else {} for f, _, i in todo)
+    found = (f(scans[i].set_up, references[i]) if scans[i].film else {} for f, _, i in todo)
     done = counted(found, "uncertain inputs", len(todo))
     for (_, of, i), by_source in zip(todo, done, strict=True):
         owners = [getattr(scan, of, None) for scan in scans]
@@ -359,12 +354,12 @@ def reference_sensitivities(
     return changes
 
 
-def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of each film property."""
     # Centred differences of the rod's solution, or its relative change for a reference from
     # elsewhere.
-    scan = expected_film(scan)
-    film = scan.set_up.film
+    set_up = set_up.expected
+    film = set_up.film
     changes: dict[str, FloatArray] = {}
     if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
@@ -373,45 +368,44 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
     for name in names if film.law in ("", LINEAR) else ["young_modulus", *names]:
         if ends := more_and_less(film, name):
             *films, share = ends
-            varied = [replace(scan, film=film) for film in films]
-            changes[name] = share * _difference(scan, reference, varied)
+            varied = [set_up._replace(film=film) for film in films]
+            changes[name] = share * _difference(set_up, reference, varied)
     return changes
 
 
-def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+def rod_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of the rod's radius."""
-    rod = scan.set_up.indenter
+    rod = set_up.indenter
     if not (u := rod.radius_uncertainty):
         return {}
     radii = (rod.radius + u, max(rod.radius - u, rod.radius / 2))
-    varied = [replace(scan, indenter=replace(rod, radius=radius)) for radius in radii]
-    return {"rod_radius": _difference(scan, reference, varied) / 2}
+    varied = [set_up._replace(indenter=replace(rod, radius=radius)) for radius in radii]
+    return {"rod_radius": _difference(set_up, reference, varied) / 2}
 
 
-def press_neo_hookean(scan: Scan) -> Contact:
-    """Press the rod of a scan on its film as if that were neo-Hookean, and stuck to it."""
+def press_neo_hookean(set_up: SetUp) -> Contact:
+    """Press a rod on its film as if that were neo-Hookean, and stuck to it."""
     # One that slides differs less from a linear film, and is not solved to any depth.
-    rubber = replace(scan.set_up.film.expected, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    return press_rod(rubber, scan.set_up.indenter, scan.stated_load)
+    return press_rod(*set_up.expected.under(NEO_HOOKEAN)._replace(rod_friction=None))
 
 
-def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by what is not known of the film's law."""
     # Rectangles, of which the standard uncertainty is the half width over the root of three: where
     # no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
     # at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
     # sliding. Nothing where the rod goes deeper than is solved.
-    film, rod, load = scan.set_up
-    if film.law == LINEAR or (film.law and scan.rod_friction is not None):
+    film, rod, load, friction = set_up
+    if film.law == LINEAR or (film.law and friction is not None):
         return {}
     k, order = reference.wavenumbers.k.tobytes(), reference.order
-    rubber, end = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None), load
+    rubber, end = set_up.under(NEO_HOOKEAN).film, load
     if film.law and isinstance(rod, Rod):
         # A film that slides is drawn out from under the rod, and is not solved to any depth.
         end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False)) or load
     try:
         if not film.law:
-            pair = press_neo_hookean(scan), press_rod(film, rod, load)
+            pair = press_neo_hookean(set_up), press_rod(film, rod, load)
         else:
             pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)
     except (ConvergenceError, DomainError):
@@ -421,11 +415,20 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     return {source: RECTANGLE * change * load / pair[0].load}
 
 
-def _difference(scan: Scan, reference: RadialSpectrum, varied: Sequence[Scan]) -> FloatArray:
-    """Difference of the rods of two scans, scaled from the scan's own rod to the reference."""
-    law = law_at_once(scan)
-    upper, lower, own = (rod_spectrum(rod, reference, law) for rod in (*varied, scan))
-    return (upper - lower) * relative(reference.values, own)
+def _difference(set_up: SetUp, reference: RadialSpectrum, varied: Sequence[SetUp]) -> FloatArray:
+    """Difference of two rods, scaled from the scan's own rod to the reference."""
+    k, order = reference.wavenumbers.k.tobytes(), reference.order
+    return reference.values * _relative_difference(set_up, *varied, k, order)
+
+
+@lru_cache(maxsize=256)
+def _relative_difference(
+    set_up: SetUp, more: SetUp, less: SetUp, nodes: bytes, order: int
+) -> FloatArray:
+    """Difference of two rods over the scan's own, kept for scans of other voltages."""
+    law = law_at_once(set_up)
+    upper, lower, own = (_rod_at(nodes, rod, law, order) for rod in (more, less, set_up))
+    return relative(upper - lower, own)
 
 
 def relative(values: FloatArray, own: FloatArray) -> FloatArray:
@@ -433,17 +436,18 @@ def relative(values: FloatArray, own: FloatArray) -> FloatArray:
     return np.divide(values, own, out=np.zeros_like(own), where=own != 0)
 
 
-def law_at_once(scan: Scan) -> str:
-    """Law by which rods like the scan's are solved in milliseconds: its own, or the nearest one."""
-    if scan.set_up.film.law in ("", LINEAR):
+def law_at_once(set_up: SetUp) -> str:
+    """Law by which such rods are solved in milliseconds: the film's own, or the nearest one."""
+    if set_up.film.law in ("", LINEAR):
         return LINEAR
-    rubber = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    rod, load = scan.set_up[1:]
-    return NEO_HOOKEAN if is_tabulated(rubber, rod, _MARGIN * load, scan.rod_friction) else LINEAR
+    larger = set_up.under(NEO_HOOKEAN)._replace(load=_MARGIN * set_up.load)
+    return NEO_HOOKEAN if is_tabulated(*larger) else LINEAR
 
 
-def rod_spectrum(scan: Scan, reference: RadialSpectrum, law: str) -> FloatArray:
-    """Transform of the base stress of a scan's rod, by a law, at the nodes of a reference (N)."""
-    film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=None)
-    contact = press_rod(film, *scan.set_up[1:], scan.rod_friction)
-    return _base_spectrum(contact, reference.wavenumbers.k.tobytes(), reference.order)
+def rod_spectrum(set_up: SetUp, reference: RadialSpectrum, law: str) -> FloatArray:
+    """Transform of the base stress of a rod, by a law, at the nodes of a reference (N)."""
+    return _rod_at(reference.wavenumbers.k.tobytes(), set_up, law, reference.order)
+
+
+def _rod_at(nodes: bytes, set_up: SetUp, law: str, order: int) -> FloatArray:
+    return _base_spectrum(press_rod(*set_up.under(law)), nodes, order)

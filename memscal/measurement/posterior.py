@@ -42,7 +42,6 @@ from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
-    expected_film,
     law_at_once,
     law_sensitivities,
     rod_spectrum,
@@ -52,7 +51,7 @@ from memscal.mechanics.film_response import base_normal_from_pressure, base_norm
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.measured_stress import MeasuredScan
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, SetUp
 
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
 #: Shears from none to full stick: spheres of a contact radius from half to twice the thickness.
@@ -65,27 +64,27 @@ _LEAST_PRESSURE = 0.1
 
 def film_transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
     """Transform of the base's normal stress under a pressure of unit transform."""
-    return _transfer(expected_film(scan), wavenumbers)
+    return _transfer(scan.set_up.expected, wavenumbers)
 
 
-def _transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
+def _transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> FloatArray:
     # A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
     # on a linear film makes the rod's own base stress.  Other indenters sink less.
-    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
-    if (law := law_at_once(scan)) == LINEAR:
+    linear = RadialSpectrum(wavenumbers, _linear_transfer(set_up.film, wavenumbers.k))
+    if (law := law_at_once(set_up)) == LINEAR:
         return linear.values
-    own, other = (rod_spectrum(scan, linear, name) for name in (law, LINEAR))
-    return linear.values + _per_pressure(scan, linear, own - other)
+    own, other = (rod_spectrum(set_up, linear, name) for name in (law, LINEAR))
+    return linear.values + _per_pressure(set_up, linear, own - other)
 
 
 def _linear_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
     return base_normal_from_pressure(k * film.thickness, film.poisson_ratio)
 
 
-def _per_pressure(scan: Scan, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
+def _per_pressure(set_up: SetUp, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
     """Divide a change of the base stress (N) by the rod's pressure on a linear film."""
-    pressure = rod_spectrum(scan, linear, LINEAR) / linear.values
-    return change * pressure / (pressure**2 + (_LEAST_PRESSURE * scan.stated_load) ** 2)
+    pressure = rod_spectrum(set_up, linear, LINEAR) / linear.values
+    return change * pressure / (pressure**2 + (_LEAST_PRESSURE * set_up.load) ** 2)
 
 
 @dataclass(frozen=True)
@@ -499,18 +498,18 @@ def _of_sensor(
 
 def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> dict[str, FloatArray]:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
-    scan = expected_film(scan)
-    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.set_up.film, wavenumbers.k))
+    set_up = scan.set_up.expected
+    linear = RadialSpectrum(wavenumbers, _linear_transfer(set_up.film, wavenumbers.k))
     columns: dict[str, FloatArray] = {}
     for name in ("thickness", "poisson_ratio"):
-        if ends := more_and_less(scan.set_up.film, name):
+        if ends := more_and_less(set_up.film, name):
             *films, share = ends
-            more, less = (_transfer(replace(scan, film=film), wavenumbers) for film in films)
+            varied = (set_up._replace(film=film) for film in films)
+            more, less = (_transfer(each, wavenumbers) for each in varied)
             columns[name] = share * (more - less)
-    film = replace(scan.set_up.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-    if law_at_once(replace(scan, film=film)) != LINEAR:
+    if law_at_once(set_up.under(NEO_HOOKEAN)) != LINEAR:
         columns |= {
-            name: _per_pressure(scan, linear, change * scan.stated_load)
-            for name, change in law_sensitivities(scan, linear).items()
+            name: _per_pressure(set_up, linear, change * set_up.load)
+            for name, change in law_sensitivities(set_up, linear).items()
         }
     return columns

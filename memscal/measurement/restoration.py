@@ -56,7 +56,7 @@ def compare_stress(
     posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
 ) -> StressComparison:
     """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
-    _, indenter, load = scan.set_up
+    _, indenter, load, _ = scan.set_up
     if not isinstance(indenter, Rod) and abs(stress.load / load - 1) > SAME_LOAD:
         raise InputError(
             f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",

@@ -93,11 +93,21 @@ def require_plane(x: FloatArray, y: FloatArray) -> None:
 
 
 class SetUp(NamedTuple):
-    """What a scan was made with, all of it stated; the load in N."""
+    """What a scan was made with; the load in N."""
 
     film: ElasticFilm
     indenter: RoundIndenter
     load: float
+    rod_friction: float | None
+
+    @property
+    def expected(self) -> SetUp:
+        """The same with the film that is expected, of a Poisson's ratio of at most 1/2."""
+        return self._replace(film=self.film.expected)
+
+    def under(self, law: str) -> SetUp:
+        """Return the same with a film of a law without further parameters."""
+        return self._replace(film=replace(self.film, law=law, mooney_rivlin_ratio=None))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -286,7 +296,7 @@ class Scan:
         """Film, indenter and load; a scan that does not state all of them is refused."""
         film, indenter, load = self.film, self.indenter, self.load
         if film is not None and indenter is not None and load is not None:
-            return SetUp(film, indenter, load)
+            return SetUp(film, indenter, load, self.rod_friction)
         names = {"sample/film": film, "indenter": indenter, "indenter/load": load}
         absent = [name for name, value in names.items() if value is None]
         missing = " and no ".join(f"{n.rpartition('/')[2]} (/entry/{n})" for n in absent)

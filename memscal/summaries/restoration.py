@@ -99,7 +99,7 @@ def tables(restored: Restoration) -> list[Table]:
         fit = f"χ²/ν = {comparison.chi_square:.3g}, p = {comparison.p_value:.2g}"
         beside = f"within 95 % bounds at {within:.0%} of radii"
         rows += [(f"{origin}, blurred", fit), (f"{origin}, beside the restored", beside)]
-    film, indenter, _ = restored.scan.set_up
+    film, indenter, *_ = restored.scan.set_up
     title = (
         f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
         f"radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"

@@ -122,7 +122,7 @@ def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path
 
 def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertainty() -> None:
     spectrum = reference_spectrum(CONTACT, POINTS)
-    changes = film_sensitivities(SCAN, spectrum) | rod_sensitivities(SCAN, spectrum)
+    changes = film_sensitivities(SCAN.set_up, spectrum) | rod_sensitivities(SCAN.set_up, spectrum)
     assert set(changes) == {"young_modulus", "thickness", "poisson_ratio", "rod_radius"}
     # At a given load the base stress of a linear film does not know its modulus...
     assert not np.any(changes["young_modulus"])
