@@ -4,6 +4,7 @@ from functools import partial
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from memscal.cli import options as common
 from memscal.cli import output as out
@@ -86,6 +87,9 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     """
     common.require_one_kernel(options)
     targets, figures, vary = (options[name] for name in ("targets", "figures", "vary"))
+    source = click.get_current_context().get_parameter_source("noise")
+    if options["noise_voltage"] is not None and source == ParameterSource.COMMANDLINE:
+        raise click.UsageError("--noise and --noise-voltage both state the noise: give one.")
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     out.prove_writable(figures, force=force)

@@ -243,9 +243,9 @@ def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
 
 def _centre(data: ApparatusData) -> float:
     """Return where the indenter's axis stands on the axis that is drawn, in m."""
-    if _by_distance(data) or "centre" not in data.parameters:
+    if _by_distance(data):
         return 0.0
-    return data.parameters["centre"]
+    return next((data.parameters[n] for n in ("centre", "centre_y") if n in data.parameters), 0.0)
 
 
 def _by_distance(data: ApparatusData) -> bool:

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from memscal.figures.style import COLOURS, drawable, legend_above, panels_of
 from memscal.model.arrays import FloatArray
-from memscal.model.fleet import ROBUST_LIMIT, FleetResults, robust_spread
+from memscal.model.fleet import FleetResults, robust_limit, robust_spread
 from memscal.summaries.declared import power_of_ten
 from memscal.summaries.fleet_results import error_classes, failures
 
@@ -36,20 +36,22 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     """Draw a histogram of the bulk; values beyond it are counted."""
     axes.set_xlabel(label)
     axes.set_ylabel("sensors")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     values = values[np.isfinite(values)]
     if not values.size:
         return
     centre, spread = float(np.median(values)), robust_spread(values)
-    reach = 1.2 * ROBUST_LIMIT * spread
+    limit = robust_limit(values.size)
+    reach = 1.2 * limit * spread
     low, high = max(values.min(), centre - reach), min(values.max(), centre + reach)
     inside = values[(values >= low) & (values <= high)]
     bins = int(np.clip(2 * np.cbrt(inside.size), 5, _MOST_BINS))
     axes.hist(inside, bins=bins, color=COLOURS["deconvolved"], alpha=0.8)
     axes.axvline(centre, color=COLOURS["measured"], lw=1, label="median")
-    limits = [centre + sign * ROBUST_LIMIT * spread for sign in (-1, 1)]
-    for i, limit in enumerate(limit for limit in limits if low <= limit <= high):
-        name = f"{'_' * i}{ROBUST_LIMIT:g} robust deviations"
-        axes.axvline(limit, color=COLOURS["gaussian"], lw=1, ls="--", label=name)
+    limits = [centre + sign * limit * spread for sign in (-1, 1)]
+    for i, end in enumerate(end for end in limits if low <= end <= high):
+        name = f"{'_' * i}{limit:.2g} robust deviations"
+        axes.axvline(end, color=COLOURS["gaussian"], lw=1, ls="--", label=name)
     if low < high:
         margin = 0.04 * (high - low)
         axes.set_xlim(low - margin, high + margin)

@@ -35,7 +35,9 @@ def opened_scans(
 ) -> tuple[Scan, ...]:
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
     listed = _listed(scans)
-    return tuple(opened_scan(scan, most, accept_altered=accept_altered) for scan in listed)
+    opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
+    _require_different(opened)
+    return tuple(opened)
 
 
 def opened_stress(
@@ -56,7 +58,9 @@ def opened_contacts(
     contacts: Contacts, *, accept_altered: bool = False
 ) -> tuple[Scan | MeasuredStress, ...]:
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
-    return tuple(_scan_or_stress(item, accept_altered) for item in _listed(contacts))
+    opened = [_scan_or_stress(item, accept_altered) for item in _listed(contacts)]
+    _require_different([item for item in opened if isinstance(item, Scan)])
+    return tuple(opened)
 
 
 def _scan_or_stress(item: Any, accept_altered: bool) -> Scan | MeasuredStress:
@@ -68,6 +72,23 @@ def _scan_or_stress(item: Any, accept_altered: bool) -> Scan | MeasuredStress:
         if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
             return stress_from(file)
         return scan_from(file)
+
+
+def _require_different(scans: Sequence[Scan]) -> None:
+    """Refuse a scan that is given twice: its readings would count as independent ones."""
+    seen = set()
+    for scan in scans if len(scans) > 1 else ():
+        arrays = scan.x, scan.y, scan.u_zz, scan.normal_load, *scan.channels.values()
+        content = scan.direction, scan.load, *(a if a is None else a.tobytes() for a in arrays)
+        if content in seen:
+            named = scan.source.file_name if scan.source else f"A scan of {scan.u_zz.size} points"
+            raise InputError(
+                f"{named} is given twice.",
+                why="The same readings would count as independent ones, and every uncertainty "
+                "would come out too small.",
+                cure="Give each scan once.",
+            )
+        seen.add(content)
 
 
 def _listed(items: Any) -> list[Any]:

@@ -132,7 +132,9 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
             f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
             why=f"The contact of a {scan.set_up.indenter.shape} grows with its load: each has a "
             "stress of its own.",
-            cure="Choose one of them by load (--load), or give the scan of one load.",
+            cure="Choose one of several loads by load (--load). Recorded loads that scatter about "
+            "one are corrected for by memscal.measure_stress() (memscal apply), with a calculated "
+            "contact; here leave them out of the scan.",
         )
 
 

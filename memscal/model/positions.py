@@ -198,6 +198,8 @@ _MISTAKES = {
     1e-3: "mm stated as m, or um as mm",
 }
 _NEAR, _FEWEST = 0.15, 6
+#: A nominal load may lie beyond those recorded by this share.
+_BEYOND = 0.3
 #: Of more points than these some tell the width of a peak.
 _MOST_POINTS = 1_000_000
 #: Share of points within a peak's width that lie above its half.
@@ -222,8 +224,25 @@ def require_span(scan: Scan) -> None:
     _refuse(scan, lengths, (short, *row, _SHORT), (long, *row, _LONG))
 
 
+def require_recorded(load: float, recorded: FloatArray) -> None:
+    """Refuse a nominal load in N that lies beyond those that were recorded."""
+    if np.isnan(recorded).all():
+        return
+    low, high = float(np.nanmin(recorded)), float(np.nanmax(recorded))
+    if not (1 - _BEYOND) * low <= load <= (1 + _BEYOND) * high:
+        raise InputError(
+            f"The load is stated as {load:.4g} N, but those recorded go from {low:.4g} to "
+            f"{high:.4g} N.",
+            why="One of them is wrong, and the stress at the base follows from it.",
+            cure="Leave the load out to take the median of those recorded, or correct them or "
+            "their unit (normal_load; --load-column, --load-unit).",
+        )
+
+
 def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
+    if scan.load is not None and scan.normal_load is not None:
+        require_recorded(scan.load, scan.normal_load)
     h, lengths = _film(scan).thickness, _lengths(scan)
     span, rod = lengths["span"], 2 * lengths.get("radius", 0.0)
     of_rod = f"The positions span {span * 1e3:.4g} mm; the rod's width is"

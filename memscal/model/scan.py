@@ -92,6 +92,19 @@ def require_plane(x: FloatArray, y: FloatArray) -> None:
         )
 
 
+#: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
+_APART, _FEWEST, _MOST_GROUPS = 0.1, 5, 12
+
+
+def load_groups(loads: FloatArray) -> NDArray[np.intp]:
+    """Number loads in N, (n,), by the few that were set, ascending; all 0 if these are not seen."""
+    order, index = np.argsort(loads, kind="stable"), np.zeros(loads.size, dtype=np.intp)
+    index[order[1:]] = np.cumsum(np.diff(np.log(loads[order])) > _APART)
+    counts = np.bincount(index)
+    seen = counts.min() >= _FEWEST and counts.size <= _MOST_GROUPS
+    return index if seen else np.zeros_like(index)
+
+
 class SetUp(NamedTuple):
     """What a scan was made with; the load in N."""
 
@@ -403,6 +416,13 @@ class Scan:
                 cure="Give the indenter's load (/entry/indenter/load).",
             )
         arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        if self.load is not None and (self.load_uncertainty or 0.0) >= self.load:
+            raise InputError(
+                f"The standard uncertainty of the load is {self.load_uncertainty:g} N, but the "
+                f"load is {self.load:g} N.",
+                why="By a load that may be zero nothing is known of the stress.",
+                cure=f"Give it in N: 1 % of the load are {0.01 * self.load:g} N.",
+            )
         require_rod_friction(self.rod_friction)
         for name in ("u_zz_errors", "normal_load_errors"):
             errors = getattr(self, name)

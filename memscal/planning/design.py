@@ -44,6 +44,8 @@ from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 MOST_POSITIONS = 4096
 #: A range that is a whole number of steps but for rounding is one.
 _ROUNDING = 1e-6
+#: An apparatus function that takes less than this from every wave that a film passes is a point.
+_A_POINT = 1e-3
 #: What a plan and a simulated scan have in common.
 _OF_SIMULATION = ("film", "rod", "kernel", "conversion_constant", "load", "load_uncertainty")
 #: The film passes nothing beyond exp(-kh) of this.
@@ -91,6 +93,14 @@ class Plan:
                 why="Without noise there is no uncertainty to expect, and no scan is without.",
                 cure="Give its standard deviation: a share of the largest signal (0.005: half a "
                 "percent), or a voltage; measure it with the rod at rest.",
+            )
+        k = _LARGEST_KH / self.film.thickness
+        if abs(1 - float(self.kernel.transform(np.array([k]))[0])) < _A_POINT:
+            raise InputError(
+                f"The apparatus function is a point to a film of {self.film.thickness * 1e3:.4g} "
+                "mm: it blurs nothing of what the film passes.",
+                why="No scan would tell its width.",
+                cure="Check its unit: widths are in metres (um on the command line).",
             )
         if not abs(self.centre) <= self.half_range:
             raise InputError(
@@ -283,6 +293,9 @@ def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, fl
             raise InputError(problem, cure=f"Choose from {', '.join(TARGETS)}.")
         if not 0 < value < np.inf:
             raise InputError(f"The {name} that is wanted is {value:g}, but it must be above zero.")
+        if value >= 1 and full != TARGETS["resolved"]:
+            problem = f"The {name} is wanted to {value:.0%}, which is no uncertainty of use."
+            raise InputError(problem, cure="Give the relative uncertainty: 0.01 is 1 %.")
         named[full] = float(value)
     if vary is not None and vary not in VARIED:
         cure = f"Choose from {', '.join(VARIED)}."

@@ -44,8 +44,9 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         for scan in comparison.measured.scans
     ]
     head = {"schema_version": "1", "scans": scans}
+    tested = comparison.measured.noise_stated
     joint = [
-        {"lubrication": lubrication, "loading": loading, **_estimate(estimate)}
+        {"lubrication": lubrication, "loading": loading, **_estimate(estimate, tested)}
         for lubrication, loading, estimate in _joint(comparison)
     ]
     if isinstance(comparison, ShearComparison):
@@ -54,7 +55,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
                 "lubrication": profile.lubrication,
                 **members(records.STRESS_NUMBERS.quantities[:1], profile),
                 "by_loading": {
-                    loading or "given": _estimate(estimates[i])
+                    loading or "given": _estimate(estimates[i], tested)
                     for loading, estimates in comparison.loads.items()
                 },
             }
@@ -84,31 +85,31 @@ def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
     """Return one row for each load and definition of the loading; open ends are infinite."""
     import pandas as pd
 
-    rows = []
+    rows, tested = [], comparison.measured.noise_stated
     for loading in comparison.loadings:
         loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
         for profile, load in zip(comparison.measured.profiles, loads, strict=True):
             row: dict[str, Any] = {"loading": loading, **columns(records.COMPARED_LOAD, profile)}
             if isinstance(load, BoundedEstimate):
-                row |= _columns("friction", load)
+                row |= _columns("friction", load, tested)
             else:
                 row |= columns(records.COMPARED_MAXIMA, load) | {"bracketed": load.bracketed}
-                row |= _columns("friction by maximum", load.by_maximum)
-                row |= _columns("friction by profile", load.by_profile)
+                row |= _columns("friction by maximum", load.by_maximum, tested)
+                row |= _columns("friction by profile", load.by_profile, tested)
             rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _columns(name: str, estimate: BoundedEstimate) -> dict[str, float]:
+def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, float]:
     value, u, high = estimate.value, estimate.standard_uncertainty, estimate.interval.high
     return {
         name: math.nan if value is None else value,
         f"u({name})": math.nan if u is None else u,
         f"{name}, low": estimate.interval.low,
         f"{name}, high": math.inf if high is None else high,
-        f"{name}, chi2": estimate.least,
+        f"{name}, chi2": estimate.least if tested else math.nan,
         f"{name}, degrees": estimate.degrees,
-        f"{name}, p": estimate.p_value,
+        f"{name}, p": estimate.p_value if tested else math.nan,
     }
 
 
@@ -182,8 +183,8 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
     mu, sticking = comparison.friction, np.isinf(comparison.friction).tolist()
     return {
         "effective_friction_coefficient": {
-            "by_maximum": _estimate(load.by_maximum),
-            "by_profile": _estimate(load.by_profile),
+            "by_maximum": _estimate(load.by_maximum, comparison.measured.noise_stated),
+            "by_profile": _estimate(load.by_profile, comparison.measured.noise_stated),
         },
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
@@ -196,10 +197,12 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
     }
 
 
-def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
+def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
+    # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
+    fit: dict[str, Any] = {} if tested else {"least": None, "p_value": None}
     return {
         **interface_laws.bounded_json(records.FRICTION, estimate),
-        **members(records.ESTIMATE_FIT, estimate),
+        **members(records.ESTIMATE_FIT, estimate, **fit),
         "lubricated_beside": estimate.beside,
         "profile_likelihood": {
             "friction_coefficient": {"value": _shortened(estimate.values), "unit": "1"},
@@ -325,12 +328,12 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
     way = f"{loading} loading" if loading else "profiles as given"
     shear = isinstance(comparison, ShearComparison)
     loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
-    head = [*_LABELS, "by the shear", "χ²/ν", "p"]
+    tests = ["χ²/ν", "p"] if comparison.measured.noise_stated else []
+    head = [*_LABELS, "by the shear", *tests]
     if not shear:
-        head = [*_LABELS, "by the maximum", "by the profile", "χ²/ν", "p", "bracketed"]
+        head = [*_LABELS, "by the maximum", "by the profile", *tests, "bracketed"]
     rows = []
-    # An estimated noise is as large as the misfit: a chi-square by it says nothing.
-    fit = _fit if comparison.measured.noise_stated else lambda _: ("", "")
+    fit = _fit if tests else lambda _: ()
     for lubrication, by_loading in comparison.joint.items():
         count = 0
         for i, load in enumerate(loads):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.model.fleet import ROBUST_LIMIT, FleetResults, robust_spread
+from memscal.model.fleet import FleetResults, robust_limit, robust_spread
 from memscal.model.notation import format_measured
 from memscal.summaries.table import Table, finite
 
@@ -37,6 +37,10 @@ def error_classes(fleet: FleetResults) -> dict[str, int]:
     return dict(Counter(kind for kind, _ in fleet.errors.values()).most_common())
 
 
+def _limit(fleet: FleetResults) -> float:
+    return robust_limit(int(np.isfinite(fleet.conversion_constant).sum()))
+
+
 def outliers(fleet: FleetResults) -> dict[int, str]:
     """Return sensors far from the median or with a failed check, the farthest first, and why."""
     deviations = {}
@@ -47,14 +51,15 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
         distance = values - np.median(known) if spread > 0 else 0 * values
         deviations[symbol] = np.nan_to_num(distance / (spread or 1.0))
     farthest = np.max([np.abs(z) for z in deviations.values()], axis=0)
-    chosen = {int(i) for i in np.flatnonzero(farthest > ROBUST_LIMIT)}
+    limit = _limit(fleet)
+    chosen = {int(i) for i in np.flatnonzero(farthest > limit)}
     chosen |= fleet.failed.keys() - fleet.errors.keys()
     reasons = {}
     for i in sorted(chosen, key=lambda i: (-farthest[i], i)):
         texts = [
             f"{symbol} {abs(z[i]):.1f} deviations {'above' if z[i] > 0 else 'below'} the median"
             for symbol, z in deviations.items()
-            if abs(z[i]) > ROBUST_LIMIT
+            if abs(z[i]) > limit
         ]
         if names := fleet.failed.get(i):
             texts.append("failed " + ", ".join(names).replace("_", " "))
@@ -81,7 +86,7 @@ def tables(fleet: FleetResults) -> list[Table]:
         for kind, n in told["error_classes"].items()
     ]
     title = (
-        f"Outliers: beyond {ROBUST_LIMIT:g} robust deviations from the median, or a failed check"
+        f"Outliers: beyond {_limit(fleet):.2g} robust deviations from the median, or a failed check"
     )
     if (further := told["outliers_in_all"] - _MOST_ROWS) > 0:
         title += f" ({further} further ones are in the tables)"

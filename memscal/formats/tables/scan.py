@@ -1,7 +1,7 @@
 """Scans from tables with one row per reading."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,10 +17,10 @@ from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.holds import find_holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
-from memscal.model.positions import places_of, require_plausible, require_span
+from memscal.model.positions import places_of, require_plausible, require_recorded, require_span
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
-from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers
+from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
 
 Column = str | int
@@ -122,6 +122,10 @@ def import_table(
     >>> scan
     <ImportedScan: line, 5 points, x from -8 to 8 mm, load 1 N>
     """
+    if unknown := stated.keys() - {item.name for item in fields(Scan)}:
+        problem = f"import_table has no argument {', '.join(map(repr, sorted(unknown)))}."
+        cure = "Give fields of memscal.Scan, such as indenter=memscal.Rod(radius=0.25e-3)."
+        raise InputError(problem, cure=cure)
     require_sign("sign of the voltage", u_sign)
     no_load, of_u = load is None and load_column is None, (u_unit, "u_unit (--u-unit)")
     noisy = u_errors is not None or noise is not None
@@ -196,16 +200,17 @@ def _scan_of(
     x_error: float | None, stated: dict[str, Any],
 ) -> ImportedScan:  # fmt: skip
     """Return the scan of columns without gaps in their positions, and add to the notes."""
-    if stated["load"] is None and "normal_load" in columns:
-        stated["load"] = float(np.nanmedian(columns["normal_load"]))
-        notes.append(f"The nominal load is the median of the column: {stated['load']:g} N.")
+    words = _numbered_by_load(columns, notes)
+    if "normal_load" in columns:
+        _take_load(columns["normal_load"], notes, stated)
     if load_scatter is not None and "normal_load" not in columns:
         if stated["load"] is None:
             problem = "The scatter of the loads is given, but no load."
             raise InputError(problem, cure="Give the load in N, or its column.")
         columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
     stated = {"direction": _direction(columns, notes), **stated}
-    notes += [*_counted(columns), *_set_up_in_words(SimpleNamespace(**stated))]
+    in_words = SimpleNamespace(**{**stated, "load": words or stated["load"]})
+    notes += [*_counted(columns), *_set_up_in_words(in_words)]
     errors = columns.get("u_zz_errors")
     u = None if errors is None else f"{reading.text(float(np.nanmedian(errors)))} (median)"
     notes.append(f"Standard uncertainty of each reading: {u or 'not stated'}.")
@@ -223,6 +228,30 @@ def _scan_of(
     told = {"channels": channels, "notes": texts, "messages": tuple(messages)}
     fields: dict[str, Any] = {**columns, **stated, **told}
     return ImportedScan(**fields)
+
+
+def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
+    """Number the readings of a line at several loads by these, if nothing else does; name them."""
+    loads = columns.get("normal_load")
+    if loads is None or "y" in columns or not np.all(loads > 0):
+        return ""
+    groups = load_groups(loads)
+    if not groups.any():
+        return ""
+    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(int(groups.max()) + 1)]
+    words = f"of {', '.join(levels[:-1])} and {levels[-1]} N"
+    if "repeat" not in columns:
+        columns["repeat"] = groups
+        notes.append(f"{len(levels)} lines: one for each of the loads {words}.")
+    return words
+
+
+def _take_load(loads: NDArray[Any], notes: list[str], stated: dict[str, Any]) -> None:
+    """Take the median of a column as the nominal load; refuse one that contradicts the column."""
+    if stated["load"] is None:
+        stated["load"] = float(np.nanmedian(loads))
+        notes.append(f"The nominal load is the median of the column: {stated['load']:.4g} N.")
+    require_recorded(stated["load"], loads)
 
 
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
@@ -263,8 +292,11 @@ def _direction(columns: Columns, notes: list[str]) -> str:
     if "y" not in columns or min(x, y) > LINE * max(x, y):
         return "x"
     along, across = ("y", "x") if y > x else ("x", "y")
-    across_mm = min(x, y) * 1e3
-    notes.append(f"The points are a line along {along}: {across} stays within {across_mm:.4g} mm.")
+    if across in columns and min(x, y) > 0:
+        stays = f": {across} stays within {min(x, y) * 1e3:.4g} mm"
+    else:
+        stays = ""
+    notes.append(f"The points are a line along {along}{stays}.")
     columns["x"] = columns.pop("y") if along == "y" else columns["x"]
     columns.pop("y", None)
     return along

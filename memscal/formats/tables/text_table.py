@@ -32,6 +32,8 @@ from memscal.progress import counted
 
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+#: A number with a separator of thousands, such as -4.000,0.
+_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 #: A name and its unit: x (mm) or x [mm], and x/mm.
 _HEADS = (re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"), re.compile(r"([^/]+?)\s*/(.+)"))
 #: Cells that mean a missing value, in capital or small letters.
@@ -148,7 +150,8 @@ class NamedColumns:
             raise InputError(
                 f"{self._name} has no column {column!r}.",
                 why="Its columns are: " + ", ".join(self.names) + ".",
-                cure="Give one of these names, or a number counted from 1.",
+                cure="Give one of these names, or a number counted from 1. If the columns of the "
+                "table are others, state what separates its cells (--delimiter).",
             )
         return number - 1
 
@@ -198,9 +201,11 @@ class NamedColumns:
             lines, cells = self._wrong[item.column]
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
+            grouped = any(map(_GROUPED.fullmatch, cells))
             raise FormatError(
                 f"{self.where(item.column)} holds what is not "
                 f"{' or '.join(['a number', *item.words])} in {self._row} {named}{more}.",
+                why="Separators of thousands are not read." if grouped else "",
                 cure="Correct or remove these lines; name a word that means a missing value "
                 "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
                 "stand before the header (--skip-rows N).",
