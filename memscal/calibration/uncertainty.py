@@ -8,7 +8,7 @@ of the expected squared error ``regularisation``.  All sources are described in 
 Inputs add one column each, the change of all results by one standard uncertainty.  An input that
 is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
 \sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the positions.  A change of the
-load scales A alone.
+load scales A; on a film at finite strain it changes the base stress per newton as well.
 """
 
 from __future__ import annotations
@@ -25,13 +25,17 @@ from memscal.axisymmetry.hankel import (
     radial_spline,
     ring_areas,
 )
-from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.calibration.fields import RasterFields
+from memscal.calibration.kernel_functionals import kernel_functionals, noise_area
 from memscal.calibration.stages import Deconvolution, Solution
-from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import RECTANGLE, carried_force, reference_sensitivities
+from memscal.estimation.reference import (
+    RECTANGLE,
+    carried_force,
+    load_sensitivities,
+    reference_sensitivities,
+)
 from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
@@ -40,8 +44,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-#: Points per step of the profile between which the half maximum is interpolated.
-_FINE = 20
 #: Windows below this have closed; what sums of squares lose to rounding.
 _CLOSED = _ROUNDING = 1e-9
 #: Columns over many points that are made at a time.
@@ -65,56 +67,6 @@ _OF_GAUSSIAN = (
 _LEAST_REACH = 0.5
 #: Sources that are the same error in every scan at the same positions.
 NOT_RANDOM = ("regularisation", "window", "misfit")
-
-
-@dataclass(frozen=True, eq=False)
-class Functional:
-    """A number read off G: its parameter's name, its value, and its derivative by G(r)."""
-
-    name: str
-    value: float
-    row: FloatArray
-
-
-def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
-    """Return the Gaussian width nearest to G, its half width and noise-equivalent area."""
-    r, g = field.r, field.radial
-    area = float(1 / np.sum(ring_areas(r) * g**2))  # 4 pi sigma^2 of a Gaussian
-    of_noise = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
-    return (_gaussian_width(r, g, sigma), _half_width(r, g), of_noise)
-
-
-def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
-    """Width of the Gaussian u nearest to G over the plane."""
-    # Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
-    slope, step = unit_gaussian_slope(r, sigma), 1e-4 * sigma
-    bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
-    left = unit_gaussian(r, sigma) - g
-    row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
-    return Functional("gaussian_sigma_deconvolved", sigma, row)
-
-
-def _half_width(r: FloatArray, g: FloatArray) -> Functional:
-    """Diameter of the outermost circle where G is half of its maximum."""
-    # With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
-    fine = np.linspace(r[0], r[-1], _FINE * r.size)
-    values = radial_spline(r, g)(fine)
-    top = int(np.argmax(values))
-    last = min(int(np.flatnonzero(values >= values[top] / 2)[-1]), fine.size - 2)
-    slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
-    half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
-    row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
-    row = -2 * row / slope if slope else np.zeros_like(row)
-    return Functional("fwhm", float(2 * half), row)
-
-
-def _at(r: FloatArray, place: float) -> FloatArray:
-    """Row that reads a profile at a radius, by linear interpolation."""
-    row = np.zeros_like(r)
-    i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
-    share = (place - r[i]) / (r[i + 1] - r[i])
-    row[i], row[i + 1] = 1 - share, share
-    return row
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,18 +96,26 @@ def input_effects(
     if alternatives is not None:
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (a.values - ours.values) for a, ours in pairs]
-    effects = {}
-    for source, change in changes.items():
-        changed = zip(model.references, change, strict=True)
-        spectra = tuple(replace(reference, values=values) for reference, values in changed)
-        signal = replace(model, references=spectra).signal
-        effects[source] = InputEffect(-signal(estimate.gaussian.geometry, estimate.kernel))
+    effects = {name: InputEffect(_mistaken(estimate, change)) for name, change in changes.items()}
     shares = np.array([scan.position_scale_uncertainty or 0.0 for scan in scans])
     if shares.any():
         slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
         error = slope * estimate.distance * shares[estimate.points.scan]
         effects["position_scale"] = InputEffect(-error)
-    return effects | _of_loads(scans, stresses, estimate)
+    effects |= _of_loads(scans, stresses, estimate)
+    if "load" in effects:
+        # Beside its scaling: at finite strain a larger load spreads the stress.
+        spread = _mistaken(estimate, load_sensitivities(scans, model.references))
+        effects["load"] = replace(effects["load"], voltage=effects["load"].voltage + spread)
+    return effects
+
+
+def _mistaken(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> FloatArray:
+    """Voltages (n,) that changes of the references' transforms would be mistaken for, in V."""
+    changed = zip(estimate.model.references, changes, strict=True)
+    spectra = tuple(replace(reference, values=values) for reference, values in changed)
+    model = replace(estimate.model, references=spectra)
+    return np.asarray(-model.signal(estimate.gaussian.geometry, estimate.kernel))
 
 
 def _of_loads(
@@ -398,6 +358,12 @@ def _numbers(
     """Value and derivatives of each parameter, in the order in which they are reported."""
     of_g = kernel[1 : 1 + deconvolution.g.r.size]
     functionals = kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma)
+    of_functionals = {f.name: (f.value, of_g.combined(f.row)) for f in functionals}
+    if deconvolution.divided and of_g.hidden.size:
+        # What a window hides of G adds to the integral of its square by its own square.
+        value, derivatives = of_functionals["noise_equivalent_area"]
+        whole = noise_area(deconvolution.g.r, deconvolution.g.radial + of_g.hidden[:, 0])
+        derivatives.hidden[0, 0] = whole - value
     hidden, gaussian = kernel.hidden.shape[1], estimate.gaussian
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain, count = estimate.gaussian_gain, estimate.points.ellipse
@@ -411,7 +377,7 @@ def _numbers(
     return {
         "conversion_constant": (deconvolution.conversion_constant, kernel[:1]),
         **numbers,
-        **{f.name: (f.value, of_g.combined(f.row)) for f in functionals},
+        **of_functionals,
         **_nuisances(estimate, hidden),
     }
 

@@ -383,6 +383,20 @@ def rod_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
     return {"rod_radius": _difference(set_up, reference, varied) / 2}
 
 
+def load_sensitivities(
+    scans: Sequence[Scan], references: Sequence[RadialSpectrum]
+) -> list[FloatArray]:
+    """Change of each scan's transform, per newton, by one standard uncertainty of its load."""
+    # None in a linear film; in others the stress spreads with the load over E h^2.
+    changes = [np.zeros_like(reference.values) for reference in references]
+    for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
+        if scan.film and scan.film.law not in ("", LINEAR) and scan.load_uncertainty:
+            set_up, u = scan.set_up.expected, scan.load_uncertainty
+            varied = [set_up._replace(load=load) for load in (set_up.load + u, set_up.load - u)]
+            changes[i] = _difference(set_up, reference, varied) / 2
+    return changes
+
+
 def press_neo_hookean(set_up: SetUp) -> Contact:
     """Press a rod on its film as if that were neo-Hookean, and stuck to it."""
     # One that slides differs less from a linear film, and is not solved to any depth.
@@ -416,7 +430,7 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
 
 
 def _difference(set_up: SetUp, reference: RadialSpectrum, varied: Sequence[SetUp]) -> FloatArray:
-    """Difference of two rods, scaled from the scan's own rod to the reference."""
+    """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     k, order = reference.wavenumbers.k.tobytes(), reference.order
     return reference.values * _relative_difference(set_up, *varied, k, order)
 
@@ -425,9 +439,11 @@ def _difference(set_up: SetUp, reference: RadialSpectrum, varied: Sequence[SetUp
 def _relative_difference(
     set_up: SetUp, more: SetUp, less: SetUp, nodes: bytes, order: int
 ) -> FloatArray:
-    """Difference of two rods over the scan's own, kept for scans of other voltages."""
+    """Difference of two rods per newton over the scan's own, kept for scans of other voltages."""
     law = law_at_once(set_up)
-    upper, lower, own = (_rod_at(nodes, rod, law, order) for rod in (more, less, set_up))
+    upper, lower, own = (
+        _rod_at(nodes, rod, law, order) / (rod.load / set_up.load) for rod in (more, less, set_up)
+    )
     return relative(upper - lower, own)
 
 

@@ -10,7 +10,7 @@ from helpers.scans import LINEAR_FILM, RING, SIGMA, TAILS, simulated
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.calibration.uncertainty import kernel_functionals
+from memscal.calibration.kernel_functionals import kernel_functionals
 from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
 from memscal.simulation.rod_scan import PAPER_ROD
