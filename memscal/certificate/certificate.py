@@ -31,6 +31,8 @@ _OF_SENSOR = (
 )
 SYNTHETIC = "SYNTHETIC DATA: NOTHING WAS MEASURED"
 _LEAST_OF_G, _MOST_RADII = 0.01, 12
+#: A value that conforms with less probability rather does not.
+_EVEN = 0.5
 _DIGITS_OF_NUMBER, _MOST_EMBEDDED = 10, 4_000_000
 
 
@@ -65,7 +67,10 @@ class Conformity:
     @property
     def statement(self) -> str:
         """The statement of conformity in words."""
-        return "conforms" if self.accepted else "not stated to conform"
+        if not self.accepted:
+            return "not stated to conform"
+        rather_not = ", though more probably it does not: the tolerance is too narrow to tell"
+        return f"conforms{rather_not if self.probability < _EVEN else ''}"
 
     @property
     def probability(self) -> float:
@@ -219,6 +224,12 @@ def _conformity(
             ends = limits.get("lower", -np.inf), limits.get("upper", np.inf)
             lower, upper = to_si(ends, limits.get("unit"), known[key].quantity.dimension, where)
             guard_band = factor * known[key].expanded if rule == RULES[1] else 0.0
+            if not lower + guard_band < upper - guard_band:
+                raise InputError(
+                    f"{where}: no value could be accepted between its limits.",
+                    why="The tolerance is not wider than its two guard bands.",
+                    cure="Agree on a wider tolerance or a smaller guard_band, or measure better.",
+                )
             statements.append(Conformity(known[key], float(lower), float(upper), guard_band))
     return statements
 

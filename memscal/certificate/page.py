@@ -21,6 +21,7 @@ from memscal.model.checks import state_of_checks
 from memscal.model.notation import SUPERSCRIPTS, format_measured
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, PER_MM, PER_MM2
+from memscal.summaries.declared import total_of
 from memscal.summaries.table import Table
 
 _PAGE = Path(__file__).with_name("certificate.html")
@@ -48,6 +49,8 @@ def certificate_page(of: Certificate) -> str:
         "origin": _origin(of),
         "celsius": _expanded(t.value - ZERO_CELSIUS, t.uncertainty, 1.0, "°C"),
         "humidity": _expanded(h.value, h.uncertainty, 0.01, "%"),
+        "sources": _sources(of),
+        "not_counted": _not_counted(of),
         "resolved": f"{of.apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
     }
     blocks = {
@@ -122,6 +125,20 @@ def _setting(of: Certificate) -> str:
     return f"Method {method}, with {'; '.join(facts)} (± U, k = 2). {program}"
 
 
+def _sources(of: Certificate) -> str:
+    """Name the sources that count."""
+    budget = of.apparatus.budget
+    shares = (share for of_value in budget.values() for share in of_value.items())
+    sources = dict.fromkeys(source for source, u in shares if u)
+    return ", ".join(source.replace("_", " ") for source in sources) or "no source that is named"
+
+
+def _not_counted(of: Certificate) -> str:
+    """Say what the uncertainties do not count, as the calibration said it."""
+    messages = of.apparatus.process.messages
+    return " ".join(m.text for m in messages if m.kind in ("film_law", "uncertainty_unstated"))
+
+
 def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> str:
     """Return a value with U = k u, both given in SI units, ``scale`` of which are the unit."""
     return format_measured(value / scale, u and COVERAGE_FACTOR * u / scale, unit)
@@ -174,9 +191,11 @@ def _budget(of: Certificate) -> str:
     }
     if not shares:
         return "<p>The artifact states no budget by source.</p>"
-    order = sorted(sources, key=lambda source: -max(shares[source]))
-    rows = {s.replace("_", " "): shares[s] for s in order if max(shares[s]) >= 0.005}
-    rows["root sum of squares"] = np.sqrt(np.sum(np.square([*shares.values()]), axis=0)).tolist()
+    largest = {source: max(map(abs, row)) for source, row in shares.items()}
+    order = sorted(sources, key=lambda source: -largest[source])
+    rows = {s.replace("_", " "): shares[s] for s in order if largest[s] >= 0.005}
+    totals = [100 * total_of(budget[v.quantity.name]) / abs(v.value) for v in columns]
+    rows["root sum of squares"] = totals
     numbers = [f"({of.values.index(value) + 1})" for value in columns]
     title = "Standard uncertainties u (k = 1) by source, in percent of the value"
     cells = [(source, *(f"{share:.2f}" for share in row)) for source, row in rows.items()]

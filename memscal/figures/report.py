@@ -34,6 +34,7 @@ from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
 from memscal.summaries import fleet_results
 from memscal.summaries.calibration import apparatus_of, sensor_title
+from memscal.summaries.declared import total_of
 from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
 from memscal.version import __version__
 
@@ -351,7 +352,7 @@ def _budget(*rows: tuple[Quantity, Mapping[str, float], float, str], down: bool 
     words = (source.replace("_", " ") for source in sources)
     lines = [("source" if down else "", *words, "root sum of squares", "relative")]
     for quantity, budget, value, of in rows:
-        total = float(np.linalg.norm(list(budget.values())))
+        total = total_of(budget)
         cells = (_share(budget.get(source), total, quantity.scale) for source in sources)
         relative = f"{100 * total / abs(value):.2g}%" if value else "–"
         lines.append((of + quantity.heading, *cells, f"{total / quantity.scale:.2g}", relative))
@@ -363,7 +364,8 @@ def _budget(*rows: tuple[Quantity, Mapping[str, float], float, str], down: bool 
 def _share(u: float | None, total: float, scale: float) -> str:
     if u is None:
         return "–"
-    return f"{u / scale:.2g}" + (f" ({(u / total) ** 2:.0%})" if total > 0 else "")
+    share = np.copysign((u / total) ** 2, u) if total > 0 else None
+    return f"{u / scale:.2g}" + ("" if share is None else f" ({share:.0%})")
 
 
 def _provenance(report: Report) -> list[Table]:

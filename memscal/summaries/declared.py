@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 else:  # their libraries are imported when they are needed
     DataFrame = Dataset = Any
 
+
+def total_of(budget: Mapping[str, float]) -> float:
+    """Return the standard uncertainty of a budget; what correlations take away has a minus sign."""
+    squares = [np.copysign(u**2, u) for u in budget.values()]
+    return float(np.sqrt(max(sum(squares), 0.0)))
+
+
 _UNCERTAINTY = "_uncertainty"
 #: Endings of names of what stands beside a quantity in JSON, in its unit, and as what.
 _BESIDE = {
