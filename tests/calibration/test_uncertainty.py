@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from helpers.scans import LINEAR_FILM, RING, SIGMA, TAILS, simulated
+from scipy.stats import binom
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
@@ -39,6 +40,46 @@ def test_each_input_of_the_reference_counts_what_moving_it_changes(source, chang
     difference = abs(moved.conversion_constant - usual.conversion_constant)
     counted = usual.budget["conversion_constant"][source]
     assert counted == pytest.approx(difference, rel=0.5, abs=5e-4 * usual.conversion_constant)
+
+
+def test_at_finite_strain_the_load_counts_in_the_widths_what_moving_it_changes() -> None:
+    scan = replace(memscal.simulate(noise=0.002, seed=2), load_uncertainty=0.02)
+    usual, moved = (
+        memscal.calibrate(each, method="bayesian").apparatus
+        for each in (scan, replace(scan, load=1.02))
+    )
+    for name, value in (("gaussian_sigma", 0.00178e-3), ("conversion_constant", None)):
+        difference = abs(moved.parameters[name] - usual.parameters[name])
+        assert usual.budget[name]["load"] == pytest.approx(difference, rel=0.05)
+        assert value is None or difference == pytest.approx(value, rel=0.1)
+    linear = simulated(film=LINEAR_FILM, rod=PAPER_ROD, load_uncertainty=0.02)
+    assert memscal.calibrate(linear).apparatus.budget["gaussian_sigma"]["load"] == 0
+
+
+@pytest.mark.parametrize(("film", "kernel", "settings"), [
+    ({"thickness": 5e-3}, memscal.GaussianMixture(), {"noise": 0.003, "half_range": 20e-3}),
+    ({"thickness": 2e-3}, memscal.SmoothedDisc(0.6e-3, 0.05e-3), {"noise": 0.005}),
+])  # fmt: skip
+def test_the_area_of_a_division_counts_what_its_window_hides(film, kernel, settings) -> None:
+    k = np.linspace(0.0, 60e3, 100_001)
+    true = 2 * np.pi / np.trapezoid(kernel.transform(k) ** 2 * k, k)
+    film = memscal.ElasticFilm(young_modulus=1e6, poisson_ratio=0.49, law="linear", **film)
+    pulls = []
+    for seed in range(12):
+        scan = memscal.simulate(film=film, kernel=kernel, load=0.1, seed=seed, **settings)
+        found = memscal.calibrate(scan).apparatus.parameters
+        name = "noise_equivalent_area"
+        pulls.append((found[name] - true) / found.uncertainty(name))
+    # A bias of known size is its standard uncertainty; before that was 2.5 to 3.2.
+    assert 0.5 < np.mean(pulls) < 1.2
+    assert np.sum(np.abs(pulls) < 2) >= binom.ppf(1e-3, len(pulls), 0.95)
+
+
+def test_a_scan_that_is_given_twice_is_refused() -> None:
+    scan, other = (memscal.simulate(seed=seed, points=33) for seed in (1, 2))
+    for scans in ([scan, scan], [scan, other, replace(scan, title="a copy")]):
+        with pytest.raises(memscal.MemscalError, match="is given twice"):
+            memscal.calibrate(scans)
 
 
 @pytest.mark.parametrize("options", [{}, {"raster": True, "points": 17}])

@@ -113,6 +113,11 @@ def test_the_conformance_probability_is_that_of_a_normal_distribution(y, lower, 
     assert conformity(y, 0.1, lower, upper).probability == pytest.approx(expected, abs=1e-8)
 
 
+def test_what_conforms_with_less_than_even_chances_says_so():
+    assert conformity(0.0, 1.0, -0.1, 0.1).statement.startswith("conforms, though")
+    assert conformity(0.0, 1.0, -2.0, 2.0).statement == "conforms"
+
+
 @given(st.floats(-10, 10), st.floats(1e-3, 3), st.floats(-10, 10), st.floats(0, 10))
 def test_what_is_accepted_with_a_guard_band_of_U_conforms_with_95_percent(y, u, lower, width):
     item = conformity(y, u, lower, lower + width, guard=2 * u)
@@ -138,6 +143,7 @@ def test_the_decision_is_that_of_its_rule(apparatus, laboratory, rule, factor, u
     ({"ellipticity": {"lower": 0.0, "unit": "1"}}, "is not certified"),
     ({LIMITS: {"lower": 1.0, "unit": "mm"}}, "must be a voltage per stress"),
     ({LIMITS: {"lower": 1.0}}, "has no unit"),
+    ({LIMITS: {"lower": 1e-4, "upper": 1.03e-4, "unit": "mV/Pa"}}, "no value could be accepted"),
 ])  # fmt: skip
 def test_limits_that_cannot_be_decided_on_are_refused(apparatus, laboratory, changes, words):
     with pytest.raises(InputError, match=words):

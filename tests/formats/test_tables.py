@@ -160,6 +160,29 @@ def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Pa
     assert scan_table(tmp_path, text, load=None).load is None
 
 
+def test_a_load_beyond_those_recorded_is_refused(tmp_path: Path):
+    text = "x,u,f\n0,1,0.050\n1,2,0.051\n2,2,0.049\n"
+    with pytest.raises(InputError, match=r"stated as 0\.5 N, but those recorded go from 0\.049"):
+        scan_table(tmp_path, text, load=0.5, load_column="f")
+    assert scan_table(tmp_path, text, load=0.05, load_column="f").load == 0.05
+    with pytest.raises(InputError, match=r"of the load is 5 N, but the load is 0\.05"):
+        scan_table(tmp_path, text, load=0.05, load_uncertainty=5.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_at_several_loads_is_numbered_by_them(tmp_path: Path, seed):
+    rng = np.random.default_rng(seed)
+    loads = rng.permutation(np.repeat([0.02, 0.05, 0.1], 11)) * rng.normal(1, 0.01, 33)
+    x = np.tile(np.arange(11.0), 3)
+    text = rows(x.tolist(), loads.tolist(), loads.tolist(), header="x,u,f")
+    scan = scan_table(tmp_path, text, load=None, load_column="f")
+    medians = [np.median(scan.normal_load[scan.passes == i]) for i in range(3)]
+    np.testing.assert_allclose(medians, [0.02, 0.05, 0.1], rtol=0.02)
+    assert "3 lines: one for each of the loads of 0.0" in scan.notes
+    one = scan_table(tmp_path, text.replace("x,u,f", "x,f,u"), load=None)
+    assert not one.passes.any()
+
+
 def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_path: Path):
     found = scan_table(tmp_path, "0,9,1\n,7,7\n1,8,\n", x="1", u=3)
     np.testing.assert_array_equal(found.u_zz, [1e-3, np.nan])
