@@ -208,6 +208,11 @@ def test_a_failed_check_marks_the_result_and_is_said_first() -> None:
     assert "gaussian_misfit failed" in calibration.apparatus.process.messages[0].text
     second = calibration.answer().splitlines()[1]
     assert second.startswith("Use G(r), for the Gaussian fails the check gaussian")
+    # With a third of its noise stated, the scan of a Gaussian sensor is explained by no G.
+    scan = simulated(noise=0.01)
+    low = memscal.calibrate(replace(scan, u_zz_errors=scan.u_zz_errors / 3), method="bayesian")
+    assert not check(low, "gaussian_misfit").passed
+    assert "G(r) explains the scan no better" in low.answer().replace("\n", " ")
 
 
 def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:

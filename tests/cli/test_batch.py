@@ -15,9 +15,12 @@ import pyarrow.parquet as pq
 import pytest
 from helpers.console import Outcome, Run
 from helpers.scans import simulated
+from scipy.stats import binom
 
 import memscal
 from memscal.formats.fleet import read_fleet
+from memscal.model.fleet import FleetResults
+from memscal.summaries.fleet_results import outliers
 
 COUNT, SHARD = 12, 2
 FLAT, DRIFTING, NONSENSE, MISSING, LARGE = 2, 3, 5, 9, 11
@@ -291,6 +294,22 @@ def test_a_figure_of_a_fleet_without_places_or_results_is_drawn(results: Path) -
     empty = replace(fleet, **dict.fromkeys(names, nowhere), failed={}, errors={})
     assert len(empty.plot().axes) == len(fleet.plot().axes)
     assert "Distributions" not in empty.summary()
+
+
+@pytest.mark.parametrize("count", [4, 8, 20, 100])
+def test_sensors_that_scatter_by_chance_are_no_outliers(count: int) -> None:
+    rng, batches, alarms = np.random.default_rng(count), 400, 0
+    for _ in range(batches):
+        values, blank = rng.normal(1.0, 0.02, (2, count)), np.full(count, np.nan)
+        names = ("conversion_constant", "gaussian_sigma")
+        fleet = FleetResults(
+            paths=["scan.h5"] * count, **dict(zip(names, values, strict=True)),
+            **{f"{name}_errors": 0.02 + 0 * blank for name in names}, wafer_x=blank, wafer_y=blank,
+            failed={}, errors={}, unit="mV/Pa",
+        )  # fmt: skip
+        alarms += bool(outliers(fleet))
+    assert alarms <= binom.ppf(1 - 1e-3, batches, 0.02)
+    assert outliers(replace(fleet, conversion_constant=np.append(values[0][1:], 9.0)))
 
 
 def test_a_manifest_that_may_not_be_read_is_refused(
