@@ -26,8 +26,8 @@ from memscal.axisymmetry.hankel import (
     ring_areas,
 )
 from memscal.calibration.fields import RasterFields
-from memscal.calibration.kernel_functionals import kernel_functionals, noise_area
 from memscal.calibration.stages import Deconvolution, Solution
+from memscal.deconvolution.fourier_ratio import kernel_functionals, noise_area
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (

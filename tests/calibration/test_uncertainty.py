@@ -11,8 +11,8 @@ from scipy.stats import binom
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.calibration.kernel_functionals import kernel_functionals
 from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
+from memscal.deconvolution.fourier_ratio import kernel_functionals
 from memscal.model.arrays import FloatArray
 from memscal.simulation.rod_scan import PAPER_ROD
 
