@@ -58,7 +58,7 @@ def test_the_law_of_the_film_and_the_friction_of_the_rod_are_stated(run: Run, ta
 
 
 def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Run, folder: Path):
-    rows = np.stack([np.arange(9.0), np.arange(9.0), np.linspace(0.3, 0.4, 9)], axis=1)
+    rows = np.stack([np.arange(9.0), np.arange(9.0), np.linspace(0.9, 1.1, 9)], axis=1)
     write_table(folder / "scan.csv", "position,voltage,force", rows)
     wet = ["--load-scatter", 2, "--lubrication", "lubricated", "--lubricant", "glycerol"]
     assert run("import", "scan.csv", "-o", "one.h5", *COLUMNS, *SET_UP, *wet).code == 0

@@ -113,7 +113,7 @@ def test_no_reader_uses_what_was_added_or_changed_unless_that_is_accepted(
     text = path.endswith(("name", "lubrication", "serial_number"))
     with h5py.File(file_path, "r+") as file:
         size = file["/entry/reference/r"].shape if path.endswith("sigma_zz_errors") else ()
-        file[f"/entry/{path}"] = "dry" if text else np.full(size, 1.0)
+        file[f"/entry/{path}"] = "dry" if text else np.full(size, 0.5)
         if not text:
             unit = "N" if "load" in path else "Pa" if "sigma" in path else "mm"
             file[f"/entry/{path}"].attrs["units"] = unit
