@@ -341,10 +341,13 @@ def test_the_settings_of_matplotlib_are_given_back(make_apparatus):
     assert panels(figure)["scan"].get_facecolor() == (1.0, 1.0, 1.0, 1.0)
 
 
-def test_a_line_along_y_says_so():
-    scan = replace(simulated(points=33), direction="y")
-    axes = panels(memscal.calibrate(scan).plot())["scan_log"]
+def test_a_line_along_y_says_so_and_stands_at_its_centre():
+    calibration = memscal.calibrate(replace(simulated(points=33), direction="y"))
+    axes = panels(calibration.plot())["scan_log"]
     assert axes.get_xlabel() == "position $y$ (mm)"
+    (rod,) = [each for each in axes.patches if isinstance(each, Rectangle)]
+    centre = rod.get_x() + rod.get_width() / 2
+    assert centre == pytest.approx(1e3 * calibration.apparatus.parameters["centre_y"])
 
 
 def test_no_line_joins_the_points_of_several_scans(make_apparatus):
