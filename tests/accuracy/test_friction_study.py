@@ -9,7 +9,7 @@ two, by which a coverage of 85 % is found in two runs of three.
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -64,13 +64,13 @@ class Outcome:
         return {name.rstrip("0123456789").rstrip("_") for name in names}
 
 
-@lru_cache
+@cache
 def families() -> dict[str, ProfileFamily]:
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
     return {"incremental": amontons_family(PAPER_FILM, PAPER_SPHERE, PAPER_LOADS, reach=24e-3)}
 
 
-@lru_cache
+@cache
 def outcome(friction: float, seed: int, gain: float = 1.0, thickness: float = 1.0) -> Outcome:
     """Make, calibrate, measure and compare one experiment, all inputs drawn."""
     mistakes = {"gain": gain, "thickness_factor": thickness}
