@@ -79,7 +79,8 @@ def _require_different(scans: Sequence[Scan]) -> None:
     seen = set()
     for scan in scans if len(scans) > 1 else ():
         arrays = scan.x, scan.y, scan.u_zz, scan.normal_load, *scan.channels.values()
-        content = scan.direction, scan.load, *(a if a is None else a.tobytes() for a in arrays)
+        stated = scan.direction, scan.load, scan.unit, scan.lubrication
+        content = *stated, *(a if a is None else a.tobytes() for a in arrays)
         if content in seen:
             named = scan.source.file_name if scan.source else f"A scan of {scan.u_zz.size} points"
             raise InputError(

@@ -474,7 +474,7 @@ def design(
     'thickness'
     >>> finer = memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")
     >>> finer.plan.repeats
-    2
+    3
     """
     targets = require_targets(want or {}, vary)
     plan = Plan(

@@ -112,8 +112,9 @@ def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draw
     for apparatus in (own.apparatus, common.apparatus):
         budget = apparatus.budget["conversion_constant"]
         assert set(budget) == {"noise", "regularisation", "window", "misfit", *common.effects}
-        assert budget["load"] / apparatus.conversion_constant == pytest.approx(0.01, rel=1e-3)
-        assert apparatus.budget["gaussian_sigma"]["load"] == 0.0
+        # At finite strain a share of the load is a little more of A, and a little of the width.
+        assert 0.01 < budget["load"] / apparatus.conversion_constant < 0.011
+        assert 0 < apparatus.budget["gaussian_sigma"]["load"] < 0.002 * apparatus.gaussian_sigma
     own.apparatus.save(tmp_path / "sensor.h5")
     saved = memscal.load_apparatus(tmp_path / "sensor.h5")
     parameters, process = saved.parameters, saved.process
