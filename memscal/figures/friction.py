@@ -133,13 +133,13 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
     by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
     loads = sorted(by_load)
     curves = np.array([by_load[load] for load in loads])
-    ends = []
+    drawn = {}
     ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
     for mu in sorted({float(mu) for mu in comparison.friction if mu in _SHOWN}.union(ends_of_all)):
         curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
         (line,) = axes.plot(loads, curve, color=profiles.friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
-        ends.append((float(curve[-1]), mu))
+        drawn[mu] = curve
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
         measured = [p for p in comparison.loads[loading] if p.lubrication == lubrication]
         values = [(p.load, p.ratio, EXPANDED * p.ratio_uncertainty) for p in measured]
@@ -147,10 +147,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         look = mark(lubrication, COLOURS["measured"])
         look |= {"ms": 4, "mew": 0.8, "ls": "none", "elinewidth": 0.8, "capsize": 2}
         axes.errorbar(x, ratio, bars, zorder=3, label=lubricated_words(lubrication), **look)
-    last = loads[-1]
-    # Room at the right for the curves' names.
-    axes.set_xlim(0.0, last + _ROOM * max(last - loads[0], 0.2 * last))
-    _name_ends(axes, last, ends)
+    _name_curves(axes, loads, drawn)
     axes.set(
         xlabel="load (N)",
         ylabel="largest blurred stress\nover frictionless, $S_{max}/p^0_{max}$ (1)",
@@ -160,12 +157,17 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
     legend_above(axes, columns=3)
 
 
-def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
-    """Name the curves at their ends; those that end together share a name."""
-    bottom, top = axes.get_ylim()
-    values = np.array(sorted(ends))
-    apart = np.diff(values[:, 0]) >= _APART * (top - bottom)
-    groups = np.split(values, np.flatnonzero(apart) + 1)
+def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArray]) -> None:
+    """Name the curves at the end where more are apart; those that end together share a name."""
+    end = max((-1, 0), key=lambda end: len(_apart(axes, curves, end)))
+    groups, x, side = _apart(axes, curves, end), loads[end], 1 if end else -1
+    # Room for the names; a load is never negative.
+    room = _ROOM * max(loads[-1] - loads[0], 0.2 * loads[-1])
+    if end:
+        axes.set_xlim(0.0, x + room)
+    else:
+        axes.set_xlim(x - room, loads[-1] + 0.3 * room)
+        axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= loads[-1] + 0.3 * room])
     for group in groups:
         height, (low, high) = float(np.mean(group[:, 0])), (group[:, 1].min(), group[:, 1].max())
         text = friction_name(low)
@@ -173,9 +175,17 @@ def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
             text = f"≥ {text}" if np.isinf(high) else f"{text}–{high:.3g}"
         axes.annotate(
             text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
-            (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
-            color=profiles.friction_colours(high)[0],
+            (x, height), (7 * side, 0), textcoords="offset points", va="center", fontsize=6.5,
+            ha="left" if end else "right", color=profiles.friction_colours(high)[0],
         )  # fmt: skip
+
+
+def _apart(axes: Axes, curves: Mapping[float, FloatArray], end: int) -> list[FloatArray]:
+    """Group the values of the curves at an end, (n, 2) with their coefficients, by nearness."""
+    bottom, top = axes.get_ylim()
+    values = np.array(sorted((float(curve[end]), mu) for mu, curve in curves.items()))
+    apart = np.diff(values[:, 0]) >= _APART * (top - bottom)
+    return np.split(values, np.flatnonzero(apart) + 1)
 
 
 def comparison_figure(

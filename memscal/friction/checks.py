@@ -12,7 +12,6 @@ from memscal.friction.results import BoundedEstimate, LoadComparison
 from memscal.model import checks as quality
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.measured_stress import MeasuredStress
-from memscal.model.notation import format_bound
 
 #: Share of points that may lie outside of what friction can explain, beyond those of chance.
 _OUTSIDE = 0.15
@@ -120,7 +119,9 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
         first, second = by_loading["incremental"], by_loading["total"]
         of = f"the {lubrication} loads" if lubrication else "the loads"
         if first.value is None or second.value is None:
-            disagree, by = (first.value is None) != (second.value is None), ""
+            # A bound and a value agree where the intervals have values in common.
+            (low, high), (least, most) = _ends(first), _ends(second)
+            disagree, by = high < least or most < low, ""
         else:
             apart = abs(first.value - second.value)
             errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
@@ -129,9 +130,14 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
         if disagree:
             yield Message(
                 "loading",
-                f"The definitions of the loading disagree for {of}{by}: incremental loading gives "
-                f"{in_words(first)}, total loading {in_words(second)}.",
+                f"The definitions of the loading disagree for {of}{by}: {first} by "
+                f"incremental loading, {second} by total loading.",
             )
+
+
+def _ends(estimate: BoundedEstimate) -> tuple[float, float]:
+    low, high = estimate.interval.low, estimate.interval.high
+    return low, math.inf if high is None else high
 
 
 def _against_macroscopic(
@@ -183,14 +189,3 @@ def _unstated(measured: MeasuredStress) -> list[Message]:
         }
         unstated |= {name: value for name, value in stated.items() if value is None}
     return quality.uncertainty_unstated_messages(unstated)
-
-
-def in_words(estimate: BoundedEstimate) -> str:
-    """Return a coefficient with its interval, or its bound, in words."""
-    low, high = estimate.interval.low, estimate.interval.high
-    if high is None or math.isinf(high):
-        return f"at least {format_bound(low, upper=False)}" if low > 0 else "no bound"
-    above = format_bound(high, upper=True)
-    if estimate.value is None or low == 0:
-        return f"at most {above}"
-    return f"{estimate.value:.2g} ({format_bound(low, upper=False)} to {above})"

@@ -215,7 +215,7 @@ def compare(
     >>> made = memscal.simulate_experiment(
     ...     friction=0.1, loads=[0.69], lubricated_loads=[0.69], seed=1
     ... )
-    >>> apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
+    >>> apparatus = memscal.calibrate(made.rod, method="bayesian").apparatus
     >>> comparison = compare(made.dry, apparatus, friction=(0, 0.1, 0.3, math.inf), loading="total")
     >>> comparison.joint["dry"]["total"].interval.low < 0.1
     True
@@ -233,7 +233,7 @@ def compare(
         if references is not None:
             problem = "Profiles of another program and the shear are asked for."
             raise InputError(problem, cure="Leave one of them out: those profiles have no shear.")
-        of_shear = opened_apparatus(shear)
+        of_shear = opened_apparatus(shear, accept_altered=accept_altered)
         notes = _accept_tangential(measured, of_shear, override=override)
         sheared = _families(setting, friction, loading, order=1)
         tangential = of_shear, sheared, notes
@@ -507,7 +507,7 @@ def compare_shear(
     ...     friction=0.1, loads=[1.37], lubricated_loads=[1.37], channels=("zz", "xz"), seed=1
     ... )
     >>> normal, shear = (
-    ...     memscal.calibrate(made.rod, channel=channel, method="evidence").apparatus
+    ...     memscal.calibrate(made.rod, channel=channel, method="bayesian").apparatus
     ...     for channel in ("zz", "xz")
     ... )
     >>> measured = memscal.measure_stress(made.dry, normal)
@@ -548,7 +548,7 @@ def _accept_tangential(
     if channel not in TANGENTIAL:
         raise InputError(
             f"The artifact is of channel {channel}, not of a tangential one.",
-            cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
+            cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="bayesian"); '
             "compare the normal channel with memscal.compare().",
         )
     for profile in measured.profiles:

@@ -228,6 +228,7 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
             cure="Measure all of them with one artifact (memscal apply ARTIFACT SCAN...).",
         )
     profiles = tuple(profile for stress in stresses for profile in stress.profiles)
+    _require_different(profiles)
     starts = np.cumsum([0, *(len(stress.profiles) for stress in stresses)])
     checks = [
         replace(check, name=f"{check.kind}_{int(check.profile) + start}")
@@ -250,6 +251,24 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
         overridden=tuple(text for stress in stresses for text in stress.overridden),
         process=replace(first.process, messages=tuple(dict.fromkeys(messages))),
     )
+
+
+def _require_different(profiles: Sequence[MeasuredProfile]) -> None:
+    """Refuse a profile that is given twice: its readings would count as independent ones."""
+    seen = dict[tuple[bytes, ...], MeasuredProfile]()
+    for profile in profiles:
+        points = profile.points.get("zz")
+        arrays = (points.x, points.y, points.u) if points else (profile.r, profile.s_zz)
+        first = seen.setdefault(tuple(array.tobytes() for array in arrays), profile)
+        if first is not profile:
+            source = profile.scan.source
+            named = f"{source.file_name}, {profile.label}" if source else profile.label
+            raise InputError(
+                f"The profile of {named} is given twice.",
+                why="The same readings would count as independent ones, and every uncertainty "
+                "would come out too small.",
+                cure="Give each scan once: itself, or in one file of measured stress.",
+            )
 
 
 def _measure(

@@ -158,9 +158,16 @@ class _Request:
                 yield contact
         except NewtonError as problem:
             error = ConvergenceError(
-                problem.problem,
+                f"Under the {self.indenter.shape} of radius {self.radius * 1e3:.4g} mm: "
+                + problem.problem,
                 why="The film folds around the indenter more sharply than its elements can follow.",
-                cure="Ask for less; or let the film stick (friction inf), which goes further.",
+                cure="Lower the load; "
+                + (
+                    ""
+                    if self.sticking
+                    else "let the film stick (friction inf), which goes further; "
+                )
+                + 'or state a linear film (law "linear"; --film-law linear), which is pressed at small strain.',
             )
             if path.states:
                 error.last = self._contact(pressing, path.states)
