@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from contextlib import ExitStack, contextmanager
 from functools import cache
-from itertools import islice
+from itertools import chain, islice, repeat
 from numbers import Integral
 from threading import Lock, Thread, get_ident
 from types import ModuleType
@@ -194,13 +194,17 @@ def shared(
 ) -> Iterator[Any]:
     """Yield what a function returns for each item, in their order; one worker is this process."""
     # Items are taken as workers become free, so that neither they nor results pile up.
-    chunk, source, tasks = _LARGEST_CHUNK, iter(items), deque["Future[list[Any]]"]()
+    source, tasks = iter(items), deque["Future[list[Any]]"]()
     if executor is not None:
         workers = getattr(executor, "_max_workers", None) or _WORKERS
+    chunk, small = _LARGEST_CHUNK, list[int]()
     if isinstance(items, Sized):
         chunk = max(2, min(chunk, len(items) // (4 * workers)))
         workers = min(workers, -(-len(items) // chunk))
-    chunks = iter(lambda: list(islice(source, chunk)), [])
+    else:  # the first tasks are small, for there may be no more
+        small = [size for size in (1, 2, 4, 8) for _ in range(workers)]
+    failed: list[BaseException] = []
+    chunks = _chunks(source, chain(small, repeat(chunk)), failed)
     with ExitStack() as stack:
         if executor is None and workers < 2:
             yield from map(function, source)
@@ -212,11 +216,30 @@ def shared(
                 some = islice(chunks, _TASKS * workers - len(tasks))
                 tasks.extend(pool.submit(_each, function, chunk) for chunk in some)
                 if not tasks:
-                    return
+                    break
                 yield from tasks.popleft().result()
         finally:
             for task in tasks:
                 task.cancel()
+        if failed:
+            raise failed[0]
+
+
+def _chunks(
+    source: Iterator[Any], sizes: Iterable[int], failed: list[BaseException]
+) -> Iterator[list[Any]]:
+    """Cut items into chunks; what the source raises is kept until those before it are done."""
+    for size in sizes:
+        chunk: list[Any] = []
+        try:
+            for item in islice(source, size):
+                chunk.append(item)  # noqa: PERF402 - what there is before the source fails
+        except Exception as failure:  # noqa: BLE001 - raised when the rest is done
+            failed.append(failure)
+        if chunk:
+            yield chunk
+        if failed or len(chunk) < size:
+            return
 
 
 def _each(function: Callable[[Any], Any], items: list[Any]) -> list[Any]:

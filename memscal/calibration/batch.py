@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
@@ -14,16 +15,19 @@ from typing import Any
 
 from memscal.calibration.calibrate import calibrate
 from memscal.calibration.many import attempted
-from memscal.errors import MemscalError, OutputError
+from memscal.errors import InputError, MemscalError, OutputError
 from memscal.formats.files import ensure_writable, read_bytes
 from memscal.formats.fleet import (
     DIGEST,
+    FLEET_SCHEMA_VERSION,
     FleetScan,
     arrow,
     fleet_row,
     manifest_scans,
+    read_batch,
     read_shard,
     shard_paths,
+    write_batch,
     write_shard,
 )
 from memscal.formats.scan import read_scan
@@ -105,13 +109,10 @@ class Batch:
     def prepare(self, *, resume: bool) -> Batch:
         """Make the folder of results, if it may be used; count the scans."""
         arrow()
-        count = sum(1 for _ in manifest_scans(self.source))
-        if not count:
-            cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
-            raise MemscalError(f"{self.source} holds no scans.", cure=cure)
+        count = self._counted()
         stays = "It may hold results, which are not replaced."
         with suppress(FileNotFoundError, NotADirectoryError):
-            if not resume and any(self.results.iterdir()):
+            if not resume and any(path.is_file() for path in self.results.rglob("*")):
                 cure = "Continue them with --resume, or give another folder."
                 raise OutputError(f"The folder {self.results} exists.", why=stays, cure=cure)
         size = self.shard_size or self._size_of(count)
@@ -131,13 +132,31 @@ class Batch:
         return replace(self, shard_size=size, count=count)
 
     def _size_of(self, count: int) -> int:
-        """Return the size of the shards that are there, or one that makes enough of them."""
-        with suppress(MemscalError):
-            return int(read_shard(self.table(Shard(0, 0, ())), ["place"]).num_rows)
-        return min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
+        """Return the size that the batch was begun with, or one that makes enough shards."""
+        stated = read_batch(self.results).get("shard_size")
+        return stated or min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
+
+    def _counted(self) -> int:
+        """Return how many scans there are; refuse a list of which none is there."""
+        count, there, first = 0, False, ""
+        for scan in manifest_scans(self.source):
+            count, first = count + 1, first or scan.path
+            there = there or (self.folder / scan.path).exists()
+        if not count:
+            cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
+            raise MemscalError(f"{self.source} holds no scans.", cure=cure)
+        if not there:
+            raise InputError(
+                f"None of the {count} scans that {self.source.name} lists is there; the first is "
+                f"{first[:200]!r}.",
+                why=f"Paths are relative to {self.folder}.",
+                cure="List a path a line, or give a table with a column path, separated by commas.",
+            )
+        return count
 
     def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
         """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""
+        write_batch(self.results, {"scans": self.count, "shard_size": self.shard_size})
         shards, tasks = self.shards(), set[Future[ShardOutcome]]()
         lost: list[str] = []
         try:
@@ -177,6 +196,8 @@ def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
     rows = _kept_rows(batch, shard)
     kept = bool(rows)
     if not kept:
+        # Artifacts of what was there before are of other scans or options.
+        shutil.rmtree(batch.results / "artifacts" / shard.name, ignore_errors=True)
         rows = [_row(batch, shard, i) for i in range(len(shard.scans))]
         digest = _digest(batch, shard, [row["input_sha256"] for row in rows])
         write_shard(batch.table(shard), rows, digest)
@@ -192,14 +213,18 @@ def _kept_rows(batch: Batch, shard: Shard) -> list[dict[str, Any]]:
             table = read_shard(batch.table(shard))
             inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
             if table.schema.metadata.get(DIGEST.encode()) == _digest(batch, shard, inputs).encode():
-                rows: list[dict[str, Any]] = table.select(["passed", "error"]).to_pylist()
-                return rows
+                names = ["passed", "error", "artifact"]
+                rows: list[dict[str, Any]] = table.select(names).to_pylist()
+                written = (batch.results / row["artifact"] for row in rows if row["artifact"])
+                if all(path.exists() for path in written):
+                    return rows
     return []
 
 
 def _digest(batch: Batch, shard: Shard, inputs: list[str | None]) -> str:
     """Return the digest of version, options, and of the contents and places of the scans."""
-    return _sha256_of((batch.version, batch.options_sha256, shard, inputs))
+    made = batch.version, FLEET_SCHEMA_VERSION, batch.options_sha256
+    return _sha256_of((*made, shard, inputs))
 
 
 def _sha256_of_file(path: Path) -> str | None:

@@ -17,6 +17,7 @@ from memscal.formats.hdf5.writer import tree_to_bytes
 from memscal.formats.laboratory import KINDS, RULES, LaboratoryFile, Measured, missing_keys
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
+from memscal.model.checks import OVERRIDE
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, Quantity, parameter_quantity
 
@@ -121,11 +122,12 @@ class Certificate:
 
     @property
     def warnings(self) -> list[str]:
-        """What must be said first: that data are synthetic, and checks that failed."""
+        """What must be said first: synthetic data, checks that failed, what was overridden."""
+        overridden = [m.text for m in self.apparatus.process.messages if m.kind == OVERRIDE]
         failed = [c.name.replace("_", " ") for c in self.apparatus.checks if not c.passed]
         synthetic = f"{SYNTHETIC}. This shows the form of a certificate and certifies nothing."
         text = f"Quality checks of the calibration that failed: {', '.join(failed)}."
-        return [synthetic] * self.synthetic + [text] * bool(failed)
+        return [synthetic] * self.synthetic + [text] * bool(failed) + overridden
 
     @property
     def accreditation(self) -> str:

@@ -77,6 +77,7 @@ def command(
 
     A manifest is a text file with the path of a scan a line, relative to its own folder, or a CSV
     file with a column path and optional wafer_x, wafer_y (mm), the sensor's place on its wafer.
+    The estimate by the other route is not computed.
 
     Each scan is a row of a table: A, widths, uncertainties, checks, G(r), digests; a scan that
     cannot be calibrated has its error there, and the exit code is 1. What is done stays when the
@@ -85,7 +86,7 @@ def command(
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
     from memscal.calibration.batch import Batch
-    from memscal.formats.fleet import manifest_scans, read_fleet
+    from memscal.formats.fleet import manifest_scans, read_fleet, shard_paths
     from memscal.progress import span
 
     chosen = calibration_settings(**settings)
@@ -101,13 +102,18 @@ def command(
     try:
         outcomes = list(_outcomes(batch, workers, scheduler))
     except (KeyboardInterrupt, MemscalError):
-        out.note("The shards that are done stay: --resume does the rest.")
+        if shard_paths(results):
+            out.note("The shards that are done stay: --resume does the rest.")
         raise
     errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
     kept, seconds = sum(outcome.kept for outcome in outcomes), round(monotonic() - start, 1)
     counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
     counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
-    page = {} if report is None else out.reported(read_fleet(results), report)
+    page, problem = dict[Path, bytes](), None
+    try:
+        page = {} if report is None else out.reported(read_fleet(results), report)
+    except MemscalError as failure:  # is told after what the batch has done
+        problem = failure
     with together():
         out.write_files(page, force=force)
         if as_json:
@@ -119,6 +125,8 @@ def command(
             out.emit_tables(Table(f"Batch of {source.name}", ("", ""), rows))
     for path in (results, *page):
         out.message(f"Written: {path}")
+    if problem:
+        raise problem
     if not errors + failed:
         return DONE
     what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"

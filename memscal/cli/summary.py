@@ -48,6 +48,7 @@ def command(
             out.emit_json({"schema_version": "1", "page": str(output), **fleet.to_dict()})
         else:
             out.emit_tables(*fleet.tables())
+    out.show_messages(fleet.messages)
     for path in contents:
         out.message(f"Written: {path}")
     return DONE

@@ -14,6 +14,8 @@ from memscal.summaries.declared import power_of_ten
 from memscal.summaries.fleet_results import error_classes, failures
 
 _MOST_BINS, _MOST_BARS = 60, 12
+#: Ticks whose labels have room.
+_TICKS = 5
 #: Markers that are drawn as an image, which keeps a page of many sensors small.
 _MANY = 2000
 
@@ -37,6 +39,7 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     axes.set_xlabel(label)
     axes.set_ylabel("sensors")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(_TICKS))
     values = values[np.isfinite(values)]
     if not values.size:
         return
@@ -48,7 +51,7 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     bins = int(np.clip(2 * np.cbrt(inside.size), 5, _MOST_BINS))
     axes.hist(inside, bins=bins, color=COLOURS["deconvolved"], alpha=0.8)
     axes.axvline(centre, color=COLOURS["measured"], lw=1, label="median")
-    limits = [centre + sign * limit * spread for sign in (-1, 1)]
+    limits = [centre + sign * limit * spread for sign in (-1, 1) if spread > 0]
     for i, end in enumerate(end for end in limits if low <= end <= high):
         name = f"{'_' * i}{limit:.2g} robust deviations"
         axes.axvline(end, color=COLOURS["gaussian"], lw=1, ls="--", label=name)
@@ -94,7 +97,9 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
         colours: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, **shown}
         points = axes.scatter(x[some], y[some], s=size, c=change[some], **colours)
         figure.colorbar(points, ax=axes, label=label, extend="both")
-        axes.set_aspect("equal")
+        # The panel stays as it is: of a single row the axes show more.
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.1)
         axes.set_xlabel("$x$ on the wafer (mm)")
         axes.set_ylabel("$y$ on the wafer (mm)")
     else:

@@ -289,7 +289,9 @@ def _of_fleet(fleet: FleetResults) -> Report:
     )
     picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
     title, failed = f"Calibrations of {fleet.name}", bool(fleet.failed)
-    return Report(title=title, verdict=counts, failed=failed, pictures=[picture])
+    return Report(
+        title=title, verdict=counts, failed=failed, pictures=[picture], messages=fleet.messages
+    )
 
 
 def _contact_words(scan: Scan | MeasuredScan) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +16,16 @@ import numpy as np
 from memscal.errors import FormatError, InputError, MemscalError
 from memscal.formats.files import atomic_write_bytes, read_bytes
 from memscal.model.apparatus import ApparatusData
+from memscal.model.checks import OVERRIDE, Message
 from memscal.model.fleet import FleetResults
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.quantities import ESTIMATED, parameter_quantity
 from memscal.version import __version__
 
-FLEET_SCHEMA, FLEET_SCHEMA_VERSION = "memscal-fleet", "1.0.0"
+FLEET_SCHEMA, FLEET_SCHEMA_VERSION = "memscal-fleet", "1.1.0"
 DIGEST = "memscal_shard_sha256"
+#: What states the batch, and the bytes that it may have; scans that a message names.
+_BATCH, _MOST_STATED, _NAMED = "batch.json", 10_000, 5
 _SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 #: What memscal writes beside scans.
 _RESULTS = (".apparatus", ".stress")
@@ -71,6 +76,7 @@ def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
         if not head:
             head = [cell.lower().removesuffix("(mm)").rstrip() for cell in cells]
             if "path" in head:
+                _require_places(name, head)
                 continue
             head = ["path"]
         row = dict(zip(head, cells if len(head) > 1 else [text], strict=False))
@@ -84,11 +90,19 @@ def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
         yield FleetScan(row["path"], *place)
 
 
+def _require_places(name: str, head: Sequence[str]) -> None:
+    for place in ("wafer_x", "wafer_y"):
+        other = next((cell for cell in head if cell.startswith(place) and cell != place), None)
+        if other is not None:
+            cure = f"Give places on the wafer in mm, in a column {place}."
+            raise FormatError(f"{name} has a column {other!r}, which is not read.", cure=cure)
+
+
 #: Those that a calibration may estimate, with columns of their own.
 _PARAMETERS = tuple(n for n in ESTIMATED if n not in ("baseline_slope", "force", "maximum"))
 _TEXTS = (
     "path", "sensor", "model", "serial_number", "channel", "start_time", "calibrated_at", "method",
-    "artifact", "error_class", "error", "input_sha256", "options_sha256", "version",
+    "artifact", "error_class", "error", "input_sha256", "options_sha256", "version", "unit",
 )  # fmt: skip
 _CHECK, _UNCERTAINTY = ("value", "limit", "p_value"), ("quantity", "source")
 
@@ -113,6 +127,7 @@ def _schema(readings: Iterable[Reading]) -> Any:
     columns |= dict.fromkeys(("wafer_x", "wafer_y", "resolved_wavenumber"), double)
     columns |= {name: pa.list_(single) for name in ("r", "g", "g_errors", "correlation")}
     columns |= {"correlated": pa.list_(text), "checks": pa.list_(pa.struct(check))}
+    columns |= {"messages": pa.list_(pa.struct(dict.fromkeys(("kind", "text"), text)))}
     columns |= {"budget": pa.list_(pa.struct(source))}
     units = {"wafer_x": "mm", "wafer_y": "mm", "r": "mm", "resolved_wavenumber": "rad/mm"}
     units |= {"g": "1/mm^2", "g_errors": "1/mm^2", "correlation": "1"}
@@ -131,6 +146,8 @@ def fleet_row(data: ApparatusData) -> dict[str, Any]:
     names = [name for name in _PARAMETERS if name in scales]
     row: dict[str, Any] = {"passed": data.passed, "calibrated_at": data.process.date}
     row |= {"method": data.process.configuration["method"], "reading": data.reading}
+    row["unit"] = parameter_quantity(parameters, "conversion_constant").unit_text
+    row["messages"] = [{"kind": m.kind, "text": m.text} for m in data.process.messages]
     row |= {name: parameters[name] / scales[name] for name in names}
     row |= {f"{name}_errors": parameters.uncertainty(name) / scales[name] for name in names}
     covariance, above = parameters.only(names).covariance, np.triu_indices(len(names), 1)
@@ -171,6 +188,10 @@ def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
         stated = file.schema_arrow.metadata or {}
         if stated.get(b"memscal_schema") != FLEET_SCHEMA.encode():
             raise FormatError(f"{path} is a Parquet file, but none of memscal batch.")
+        if missing := set(columns or ()) - set(file.schema_arrow.names):
+            cure = "Run memscal batch --resume with this one."
+            problem = f"{path} was written by an earlier memscal."
+            raise FormatError(problem, why=f"It lacks {', '.join(sorted(missing))}.", cure=cure)
         return file.read(columns)
     except (pa.ArrowException, OSError) as error:
         reason = " ".join(str(error).split())[:200]
@@ -183,11 +204,91 @@ def shard_paths(results: Path) -> list[Path]:
     return sorted((results / "shards").glob("shard-*.parquet"))
 
 
+def write_batch(results: Path, stated: Mapping[str, Any]) -> None:
+    """State what a batch is, for those that continue or summarise it."""
+    text = json.dumps({"schema": FLEET_SCHEMA, "version": FLEET_SCHEMA_VERSION, **stated}, indent=2)
+    atomic_write_bytes(results / _BATCH, f"{text}\n".encode(), overwrite=True)
+
+
+def read_batch(results: Path) -> dict[str, Any]:
+    """Return what the batch of some results states of itself; nothing where that is not known."""
+    with suppress(MemscalError, ValueError):
+        stated = json.loads(read_bytes(results / _BATCH, limit=_MOST_STATED))
+        if isinstance(stated, dict) and all(
+            isinstance(stated.get(key), int) and stated[key] > 0 for key in ("scans", "shard_size")
+        ):
+            return stated
+    return {}
+
+
 _NUMBERS = (
     "conversion_constant", "conversion_constant_errors", "gaussian_sigma", "gaussian_sigma_errors",
     "wafer_x", "wafer_y",
 )  # fmt: skip
-_OF_SUMMARY = (*_NUMBERS, "path", "passed", "error_class", "error", "checks")
+_OF_SUMMARY = (
+    *_NUMBERS, "path", "passed", "error_class", "error", "checks", "unit", "messages",
+    "input_sha256", "options_sha256", "version", "method",
+)  # fmt: skip
+
+
+@dataclass
+class _Told:
+    """What the rows of a batch say beside their numbers; scans by their numbers."""
+
+    paths: list[str] = field(default_factory=list)
+    failed: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    errors: dict[int, tuple[str, str]] = field(default_factory=dict)
+    units: dict[str, int] = field(default_factory=dict)  # the first scan in each
+    done_with: dict[tuple[str, ...], int] = field(default_factory=dict)  # and with each setting
+    overridden: dict[int, str] = field(default_factory=dict)
+    contents: set[int] = field(default_factory=set)
+    repeated: list[int] = field(default_factory=list)
+
+    def add(self, table: Any) -> None:
+        """Add the rows of a shard."""
+        start = len(self.paths)
+        self.paths += table["path"].to_pylist()
+        for place in np.flatnonzero(~table["passed"].to_numpy().astype(bool)):
+            row = table.slice(place, 1).to_pylist()[0]
+            checks, number = row["checks"] or (), start + int(place)
+            self.failed[number] = tuple(c["name"] for c in checks if not c["passed"])
+            if row["error"]:
+                self.errors[number] = row["error_class"], row["error"]
+        settings = zip(*(table[n].to_pylist() for n in ("options_sha256", "version")), strict=True)
+        for i, setting in enumerate(settings, start):
+            self.done_with.setdefault(setting, i)
+        for i, unit in enumerate(table["unit"].to_pylist(), start):
+            if unit:
+                self.units.setdefault(unit, i)
+        for i, messages in enumerate(table["messages"].to_pylist(), start):
+            for message in messages or ():
+                if message["kind"] == OVERRIDE:
+                    self.overridden.setdefault(i, message["text"])
+        for i, digest in enumerate(table["input_sha256"].to_pylist(), start):
+            if digest and (short := int(digest[:15], 16)) in self.contents:
+                self.repeated.append(i)
+            elif digest:
+                self.contents.add(short)
+
+    def messages(self, scans: int) -> Iterator[Message]:
+        """Yield what is missing of so many scans, mixed, repeated or overridden."""
+        if len(self.paths) < scans:
+            text = f"The batch is not finished: {len(self.paths)} of {scans} scans are done."
+            yield Message("unfinished", f"{text} memscal batch --resume does the rest.", "warning")
+        if (kinds := len(self.done_with)) > 1:
+            first = ", ".join(self.paths[i] for i in self.done_with.values())
+            text = f"The scans were calibrated with {kinds} different options or versions"
+            yield Message("mixed", f"{text}; the first of each: {first}.", "warning")
+        if self.repeated:
+            named = ", ".join(self.paths[i] for i in self.repeated[:_NAMED])
+            more = len(self.repeated) - _NAMED
+            tail = f" and {more} more" if more > 0 else ""
+            text = f"{len(self.repeated)} scans have the content of another one and count again"
+            yield Message("repeated", f"{text}: {named}{tail}.", "warning")
+        if self.overridden:
+            i, text = next(iter(self.overridden.items()))
+            text = f"{len(self.overridden)} scans, the first {self.paths[i]}: {text}"
+            yield Message(OVERRIDE, text, "warning")
 
 
 def read_fleet(results: Path) -> FleetResults:
@@ -195,28 +296,23 @@ def read_fleet(results: Path) -> FleetResults:
     if not (shards := shard_paths(results)):
         cure = "Give the folder that memscal batch -o wrote."
         raise InputError(f"{results} holds no results of a batch.", cure=cure)
-    paths: list[str] = []
-    numbers: list[Any] = []
-    failed: dict[int, tuple[str, ...]] = {}
-    errors: dict[int, tuple[str, str]] = {}
-    units: set[str] = set()
+    told, numbers = _Told(), []
     for shard in shards:
         table = read_shard(shard, _OF_SUMMARY)
         numbers.append([table[name].to_numpy().astype(np.float64) for name in _NUMBERS])
-        if np.isfinite(numbers[-1][0]).any():
-            about = table.schema.field("conversion_constant").metadata
-            units |= set(about[b"units"].decode().split(" or "))
-        for i in np.flatnonzero(~table["passed"].to_numpy().astype(bool)):
-            row = table.slice(i, 1).to_pylist()[0]
-            checks, number = row["checks"] or (), len(paths) + int(i)
-            failed[number] = tuple(check["name"] for check in checks if not check["passed"])
-            if row["error"]:
-                errors[number] = row["error_class"], row["error"]
-        paths += table["path"].to_pylist()
-    if len(units) > 1:
-        why = f"The conversion constants are in {', '.join(sorted(units))}."
+        told.add(table)
+    if len(told.units) > 1:
+        kinds = ", ".join(f"{unit} (as {told.paths[i]})" for unit, i in told.units.items())
         cure = "Run a batch for each unit of readings."
+        why = f"The conversion constants are in {kinds}."
         raise FormatError(f"{results} holds sensors of several kinds.", why=why, cure=cure)
     columns = dict(zip(_NUMBERS, np.concatenate(numbers, axis=1), strict=True))
-    name, unit = os.path.basename(os.path.realpath(results)), (*units, "")[0]
-    return FleetResults(paths=paths, failed=failed, errors=errors, unit=unit, name=name, **columns)
+    return FleetResults(
+        paths=told.paths,
+        failed=told.failed,
+        errors=told.errors,
+        unit=next(iter(told.units), ""),
+        name=os.path.basename(os.path.realpath(results)),
+        messages=tuple(told.messages(read_batch(results).get("scans", 0))),
+        **columns,
+    )

@@ -136,7 +136,7 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 def _digest(file: SafeFile, schema: str) -> Finding:
     """Results must have a digest: scans and references may come from other programs."""
     if has_no_digest(file, schema):
-        return Finding("digest", True, "None: the file was written by another program.")
+        return Finding("digest", True, "None, as other programs write them: no change would show.")
     if problem := altered(file):
         return Finding("digest", False, f"The file was changed after it was written: {problem}.")
     return Finding("digest", True, "The content is what was written.")

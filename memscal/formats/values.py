@@ -28,8 +28,8 @@ def require_schema(file: SafeFile, schema: str) -> str:
         raise FormatError(problem, why=why, cure=cure)
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
     major = version.partition(".")[0]
-    if not (major.isascii() and major.isdigit()):
-        problem = f'{file.name} has the schema version "{version}", which is not a version.'
+    if not re.fullmatch("[0-9]{1,9}", major):
+        problem = f'{file.name} has the schema version "{version[:80]}", which is not a version.'
         cure = f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".'
         raise FormatError(problem, cure=cure)
     newest = SCHEMA_VERSION.partition(".")[0]

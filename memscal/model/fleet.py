@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from memscal.model.arrays import FloatArray
+from memscal.model.checks import Message
 from memscal.model.result import Result
 
 #: A value farther from the median is an outlier, in robust standard deviations: of a million
@@ -24,6 +25,7 @@ class FleetResults(Result):
     ``conversion_constant`` is in ``unit``, ``gaussian_sigma`` and the places on a wafer are in mm,
     as in the files; ``failed`` has the names of the checks that failed, ``errors`` class and words
     of errors, both by the number of the sensor; ``name`` is that of the folder of results.
+    ``messages`` say what is missing, mixed, repeated or overridden.
     """
 
     _summary: ClassVar[str] = "fleet_results"
@@ -40,6 +42,7 @@ class FleetResults(Result):
     errors: Mapping[int, tuple[str, str]]
     unit: str
     name: str = "sensors"
+    messages: tuple[Message, ...] = ()
 
 
 def robust_limit(count: int) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from memscal.model.fleet import FleetResults, robust_limit, robust_spread
 from memscal.model.notation import format_measured
-from memscal.summaries.table import Table, finite
+from memscal.summaries.table import Table, finite, texts_of
 
 _MOST_ROWS = 50
 _VALUES = {"conversion_constant": "A", "gaussian_sigma": "sigma"}
@@ -47,9 +47,12 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
     for name, symbol in _VALUES.items():
         values = getattr(fleet, name)
         known = values[np.isfinite(values)]
-        spread = robust_spread(known)
-        distance = values - np.median(known) if spread > 0 else 0 * values
-        deviations[symbol] = np.nan_to_num(distance / (spread or 1.0))
+        if not known.size:
+            deviations[symbol] = np.zeros(values.size)
+            continue
+        # Where most values are the same, others are as far as their uncertainty says.
+        spread = robust_spread(known) or float(np.nanmedian(getattr(fleet, f"{name}_errors")))
+        deviations[symbol] = np.nan_to_num((values - np.median(known)) / (spread or 1.0))
     farthest = np.max([np.abs(z) for z in deviations.values()], axis=0)
     limit = _limit(fleet)
     chosen = {int(i) for i in np.flatnonzero(farthest > limit)}
@@ -123,6 +126,7 @@ def mapping(fleet: FleetResults) -> dict[str, Any]:
             "median_standard_uncertainty": np.median(errors) if errors.size else np.nan,
         }
         told[name] = {"unit": unit} | {key: finite(value) for key, value in numbers.items()}
+    told["warnings"] = texts_of(fleet.messages)
     listed = [{"path": fleet.paths[i], "reason": text} for i, text in reasons.items()]
     told |= {"error_classes": error_classes(fleet), "outliers": listed[:_MOST_ROWS]}
     return told | {"outliers_in_all": len(listed)}

@@ -164,6 +164,30 @@ def test_a_wrong_executor_method_or_option_is_refused_at_once(options, words) ->
 
 def test_one_scan_is_no_list_and_no_scans_are_no_results() -> None:
     assert list(memscal.calibrate_many([])) == []
+
+
+def test_what_a_generator_gave_before_it_failed_is_calibrated() -> None:
+    def failing() -> Iterator[memscal.Scan]:
+        yield from scans(3)
+        raise OSError("the detector died")
+
+    results = memscal.calibrate_many(failing(), method="bayesian")
+    assert [next(results).error for _ in range(3)] == [None] * 3
+    with pytest.raises(OSError, match="the detector died"):
+        next(results)
+
+
+def test_few_scans_of_a_generator_are_shared_by_all_workers() -> None:
+    submitted = []
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, function: Any, *given: Any, **named: Any) -> Any:
+            submitted.append(len(given[-1]))
+            return super().submit(function, *given, **named)
+
+    with Counting(2) as executor:
+        assert len(list(memscal.calibrate_many((s for s in scans(5)), executor))) == 5
+    assert submitted == [1, 1, 2, 1]
     with pytest.raises(memscal.MemscalError, match="one scan"):
         memscal.calibrate_many(scans(1)[0])
 

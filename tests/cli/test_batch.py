@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from helpers.console import Outcome, Run
@@ -277,10 +278,10 @@ def test_a_summary_of_no_batch_or_of_several_units_is_refused(copy: Path, run: R
     run("summary", copy / "scans").exits(3, "holds no results of a batch")
     path = copy / "results" / "shards" / "shard-000001.parquet"
     table = pq.read_table(path)
-    field = table.schema.field("conversion_constant").with_metadata({"units": "nA/Pa"})
-    place = table.schema.get_field_index("conversion_constant")
-    pq.write_table(table.cast(table.schema.set(place, field)), path)
-    run("summary", copy / "results").exits(3, "mV/Pa, nA/Pa")
+    place = table.schema.get_field_index("unit")
+    units = pa.array(["nA/Pa"] * len(table))
+    pq.write_table(table.set_column(place, table.schema.field(place), units), path)
+    run("summary", copy / "results").exits(3, "mV/Pa (as scans/", "nA/Pa (as scans/")
     path.write_bytes(b"PAR1")
     run("summary", copy / "results").exits(3, "is damaged", "--resume")
 
@@ -310,6 +311,82 @@ def test_sensors_that_scatter_by_chance_are_no_outliers(count: int) -> None:
         alarms += bool(outliers(fleet))
     assert alarms <= binom.ppf(1 - 1e-3, batches, 0.02)
     assert outliers(replace(fleet, conversion_constant=np.append(values[0][1:], 9.0)))
+
+
+def test_a_summary_says_what_is_missing_mixed_repeated_and_overridden(
+    copy: Path, run: Run, folder: Path
+) -> None:
+    shard = copy / "results" / "shards" / "shard-000000.parquet"
+    table = pq.read_table(shard)
+    rows = table.to_pylist()
+    override = {"kind": "override", "text": "Overridden: rod radius 0.25 mm."}
+    rows[0] |= {"messages": [override], "options_sha256": "0" * 64}
+    pq.write_table(pa.Table.from_pylist(rows, table.schema), shard)
+    again = copy / "results" / "shards" / "shard-000002.parquet"
+    shutil.copy(copy / "results" / "shards" / "shard-000001.parquet", again)
+    (copy / "results" / "shards" / "shard-000005.parquet").unlink()
+    outcome = run("summary", copy / "results", "--json")
+    outcome.exits(0, "10 of 12 scans are done", "2 different options", "content of another one")
+    assert "Overridden: rod radius 0.25 mm." in outcome.err
+    assert len(json.loads(outcome.out)["warnings"]) == 4
+    assert "10 of 12 scans are done" in (copy / "results" / "summary.html").read_text()
+    arrays = {name: table[name].to_pylist() for name in ("messages", "unit")}
+    assert {unit for unit in arrays["unit"] if unit} == {"mV/Pa"}
+    assert "synthetic" in {message["kind"] for message in arrays["messages"][0]}
+
+
+def test_a_batch_that_overrides_says_so_in_its_rows(fleet: Path, folder: Path, run: Run) -> None:
+    shutil.copytree(
+        fleet / "scans", folder / "few", ignore=shutil.ignore_patterns("s0[2-9]*", "s1*")
+    )
+    run("reference", "rod", "--radius", 0.5, "--load", 1, "-o", folder / "r.h5").exits(0)
+    given = ["--reference", folder / "r.h5", "--override", "--workers", 1]
+    run("batch", folder / "few", "-o", folder / "results", *given)
+    [path] = (folder / "results" / "shards").iterdir()
+    kinds = [[m["kind"] for m in row] for row in pq.read_table(path)["messages"].to_pylist()]
+    assert len(kinds) == 2
+    assert all("override" in row for row in kinds)
+
+
+def test_artifacts_are_those_of_the_rows(copy: Path, folder: Path) -> None:
+    results, source = copy / "results", copy / "wafer.csv"
+    written = sorted((results / "artifacts").rglob("*.h5"))
+    assert written
+    written[0].unlink()
+    stale = results / "artifacts" / written[0].parent.name / "0000099-gone.apparatus.h5"
+    stale.write_text("of another scan")
+    assert batch(source, results, "--resume").wait() == 1
+    assert sorted((results / "artifacts").rglob("*.h5")) == written
+
+
+def test_a_batch_is_continued_in_shards_of_its_size_without_its_first_one(
+    copy: Path, run: Run
+) -> None:
+    (copy / "results" / "shards" / "shard-000000.parquet").unlink()
+    before = {path: path.stat().st_mtime_ns for path in (copy / "results" / "shards").iterdir()}
+    given = [copy / "wafer.csv", "-o", copy / "results", "--resume", "--workers", 1, "--json"]
+    assert shards_of(run("batch", *given)) == (1, COUNT // SHARD - 1)
+    assert len(list((copy / "results" / "shards").iterdir())) == COUNT / SHARD
+    assert all(path.stat().st_mtime_ns == time for path, time in before.items())
+
+
+def test_a_list_of_which_no_scan_is_there_is_refused(folder: Path, run: Run) -> None:
+    (folder / "list.csv").write_text("path;wafer_x\na.h5;0\n")
+    outcome = run("batch", folder / "list.csv", "-o", folder / "results")
+    outcome.exits(3, "None of the 2 scans", "separated by commas")
+    (folder / "list.csv").write_text("path,wafer_x (um)\na.h5,0\n")
+    run("batch", folder / "list.csv", "-o", folder / "results").exits(3, "'wafer_x (um)'")
+    assert not (folder / "results").exists()
+
+
+def test_a_sensor_apart_from_equal_ones_is_an_outlier() -> None:
+    values, blank = np.array([1.0] * 9 + [2.0]), np.full(10, np.nan)
+    errors = {f"{n}_errors": 0.01 * values for n in ("conversion_constant", "gaussian_sigma")}
+    fleet = FleetResults(
+        paths=["scan.h5"] * 10, conversion_constant=values, gaussian_sigma=values, **errors,
+        wafer_x=blank, wafer_y=blank, failed={}, errors={}, unit="mV/Pa",
+    )  # fmt: skip
+    assert list(outliers(fleet)) == [9]
 
 
 def test_a_manifest_that_may_not_be_read_is_refused(

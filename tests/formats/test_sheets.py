@@ -93,6 +93,11 @@ def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3])
     np.testing.assert_allclose(scan.u_zz, [1e-6, np.nan, 3e-6])
     assert scan.source.file_name == "rod.parquet"
+    columns = [pa.array(np.arange(5.0) * factor) for factor in (1, 1, 2)]
+    twice = pa.Table.from_arrays(columns, names=["x", "u", "u"])
+    parquet.write_table(twice, tmp_path / "twice.parquet")
+    third = memscal.import_table(tmp_path / "twice.parquet", x="x", u=3, x_unit="mm", u_unit="V")
+    np.testing.assert_array_equal(third.u_zz, 2 * np.arange(5.0))
     (tmp_path / "no.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(FormatError, match=r"no\.parquet cannot be read"):
         memscal.import_table(tmp_path / "no.parquet", x="x", u="u")

@@ -439,3 +439,46 @@ def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
     assert "24 more lines above the table were left out." in lines
     assert "within the table" not in found.notes
     assert max(map(len, lines)) < 400
+
+
+LINE = "\n".join(f"{x},{x % 3}" for x in range(-8, 9))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x (mm),u (mV)\n" + LINE.replace(",", ",0,0,"), "line 2 has 4 cells, the header 2"),
+        ("x (mm),u (mV)\n" + LINE + "\n9,ok,1\n", "line 19 has 3 cells"),
+        ("x/mm u/mV t\n" + "\n".join(f"{x} 1 2" for x in range(9)) + "\n1 2\n", "line 11 has 2"),
+        ('x (mm),u (mV),n\n0,1,"5 inch\n1,2,n\n2,3,end"\n' + LINE, "no end in it"),
+        ("x [mm],u [mV]\nmm,V\n" + LINE, "'mV' in its head, and 'V'"),
+        ("x (um);u (mV)\n-6,000;1\n-750;2\n0;3\n750;4\n1,000;5\n", "may separate thousands"),
+        ("x (mm),u (mV),u (V)\n" + LINE, "several columns 'u': u (mV), u (V)"),
+    ],
+)
+def test_a_table_that_would_be_misread_is_refused(tmp_path: Path, text: str, words: str):
+    table = tmp_path / "table.csv"
+    table.write_text(text, encoding="utf-8")
+    given = {"x": "x", "u": "u", "load": 1.0, "film": make_film(), "indenter": Rod(radius=0.25e-3)}
+    with pytest.raises((FormatError, InputError), match=re.escape(words)):
+        import_table(table, **given)
+
+
+def test_a_point_under_a_decimal_comma_is_no_decimal_mark(tmp_path: Path):
+    text = "x;u\n-8.000;0,05\n-500;0,1\n0;12,1\n500;0,1\n"
+    with pytest.raises(FormatError, match=r"'-8\.000'"):
+        scan_table(tmp_path, text, decimal=",", x_unit="um")
+
+
+def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tmp_path: Path):
+    errors = "t,x,u\n" + "\n".join(f"{'#N/A' if x % 2 else x},{x},1" for x in range(9))
+    assert scan_table(tmp_path, errors).x.size == 9
+    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n#2,3\n3,4\n4,5\n")
+    assert found.x.size == 4
+    assert any("Left out as comments: line 4." in text for text in marked_texts(found.messages))
+
+
+def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
+    assert found.x[0] == -1e-3
+    assert np.isnan(found.u_zz).sum() == 1

@@ -268,6 +268,8 @@ def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
     other = memscal.measure_stress(wet, made.known_apparatus(conversion_uncertainty=0.01))
     with pytest.raises(InputError, match="digests differ"):
         joined_stress([joined, other])
+    with pytest.raises(InputError, match="is given twice"):
+        joined_stress([together, memscal.measure_stress(wet, SENSOR)])
 
 
 def test_what_is_no_scan_is_refused() -> None:

@@ -203,7 +203,9 @@ def _parquet_table(parquet: Any, name: str, data: bytes, **reading: Any) -> Fram
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
 
     def column(index: int) -> Any:
-        return file.read(columns=[heads[index].name]).column(0)
+        # Columns of one name are read together.
+        same = heads.names[:index].count(heads[index].name)
+        return file.read(columns=[heads[index].name]).column(same)
 
     rows = file.metadata.num_rows
     return FrameTable(name, heads.names, rows, column, units=units, source=source, **reading)

@@ -7,6 +7,7 @@ import os
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from itertools import zip_longest
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -32,6 +33,8 @@ from memscal.progress import counted
 
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+_SHEET_ERROR = re.compile(r"#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?)", re.IGNORECASE)
 #: A number with a separator of thousands, such as -4.000,0.
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 #: A name and its unit: x (mm) or x [mm], and x/mm.
@@ -74,7 +77,7 @@ class NamedColumns:
     def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
         self._name, self._unit_row = name, tuple[str, ...]()
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
-        self._sentinels = [float(w.replace(",", ".")) for w in missing if _NUMBER.fullmatch(w)]
+        self._sentinels = [_float(w.replace(",", ".")) for w in missing if _NUMBER.fullmatch(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
         self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
         # First row of each part, and the lines of its rows.
@@ -109,8 +112,12 @@ class NamedColumns:
     ) -> str:
         """Return the unit of a column: of its head, of the row of units, or the one given."""
         index = self._index(column)
-        stated = self._unit_row[index] if index < len(self._unit_row) else ""
-        stated = stated or next((u for u in _cut(self.names[index])[1:] if is_unit(u)), "")
+        below = self._unit_row[index] if index < len(self._unit_row) else ""
+        head = next((u for u in _cut(self.names[index])[1:] if is_unit(u)), "")
+        if below and head and not same_unit(below, head):
+            problem = f"{self.where(column)} has the unit {head!r} in its head, and {below!r}."
+            raise InputError(problem, why="One of them is wrong.", cure="Correct the table.")
+        stated = below or head
         if unit and stated and not same_unit(unit, stated):
             problem = f"{self.where(column)} states the unit {stated!r}, but {option} is {unit!r}."
             cure = "Leave the option out to take the unit of the table, or correct the table."
@@ -137,13 +144,14 @@ class NamedColumns:
         return np.concatenate([np.asarray(lines) for _, lines in self._lines_of])
 
     def _index(self, column: str | int) -> int:
-        if isinstance(column, str) and column in self.names:
-            if self.names.count(column) > 1:
-                problem = f"{self._name} has several columns named {column!r}."
-                raise InputError(problem, cure="Give the number of the column, counted from 1.")
+        if isinstance(column, str) and self.names.count(column) == 1:
             return self.names.index(column)
         heads = [_cut(name)[0] for name in self.names]
-        if heads.count(str(column)) == 1:
+        if heads.count(str(column)) > 1:
+            named = [n for n, head in zip(self.names, heads, strict=True) if head == str(column)]
+            problem = f"{self._name} has several columns {column!r}: {', '.join(named)}."
+            raise InputError(problem, cure="Give the number of the column, counted from 1.")
+        if str(column) in heads:
             return heads.index(str(column))
         number = int(column) if isinstance(column, int) or column.isdecimal() else 0
         if not 1 <= number <= len(self.names):
@@ -173,11 +181,16 @@ class NamedColumns:
 
     def _numbers(self, cells: Sequence[str], lines: Lines, item: Wanted) -> FloatArray:
         """Return cells of a column as numbers; those that are none are kept for the message."""
-        try:
-            return np.fromiter(map(float, cells), np.float64, len(cells))
-        except ValueError:
-            pairs = zip(cells, lines, strict=True)
-            return np.array([self._number(cell, line, item) for cell, line in pairs])
+        with suppress(ValueError):
+            if not (self._comma_alone and any("." in cell for cell in cells)):
+                return np.fromiter(map(float, cells), np.float64, len(cells))
+        pairs = zip(cells, lines, strict=True)
+        return np.array([self._number(cell, line, item) for cell, line in pairs])
+
+    @property
+    def _comma_alone(self) -> bool:
+        """Whether a point in a number would be a separator of thousands."""
+        return False
 
     def _number(self, cell: str, line: int, item: Wanted) -> float:
         word = cell.lower()
@@ -186,13 +199,13 @@ class NamedColumns:
         if word in self._missing:
             return float("nan")
         text = cell.replace(",", ".") if self.decimal == "," else cell
-        try:
-            return float(text.replace("D", "E").replace("d", "e"))
-        except ValueError:
-            lines, cells = self._wrong.setdefault(item.column, ([], []))
-            lines.append(line)
-            cells += [printable(cell, _MAX_NAME)] if len(cells) < _NAMED else []
-            return float("nan")
+        with suppress(ValueError):
+            if not (self._comma_alone and "." in cell):
+                return _float(text)
+        lines, cells = self._wrong.setdefault(item.column, ([], []))
+        lines.append(line)
+        cells += [printable(cell, _MAX_NAME)] if len(cells) < _NAMED else []
+        return float("nan")
 
     def _refuse_wrong(self, wanted: list[Wanted]) -> None:
         for item in wanted:
@@ -210,6 +223,11 @@ class NamedColumns:
                 "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
                 "stand before the header (--skip-rows N).",
             )
+
+
+def _float(text: str) -> float:
+    """Return a number; D as in Fortran begins its power of ten, too."""
+    return float(text.replace("D", "E").replace("d", "e"))
 
 
 def _cut(name: str) -> tuple[str, ...]:
@@ -245,6 +263,7 @@ class TextTable(NamedColumns):
         super().__init__(os.path.basename(os.fspath(path)), missing)
         self._path, self._sheet, self._row = path, sheet, "row" if sheet else "line"
         self._digest, self._latin, self._width, self._line = hashlib.sha256(), False, 0, 1
+        self._comments: list[int] = []
         self._blocks = self._whole_lines()
         head, written, lines = b"", Numbered(), Numbered()
         # A head of a few endless lines, or of comments alone, is looked at no further than this.
@@ -258,7 +277,9 @@ class TextTable(NamedColumns):
         self._delimiter = delimiter or ("\t" if sheet else _find_delimiter([s for _, s in lines]))
         self._find_head([(n, s) for n, s in written if n > skip_rows], lines)
         self._said = [s for n, s in written if n < self._header[0]]
-        self.decimal = decimal or find_decimal(self._first[0], self._delimiter)
+        self._comments = [n for n, s in written if n > self._first[1][0] and _is_comment(s)]
+        with placed(self._name):
+            self.decimal = decimal or find_decimal(self._first[0], self._delimiter)
         self._marks = bytes.maketrans(self.decimal.encode()[:1] + b"dD", b".EE")
 
     def _find_head(self, written: Numbered, lines: Numbered) -> None:
@@ -287,6 +308,10 @@ class TextTable(NamedColumns):
         heads = [*names, *[""] * (self._width - len(names))]
         self.names = tuple(printable(c, _MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
+        by_rows = not names or self._delimiter == " "
+        self._columns = len(rows[start] if by_rows else names)
+        after = places[start - 1] if start else 0
+        self._require_whole(*self._first, [entry for entry in lines if entry[0] > after])
 
     def _describe(self, count: int) -> None:
         sha256 = self._sheet.sha256 if self._sheet else self._digest.hexdigest()
@@ -303,8 +328,44 @@ class TextTable(NamedColumns):
             *["The table is not UTF-8; it was read as Latin-1."] * self._latin,
             *self._sayings(),
             *[f"The header is {self._row} {line}{units}."] * found,
+            *[f"Left out as comments: {self._left_out()}."] * bool(self._comments),
             f"Read {count} rows of {self._width} columns {apart}.",
         )
+
+    def _left_out(self) -> str:
+        named = ", ".join(map(str, self._comments[:_NAMED]))
+        more = len(self._comments) - _NAMED
+        several = "s" if len(self._comments) > 1 else ""
+        return f"{self._row}{several} {named}{f' and {more} more' if more > 0 else ''}"
+
+    @property
+    def _comma_alone(self) -> bool:
+        # The numbers of a workbook have points, whatever its texts have.
+        return self.decimal == "," and not self._sheet
+
+    def _require_whole(self, rows: Rows, places: list[int], lines: Numbered) -> None:
+        """Refuse rows with more cells than the header, or spaces for a cell; and open quotes."""
+        if len(rows) < len(lines):
+            starts = {n: i for i, (n, _) in enumerate(lines)}
+            ends = [starts[n] for n in places]
+            # The first row whose lines are several.
+            begun = next(i for i, end in enumerate(ends) if end > i)
+            raise FormatError(
+                f"{self._name}: a cell of {self._row} {lines[begun][0]} has no end in it.",
+                why="A quotation mark stands alone; the readings within would be lost.",
+                cure="Take quotation marks out of the rows of numbers, or close them.",
+            )
+        spaces, stated = self._delimiter == " ", self._columns
+        for row, place in zip(rows, places, strict=True):
+            # Cells may be missing at the end; between spaces, any may be.
+            if len(row) != stated if spaces else any(row[stated:]):
+                raise FormatError(
+                    f"{self._name}: {self._row} {place} has {len(row)} cells, the "
+                    f"{'header' if self._header[1] and not spaces else 'first row'} {stated}.",
+                    why="Which cell belongs to which column is not known.",
+                    cure="Correct the table; state what separates its cells (--delimiter), or "
+                    "write numbers with a decimal point where commas separate them.",
+                )
 
     def _sayings(self) -> Iterator[str]:
         """Yield what is written above the table: it may say that the data are synthetic."""
@@ -319,7 +380,7 @@ class TextTable(NamedColumns):
 
     def _room(self, columns: int) -> tuple[int, int]:
         most = self._most(columns)
-        lines = sum(piece.count(b"\n") or piece.count(b"\r") for piece in self._raw())
+        lines = sum(max(piece.count(b"\n"), piece.count(b"\r")) for piece in self._raw())
         if lines > most:
             cure = "Average neighbouring readings, or cut the table into several."
             raise too_large(self._name, lines, most, f"lines of {columns} columns", cure=cure)
@@ -363,8 +424,12 @@ class TextTable(NamedColumns):
                 first, self._line = self._line, self._line + numbers[0].size
                 yield range(first, self._line), numbers
             else:
-                lines = [entry for entry in self._numbered(block) if not _is_comment(entry[1])]
-                yield self._part(*self._rows(lines), indices, wanted)
+                written = self._numbered(block)
+                self._comments += [n for n, s in written if _is_comment(s)]
+                lines = [entry for entry in written if not _is_comment(entry[1])]
+                rows, places = self._rows(lines)
+                self._require_whole(rows, places, lines)
+                yield self._part(rows, places, indices, wanted)
 
     def _part(
         self, rows: Rows, lines: list[int], indices: list[int], wanted: list[Wanted]
@@ -384,7 +449,10 @@ class TextTable(NamedColumns):
         # The ends of the cells, as they follow each other in equal rows.
         ends = block.translate(None, _PLAIN.translate(None, mark + b"\n"))
         equal = spaces or ends == (mark * (width - 1) + b"\n") * len(lines)
-        if max(indices) >= width or not equal:
+        # What needs a look is cut into cells: to be refused, or completed.
+        if max(indices) >= width or not equal or width > self._columns:
+            return []
+        if (spaces and width != self._columns) or (self._comma_alone and b"." in block):
             return []
         try:
             chosen: Any = {} if spaces else {"delimiter": self._delimiter, "usecols": indices}
@@ -403,7 +471,8 @@ class TextTable(NamedColumns):
             text = block.decode("latin-1" if self._latin else "utf-8-sig")
         except UnicodeDecodeError:
             self._latin, text = True, block.decode("latin-1")
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        # A typographic minus is one.
+        lines = text.replace("\r\n", "\n").replace("\r", "\n").replace("−", "-").split("\n")
         first, self._line = self._line, self._line + len(lines) - 1
         return [(number, line) for number, line in enumerate(lines, first) if line.strip()]
 
@@ -428,7 +497,9 @@ class TextTable(NamedColumns):
 
 
 def _is_comment(line: str) -> bool:
-    return line.lstrip()[0] in "#%"
+    # What a spreadsheet writes for an error is a cell.
+    text = line.lstrip()
+    return text[0] in "#%" and not _SHEET_ERROR.match(text)
 
 
 def _filled(cells: Sequence[str]) -> int:
@@ -477,8 +548,21 @@ def find_decimal(rows: Rows, delimiter: str = "") -> str:
     """A comma is the decimal mark only where cells hold one comma each and no point."""
     if delimiter == ",":
         return "."
-    cells = [c for row in rows[:200] for c in row if _is_number(c)]
-    return "," if any("," in c for c in cells) and not any("." in c for c in cells) else "."
+    some = rows[:200]
+    cells = [c for row in some for c in row if _is_number(c)]
+    if not any("," in c for c in cells) or any("." in c for c in cells):
+        return "."
+    for column in zip_longest(*some, fillvalue=""):
+        commas = [c for c in column if "," in c and _is_number(c)]
+        bare = [c for c in column if "," not in c and _is_number(c)]
+        if commas and bare and all(map(_THOUSANDS.fullmatch, commas)):
+            raise FormatError(
+                f"The commas of {commas[0]!r} may separate thousands: {bare[0]!r} in the same "
+                "column has none.",
+                why="Separators of thousands are not read.",
+                cure="Take them out, or state that commas are decimal (--decimal ,).",
+            )
+    return ","
 
 
 def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:

@@ -167,7 +167,7 @@ class _Request:
                     if self.sticking
                     else "let the film stick (friction inf), which goes further; "
                 )
-                + 'or state a linear film (law "linear"; --film-law linear), which is pressed at small strain.',
+                + 'or state a linear film (law "linear"; --film-law linear).',
             )
             if path.states:
                 error.last = self._contact(pressing, path.states)
