@@ -77,11 +77,11 @@ def command(
 
     A manifest is a text file with the path of a scan a line, relative to its own folder, or a CSV
     file with a column path and optional wafer_x, wafer_y (mm), the sensor's place on its wafer.
-    The estimate by the other route is not computed.
 
-    Each scan is a row of a table: A, widths, uncertainties, checks, G(r), digests; a scan that
-    cannot be calibrated has its error there, and the exit code is 1. What is done stays when the
-    program is interrupted or killed: --resume does the rest.
+    Each scan is a row of a table: A, widths, uncertainties, checks, G(r), digests, by the method
+    alone that is asked for; a scan that cannot be calibrated has its error there, and the exit
+    code is 1. What is done stays when the program is interrupted or killed: --resume does the
+    rest.
     """
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
