@@ -1,6 +1,7 @@
 """Figures of a comparison: what is drawn are the comparison's numbers, and nothing is lost."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -145,6 +146,21 @@ def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: Friction
         np.testing.assert_allclose(
             sticking.get_ydata(), [one.p_max[-1] / one.p0_max for one in of_dry]
         )
+
+
+def test_curves_that_meet_at_the_largest_load_are_named_at_the_smallest(found: FrictionComparison):
+    meeting = {
+        loading: [
+            replace(one, p_max=one.p0_max + 0 * one.p_max) if one.load == loads[-1].load else one
+            for one in loads
+        ]
+        for loading, loads in found.loads.items()
+    }
+    for loads, side in ((found.loads, "left"), (meeting, "right")):
+        figure = of_friction.maxima_figure(replace(found, loads=loads))
+        names = [t for t in figure.axes[0].texts if re.search(r"\\mu|^[≥\d]", t.get_text())]
+        assert len(names) > 2
+        assert {name.get_ha() for name in names} == {side}
 
 
 def test_both_readings_stand_within_their_intervals(found: FrictionComparison):

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -17,7 +18,7 @@ from scipy.stats import binom
 
 import memscal
 from memscal import ApparatusFunction, Experiment, GaussianMixture, MeasuredStress, compare_shear
-from memscal.errors import InputError
+from memscal.errors import FormatError, InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.likelihood import (
     Channel,
@@ -256,6 +257,13 @@ def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
         memscal.compare(without, normal, shear=shear, **options)
     with pytest.raises(InputError, match="not of a tangential"):
         memscal.compare(measured, normal, shear=normal, **options)
+    shear.save(path := cache / "xz.apparatus.h5")
+    with h5py.File(path, "r+") as file:
+        file["/entry/indenter/load"][()] *= 2
+    with pytest.raises(FormatError, match=r"xz\.apparatus\.h5 was changed"):
+        memscal.compare(without, normal, shear=path, **options)
+    with pytest.raises(InputError, match="no usable voltage u_xz"):
+        memscal.compare(without, normal, shear=path, accept_altered=True, **options)
     with pytest.raises(InputError, match="no shear"):
         memscal.compare(measured, normal, shear=shear, references=[])
     measured.save(cache / "dry.stress.h5")

@@ -158,7 +158,7 @@ class _Request:
                 yield contact
         except NewtonError as problem:
             error = ConvergenceError(
-                f"Under the {self.indenter.shape} of radius {self.radius * 1e3:.4g} mm: "
+                f"Under the {self.indenter.shape} of radius {self.indenter.radius * 1e3:.4g} mm: "
                 + problem.problem,
                 why="The film folds around the indenter more sharply than its elements can follow.",
                 cure="Lower the load; "

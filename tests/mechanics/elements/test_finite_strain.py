@@ -212,6 +212,8 @@ def test_a_load_that_cannot_be_reached_gives_the_last_state_that_was() -> None:
     depths = (Depth(0.02e-3), Depth(1.95e-3))
     with pytest.raises(ConvergenceError, match="No equilibrium") as caught:
         solve_finite_strain(FILM, ROD, depths, sticking=True, refinement=0.4)
+    assert f"Under the rod of radius {ROD.radius * 1e3:.4g} mm" in str(caught.value)
+    assert "friction inf" not in str(caught.value)  # it sticks
     last = caught.value.last
     assert isinstance(last, Contact)
     assert 0.02e-3 < last.depth < 1.95e-3
