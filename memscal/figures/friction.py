@@ -1,6 +1,5 @@
 """Figures of a comparison of measured with calculated stress."""
 
-import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -301,8 +300,7 @@ def _draw_reading(
 
 def _ends(reading: BoundedEstimate) -> FloatArray:
     """Return where the ends of an interval stand on the axis."""
-    low, high = reading.interval.low, reading.interval.high
-    return friction_position([low, math.inf if high is None else high])
+    return friction_position([reading.interval.low, reading.interval.upper])
 
 
 def _panels(

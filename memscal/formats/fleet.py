@@ -212,10 +212,11 @@ def write_batch(results: Path, stated: Mapping[str, Any]) -> None:
 
 def read_batch(results: Path) -> dict[str, Any]:
     """Return what the batch of some results states of itself; nothing where that is not known."""
-    with suppress(MemscalError, ValueError):
+    with suppress(MemscalError, ValueError, RecursionError):
         stated = json.loads(read_bytes(results / _BATCH, limit=_MOST_STATED))
         if isinstance(stated, dict) and all(
-            isinstance(stated.get(key), int) and stated[key] > 0 for key in ("scans", "shard_size")
+            isinstance(stated.get(key), int) and 0 < stated[key] < 2**31
+            for key in ("scans", "shard_size")
         ):
             return stated
     return {}
@@ -227,7 +228,7 @@ _NUMBERS = (
 )  # fmt: skip
 _OF_SUMMARY = (
     *_NUMBERS, "path", "passed", "error_class", "error", "checks", "unit", "messages",
-    "input_sha256", "options_sha256", "version", "method",
+    "input_sha256", "options_sha256", "version",
 )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """Scans and measured stress, given as objects or as the paths of their files."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from os import PathLike
 from typing import Any, TypeAlias
 
@@ -75,19 +75,26 @@ def _scan_or_stress(item: Any, accept_altered: bool) -> Scan | MeasuredStress:
 
 
 def _require_different(scans: Sequence[Scan]) -> None:
-    """Refuse a scan that is given twice: its readings would count as independent ones."""
+    require_different(map(_contents, scans) if len(scans) > 1 else ())
+
+
+def _contents(scan: Scan) -> tuple[str, Hashable]:
+    arrays = scan.x, scan.y, scan.u_zz, scan.normal_load, *scan.channels.values()
+    stated = scan.direction, scan.load, scan.unit, scan.lubrication
+    named = scan.source.file_name if scan.source else f"A scan of {scan.u_zz.size} points"
+    return named, (*stated, *(a if a is None else a.tobytes() for a in arrays))
+
+
+def require_different(named: Iterable[tuple[str, Hashable]]) -> None:
+    """Refuse contents, with their names, that are given twice: they would count as independent."""
     seen = set()
-    for scan in scans if len(scans) > 1 else ():
-        arrays = scan.x, scan.y, scan.u_zz, scan.normal_load, *scan.channels.values()
-        stated = scan.direction, scan.load, scan.unit, scan.lubrication
-        content = *stated, *(a if a is None else a.tobytes() for a in arrays)
+    for name, content in named:
         if content in seen:
-            named = scan.source.file_name if scan.source else f"A scan of {scan.u_zz.size} points"
             raise InputError(
-                f"{named} is given twice.",
+                f"{name} is given twice.",
                 why="The same readings would count as independent ones, and every uncertainty "
                 "would come out too small.",
-                cure="Give each scan once.",
+                cure="Give each scan once, itself or as measured stress.",
             )
         seen.add(content)
 

@@ -1,6 +1,5 @@
 """Quality checks of a comparison: whether any calculated contact explains what was measured."""
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -120,8 +119,8 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
         of = f"the {lubrication} loads" if lubrication else "the loads"
         if first.value is None or second.value is None:
             # A bound and a value agree where the intervals have values in common.
-            (low, high), (least, most) = _ends(first), _ends(second)
-            disagree, by = high < least or most < low, ""
+            one, other = first.interval, second.interval
+            disagree, by = one.upper < other.low or other.upper < one.low, ""
         else:
             apart = abs(first.value - second.value)
             errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
@@ -133,11 +132,6 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
                 f"The definitions of the loading disagree for {of}{by}: {first} by "
                 f"incremental loading, {second} by total loading.",
             )
-
-
-def _ends(estimate: BoundedEstimate) -> tuple[float, float]:
-    low, high = estimate.interval.low, estimate.interval.high
-    return low, math.inf if high is None else high
 
 
 def _against_macroscopic(

@@ -412,8 +412,7 @@ def implied_friction(
 ) -> ImpliedFriction:
     """Return what a slip length and its interval mean at each load, read from the maximum."""
     order = np.argsort(rigid.family.loads, kind="stable")
-    high = math.inf if length.interval.high is None else length.interval.high
-    lengths = np.array([length.interval.low, length.best, high])
+    lengths = np.array([length.interval.low, length.best, length.interval.upper])
     t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
     values = rigid.family.values_at(t)
     curves, maxima = _maxima(rigid, values), _maxima(slipping, lengths)

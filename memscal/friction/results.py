@@ -46,13 +46,18 @@ class Interval:
         return f"[{self.low:.3g}, {high}] ({percent(self.level)})"
 
     @property
+    def upper(self) -> float:
+        """The upper end, infinite where there is none."""
+        return math.inf if self.high is None else self.high
+
+    @property
     def two_sided(self) -> bool:
         """Whether the data exclude both smaller and larger values."""
         return self.low > 0 and self.high is not None
 
     def holds(self, value: float) -> bool:
         """Whether a value lies in the interval, its ends included."""
-        return self.low <= value and (self.high is None or value <= self.high)
+        return self.low <= value <= self.upper
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,7 +13,7 @@ from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
-from memscal.formats.opened import Scans, opened_scans
+from memscal.formats.opened import Scans, opened_scans, require_different
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
@@ -228,7 +228,7 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
             cure="Measure all of them with one artifact (memscal apply ARTIFACT SCAN...).",
         )
     profiles = tuple(profile for stress in stresses for profile in stress.profiles)
-    _require_different(profiles)
+    require_different(map(_contents, profiles))
     starts = np.cumsum([0, *(len(stress.profiles) for stress in stresses)])
     checks = [
         replace(check, name=f"{check.kind}_{int(check.profile) + start}")
@@ -253,22 +253,12 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
     )
 
 
-def _require_different(profiles: Sequence[MeasuredProfile]) -> None:
-    """Refuse a profile that is given twice: its readings would count as independent ones."""
-    seen = dict[tuple[bytes, ...], MeasuredProfile]()
-    for profile in profiles:
-        points = profile.points.get("zz")
-        arrays = (points.x, points.y, points.u) if points else (profile.r, profile.s_zz)
-        first = seen.setdefault(tuple(array.tobytes() for array in arrays), profile)
-        if first is not profile:
-            source = profile.scan.source
-            named = f"{source.file_name}, {profile.label}" if source else profile.label
-            raise InputError(
-                f"The profile of {named} is given twice.",
-                why="The same readings would count as independent ones, and every uncertainty "
-                "would come out too small.",
-                cure="Give each scan once: itself, or in one file of measured stress.",
-            )
+def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
+    """Return the name of a profile, and its readings."""
+    points, source = profile.points.get("zz"), profile.scan.source
+    arrays = (points.x, points.y, points.u) if points else (profile.r, profile.s_zz)
+    named = f"{source.file_name}, {profile.label}" if source else profile.label
+    return f"The profile of {named}", tuple(array.tobytes() for array in arrays)
 
 
 def _measure(

@@ -101,12 +101,12 @@ def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
 
 
 def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, float]:
-    value, u, high = estimate.value, estimate.standard_uncertainty, estimate.interval.high
+    value, u = estimate.value, estimate.standard_uncertainty
     return {
         name: math.nan if value is None else value,
         f"u({name})": math.nan if u is None else u,
         f"{name}, low": estimate.interval.low,
-        f"{name}, high": math.inf if high is None else high,
+        f"{name}, high": estimate.interval.upper,
         f"{name}, chi2": estimate.least if tested else math.nan,
         f"{name}, degrees": estimate.degrees,
         f"{name}, p": estimate.p_value if tested else math.nan,

@@ -21,7 +21,7 @@ import memscal
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import _channels, _confronted, _joint, compare_measured
 from memscal.friction.family import ProfileFamily
-from memscal.friction.results import FrictionComparison, Interval
+from memscal.friction.results import FrictionComparison
 from memscal.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
 from memscal.simulation.rod_scan import PAPER_FILM
 
@@ -95,10 +95,6 @@ def at_least(count: int, of: int, share: float) -> bool:
     return count >= binom.ppf(CHANCE, of, share)
 
 
-def upper_end(interval: Interval) -> float:
-    return math.inf if interval.high is None else interval.high
-
-
 @pytest.mark.parametrize("beside", [True, False])
 def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(beside: bool) -> None:
     # Lubricated loads beside the dry ones, or apart.
@@ -111,7 +107,7 @@ def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(besi
     assert low <= sum(held) <= high
     for missed in (
         [j.interval.low > t for t, j in found],
-        [upper_end(j.interval) < t for t, j in found],
+        [j.interval.upper < t for t, j in found],
     ):
         assert sum(missed) <= binom.ppf(1 - CHANCE, len(missed), 0.04)
 
@@ -130,8 +126,7 @@ def test_no_coefficient_is_left_out(friction: float) -> None:
     assert at_least(sum(held), len(held), 0.90)
     # Other frictions are excluded; larger ones only where the contact does not stick nearly whole.
     told = [
-        i.low > friction - 0.15 and (friction > 0.1 or upper_end(i) < friction + 0.1)
-        for i in intervals
+        i.low > friction - 0.15 and (friction > 0.1 or i.upper < friction + 0.1) for i in intervals
     ]
     assert at_least(sum(told), len(told), 0.90)
 
@@ -163,7 +158,7 @@ def test_lubricated_contacts_reach_no_friction() -> None:
     intervals = [one.comparison.joint["lubricated"]["incremental"].interval for one in found]
     reached = [interval.low == 0 for interval in intervals]
     assert at_least(sum(reached), len(reached), 0.94)
-    assert np.median([upper_end(interval) for interval in intervals]) < 0.08
+    assert np.median([interval.upper for interval in intervals]) < 0.08
 
 
 def test_chi_square_is_as_large_as_its_degrees_say() -> None:

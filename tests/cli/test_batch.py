@@ -370,6 +370,12 @@ def test_a_batch_is_continued_in_shards_of_its_size_without_its_first_one(
     assert all(path.stat().st_mtime_ns == time for path, time in before.items())
 
 
+@pytest.mark.parametrize("text", ["[" * 9000, '{"scans": 12, "shard_size": 1e9}', "{}", '{"a": 9'])
+def test_what_a_batch_states_of_itself_may_be_damaged(copy: Path, run: Run, text: str) -> None:
+    (copy / "results" / "batch.json").write_text(text)
+    run("summary", copy / "results").exits(0)
+
+
 def test_a_list_of_which_no_scan_is_there_is_refused(folder: Path, run: Run) -> None:
     (folder / "list.csv").write_text("path;wafer_x\na.h5;0\n")
     outcome = run("batch", folder / "list.csv", "-o", folder / "results")

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError, UnsafeFileError
+from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.formats.files import read_bytes
 from memscal.formats.tables.text_table import (
     Lines,
@@ -174,7 +174,8 @@ class FrameTable(NamedColumns):
         if values.dtype.kind in "iufb":
             return values.astype(np.float64)
         cells = ["" if value is None else str(value).strip() for value in values.tolist()]
-        self.decimal = self.decimal or find_decimal([(cell,) for cell in cells])
+        with placed(self.where(item.column)):
+            self.decimal = self.decimal or find_decimal([(cell,) for cell in cells])
         return self._numbers(cells, lines, item)
 
     def _describe(self, count: int) -> None:

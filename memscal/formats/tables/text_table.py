@@ -346,8 +346,8 @@ class TextTable(NamedColumns):
     def _require_whole(self, rows: Rows, places: list[int], lines: Numbered) -> None:
         """Refuse rows with more cells than the header, or spaces for a cell; and open quotes."""
         if len(rows) < len(lines):
-            starts = {n: i for i, (n, _) in enumerate(lines)}
-            ends = [starts[n] for n in places]
+            order = {number: i for i, (number, _) in enumerate(lines)}
+            ends = [order[number] for number in places]
             # The first row whose lines are several.
             begun = next(i for i, end in enumerate(ends) if end > i)
             raise FormatError(

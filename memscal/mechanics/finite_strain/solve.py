@@ -157,17 +157,12 @@ class _Request:
                     contact = replace(contact, convergence=change, steps=steps)
                 yield contact
         except NewtonError as problem:
+            stick = "" if self.sticking else "let the film stick (friction inf); "
             error = ConvergenceError(
                 f"Under the {self.indenter.shape} of radius {self.indenter.radius * 1e3:.4g} mm: "
                 + problem.problem,
                 why="The film folds around the indenter more sharply than its elements can follow.",
-                cure="Lower the load; "
-                + (
-                    ""
-                    if self.sticking
-                    else "let the film stick (friction inf), which goes further; "
-                )
-                + 'or state a linear film (law "linear"; --film-law linear).',
+                cure=f"Lower the load; {stick}or take the film as linear (--film-law linear).",
             )
             if path.states:
                 error.last = self._contact(pressing, path.states)
