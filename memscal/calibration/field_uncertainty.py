@@ -99,12 +99,9 @@ def _kernels(
 
 
 def _of_posterior(
-    solution: Solution,
-    deconvolution: Deconvolution,
-    axes: tuple[FloatArray, FloatArray],
-    g: FloatArray,
-    inputs: FloatArray,
-) -> FloatArray:
+    solution: Solution, deconvolution: Deconvolution, axes: tuple[FloatArray, FloatArray],
+    g: FloatArray, inputs: FloatArray,
+) -> FloatArray:  # fmt: skip
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
     estimate, a = solution.estimate, deconvolution.conversion_constant
     kernels = _kernels(estimate, *axes)
@@ -233,12 +230,9 @@ class _OfParameters:
 
 
 def _divided(
-    solution: Solution,
-    deconvolution: Deconvolution,
-    axes: tuple[FloatArray, FloatArray],
-    g: FloatArray,
-    inputs: FloatArray,
-) -> FloatArray:
+    solution: Solution, deconvolution: Deconvolution, axes: tuple[FloatArray, FloatArray],
+    g: FloatArray, inputs: FloatArray,
+) -> FloatArray:  # fmt: skip
     """Variances of G (2, nodes) by noise, and by inputs (n, q) and what a division takes away."""
     fields: Any = solution.fields
     estimate, smoothed = solution.estimate, solution.smoothed

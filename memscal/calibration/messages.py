@@ -105,7 +105,7 @@ def _directions(estimate: ProfileEstimate, checks: tuple[QualityCheck, ...]) -> 
 
 def _tails(estimate: ProfileEstimate) -> list[Message]:
     """Return what a tail that the scan hardly tells from the baseline would change in A."""
-    probability, change = estimate.weighed.of_kind("wide tail")
+    probability, change = estimate.weighed.of_kind("wide tail", estimate.departures.integrals)
     if probability < _LEAST_TOLD:
         return []
     prior = sum(h.estimate for h in HYPOTHESES if h.kind == "wide tail")

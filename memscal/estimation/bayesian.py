@@ -19,7 +19,7 @@ the Gaussian itself; its uncertainty is the mean squared error with priors that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import compress, pairwise, product
@@ -59,7 +59,7 @@ class Bayesian:
 
 @dataclass(frozen=True, eq=False)
 class _Sensors:
-    """Weighted data and columns of flat prior about f sensors, the Gaussian and the families'."""
+    """Weighted data and columns of flat prior about f sensors: of each fit Gaussian, families."""
 
     start: FloatArray  # (f, p): the sensor among all parameters
     root: FloatArray  # (f, p, flat): of the flat ones' covariance, for noise of unit variance
@@ -69,18 +69,24 @@ class _Sensors:
     rest: FloatArray  # (f, n): what the flat columns leave over
 
     @classmethod
-    def of(cls, basis: DepartureBasis, columns: FloatArray, data: FloatArray) -> _Sensors:
+    def of(cls, bases: Sequence[DepartureBasis], columns: FloatArray, data: FloatArray) -> _Sensors:
         """Project the weighted flat columns out of the weighted data, less a family's sensor."""
+        # ``columns`` (b, n, p) and ``data`` (b, n) of b fits, whose bases have the same columns.
+        basis, fits = bases[0], len(bases)
         starts = np.array([block.start for block in basis.blocks[len(basis.rings) :]], np.intp)
-        flat, shape = basis.flat, (1 + starts.size, columns.shape[1])
+        flat, shape = basis.flat, (fits, 1 + starts.size, columns.shape[2])
         start, places = np.zeros(shape), np.zeros((*shape, flat))
         # The first two parameters are ln A and ln(width).
-        flat_ones = np.r_[basis.conversion_constant, basis.sigma, np.ones(flat - 2)]
-        places[:, range(flat), range(flat)] = flat_ones
-        each = np.arange(1, len(start))
-        start[each, starts] = 1.0
-        places[each, 1, 1], places[each, starts, 0], places[each, starts + 1, 1] = 0.0, 1.0, 1.0
-        values, data = columns @ places, data - start @ columns.T
+        flat_ones = np.ones((fits, flat))
+        flat_ones[:, :2] = [[basis.conversion_constant, basis.sigma] for basis in bases]
+        places[..., range(flat), range(flat)] = flat_ones[:, None]
+        each = np.arange(1, shape[1])
+        start[:, each, starts] = 1.0
+        places[:, each, 1, 1], places[:, each, starts, 0] = 0.0, 1.0
+        places[:, each, starts + 1, 1] = 1.0
+        values, data = columns[:, None] @ places, data[:, None] - start @ columns.swapaxes(1, 2)
+        arrays = start, places, values, data
+        start, places, values, data = (array.reshape(-1, *array.shape[2:]) for array in arrays)
         scale = np.linalg.norm(values, axis=1, keepdims=True)
         q, r = np.linalg.qr(values / scale)
         size = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)) * scale[:, 0]).sum(axis=1)
@@ -123,6 +129,7 @@ class _Conditionals:
     """
 
     sensors: _Sensors
+    fit: NDArray[np.intp]  # (h,): which of several it is about
     number: NDArray[np.intp]  # (h,): places among HYPOTHESES
     family: NDArray[np.intp]  # (h,): of the sensor
     prior: FloatArray  # (h,): variance of the amplitudes
@@ -140,10 +147,14 @@ class _Conditionals:
     def of(
         cls, sensors: _Sensors, columns: FloatArray, choice: _Choice, noise: _Noise
     ) -> _Conditionals:
-        """Decompose the columns (n, p) that each hypothesis chooses."""
-        number, family, places, factors, strength = choice
+        """Decompose what each hypothesis about each of b fits chooses of its columns, (b, n, p)."""
+        fits = np.repeat(np.arange(len(columns)), len(choice.number))
+        number, family, places, factors, strength = (
+            np.concatenate([chosen] * len(columns)) for chosen in choice
+        )
+        family = family + fits * (len(sensors.start) // len(columns))
         q, prior = sensors.q[family], strength**2
-        chosen = np.moveaxis(columns[:, places], 1, 0) * factors[:, None, :]
+        chosen = columns[fits[:, None], :, places].swapaxes(1, 2) * factors[:, None, :]
         beside = q.swapaxes(1, 2) @ chosen
         changes = -(sensors.root[family] @ beside)
         changes[np.arange(len(places))[:, None], places, np.arange(places.shape[1])] += factors
@@ -155,7 +166,8 @@ class _Conditionals:
             power += noise.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
         signal = prior[:, None] * singular**2
         found = _likelihoods(sensors, family, signal, power, noise)
-        return cls(sensors, number, family, prior, changes, left, singular, right, along, *found)
+        decomposed = changes, left, singular, right, along
+        return cls(sensors, fits, number, family, prior, *decomposed, *found)
 
     def __getitem__(self, rows: NDArray[np.bool_]) -> _Conditionals:
         """Some of the hypotheses."""
@@ -278,6 +290,8 @@ def _hypotheses() -> Iterator[Hypothesis]:
 
 
 HYPOTHESES = tuple(_hypotheses())
+#: Their prior probabilities, for the estimate and for its uncertainty.
+_PRIORS = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,20 +304,18 @@ class WeighedFit:
     noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
-    change_of_a: FloatArray  # (h,): by each hypothesis, in V/Pa; NaN where it is unlikely
-    # Of all hypotheses, up to a constant of the scan, by the priors of estimate and uncertainty.
-    log_marginal_likelihood: float = 0.0
-    log_marginal_of_uncertainty: float = 0.0
+    means: FloatArray  # (h, p): of each hypothesis; zero where it is unlikely
 
     @property
     def gaussian_probability(self) -> float:
         """Posterior probability that there is no departure, from a prior of 0.45."""
         return float(self.probability[0])
 
-    def of_kind(self, name: str) -> tuple[float, float]:
+    def of_kind(self, name: str, integrals: FloatArray) -> tuple[float, float]:
         """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
+        # ``integrals`` (p,) of the columns that were weighed.
         shares = [p * (h.kind == name) for p, h in zip(self.probability, HYPOTHESES, strict=True)]
-        total, change = float(np.sum(shares)), np.nan_to_num(self.change_of_a)
+        total, change = float(np.sum(shares)), self.means @ integrals
         others = float((self.probability - shares) @ change) / max(1 - total, 1e-300)
         return total, float(shares @ change) / total - others if total > 0 else 0.0
 
@@ -319,22 +331,87 @@ def weigh_departures(
     # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.
     # Of a point of weight one, ``expected_noise`` is that of voltages that have none (of a plan),
     # ``least_noise`` the least that there is, as stated.
-    model, fit, flat = reduced.model, reduced.fit, basis.flat
-    columns, data = basis.columns(reduced), reduced.data
+    [weighing] = weighings([(reduced, basis)], effective_count, expected_noise, least_noise)
+    return weighing.average()
+
+
+def weighings(
+    pairs: Sequence[tuple[ReducedScan, DepartureBasis]],
+    effective_count: float,
+    expected_noise: float = 0.0,
+    least_noise: float = 0.0,
+) -> list[Weighing]:
+    """Weigh the hypotheses about several fits to the same points, with equal numbers of columns."""
+    _, basis = pairs[0]
+    flat = basis.flat
+    columns = np.stack([basis.columns(reduced) for reduced, basis in pairs])
+    data = np.stack([reduced.data for reduced, _ in pairs])
     size = basis.angular.count if basis.angular else 0
     if size:
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
-        prior = least_noise * np.eye(size, columns.shape[1], flat - size)
-        columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
+        prior = least_noise * np.eye(size, columns.shape[2], flat - size)
+        prior = np.broadcast_to(prior, (len(pairs), *prior.shape))
+        columns, data = np.hstack([columns, prior]), np.pad(data, ((0, 0), (0, size)))
     noise = _Noise(effective_count + size - flat, expected_noise**2, least_noise**2)
     families = tuple(fitted.family for fitted in basis.families)
     choice = _choice(flat, tuple(ring.radius.size for ring in basis.rings), families)
-    sensors = _Sensors.of(basis, columns, data)
+    sensors = _Sensors.of([basis for _, basis in pairs], columns, data)
     given = _Conditionals.of(sensors, columns, choice, noise)
-    averaged, gain = _average(given, noise.added, basis.integrals)
-    residual = model.points.u - fit.predicted - basis.voltages(model, fit, averaged.mean)
-    gain = gain[:, : reduced.data.size]
-    return replace(averaged, gain=reduced.by_voltages(gain), residual=residual)
+    return [Weighing(*pair, given[given.fit == i], noise.added) for i, pair in enumerate(pairs)]
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """The hypotheses about a fit, weighed; they are averaged when that is asked for."""
+
+    reduced: ReducedScan
+    basis: DepartureBasis
+    given: _Conditionals
+    added: float
+
+    @cached_property
+    def log_marginals(self) -> FloatArray:
+        """Of each of HYPOTHESES, (h,)."""
+        log_marginals = np.full(len(HYPOTHESES), -np.inf)
+        log_marginals[self.given.number] = self.given.log_marginal
+        return log_marginals
+
+    @cached_property
+    def log_marginal_likelihoods(self) -> tuple[float, float]:
+        """Of all hypotheses by either prior, up to a constant of the scan."""
+        terms = (self.log_marginals[p > 0] + np.log(p[p > 0]) for p in _PRIORS)
+        estimate, uncertainty = map(np.logaddexp.reduce, terms)
+        return float(estimate), float(uncertainty)
+
+    def average(self) -> WeighedFit:
+        """Average mean and gain by one set of probabilities, squared errors by the other."""
+        given, added, reduced, basis = self.given, self.added, self.reduced, self.basis
+        scatter = np.zeros(len(HYPOTHESES))
+        scatter[given.number] = given.scatter
+        estimate, uncertainty = (_posterior(self.log_marginals, prior) for prior in _PRIORS)
+        used = given[((estimate > 0) | (uncertainty > 0))[given.number]]
+        p, q, means = estimate[used.number], uncertainty[used.number], used.means
+        of_each = np.zeros((estimate.size, means.shape[1]))
+        of_each[used.number] = means
+        mean = p @ means
+        apart, gain = means - mean, used.gain(p)
+        parts = [q**0.5 * apart.T, used.covariance_root(q)]
+        if added:
+            pairs = zip(q, np.eye(q.size), strict=True)
+            parts += [(added * share) ** 0.5 * (used.gain(one) - gain) for share, one in pairs]
+        root = np.hstack(parts)
+        # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal).
+        gain = gain + (p[:, None] * apart).T @ used.slopes
+        model, fit = reduced.model, reduced.fit
+        return WeighedFit(
+            mean=mean,
+            covariance=root @ root.T,
+            gain=reduced.by_voltages(gain[:, : reduced.data.size]),
+            noise=float(np.sqrt(estimate @ scatter)),
+            probability=estimate,
+            residual=model.points.u - fit.predicted - basis.voltages(model, fit, mean),
+            means=of_each,
+        )
 
 
 class _Choice(NamedTuple):
@@ -356,7 +433,7 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
     of_family |= {family: i for i, family in enumerate(families, start=1)}
     kept = [(i, h) for i, h in enumerate(HYPOTHESES) if h.family in of_family]
     # Equal numbers of columns for all: one batch of decompositions.
-    places, factors = np.zeros((2, len(kept), 1 + max(sizes)))
+    places, factors = np.zeros((2, len(kept), max(sizes) + bool(families)))
     strengths = np.array([1.0 if h.family else h.strength for _, h in kept])
     for row, (_, hypothesis) in enumerate(kept):
         if hypothesis.family is not None:
@@ -371,38 +448,6 @@ def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> 
         [*each] for each in zip(*((i, of_family[h.family]) for i, h in kept), strict=True)
     )
     return _Choice(np.array(numbers), np.array(of), places.astype(np.intp), factors, strengths)
-
-
-def _average(
-    given: _Conditionals, added: float, integrals: FloatArray
-) -> tuple[WeighedFit, FloatArray]:
-    """Average mean and gain by one set of probabilities, squared errors by the other."""
-    log_marginal, scatter = np.full(len(HYPOTHESES), -np.inf), np.zeros(len(HYPOTHESES))
-    log_marginal[given.number], scatter[given.number] = given.log_marginal, given.scatter
-    priors = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
-    estimate, uncertainty = (_posterior(log_marginal, prior) for prior in priors)
-    used = given[((estimate > 0) | (uncertainty > 0))[given.number]]
-    p, q, means = estimate[used.number], uncertainty[used.number], used.means
-    change_of_a = np.full(estimate.size, np.nan)
-    change_of_a[used.number] = means @ integrals
-    mean = p @ means
-    apart, gain = means - mean, used.gain(p)
-    parts = [q**0.5 * apart.T, used.covariance_root(q)]
-    if added:
-        pairs = zip(q, np.eye(q.size), strict=True)
-        parts += [(added * share) ** 0.5 * (used.gain(one) - gain) for share, one in pairs]
-    root = np.hstack(parts)
-    # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
-    moving = (p[:, None] * apart).T @ used.slopes
-    sums = (
-        np.logaddexp.reduce(log_marginal[prior > 0] + np.log(prior[prior > 0])) for prior in priors
-    )
-    noise, unknown = float(np.sqrt(estimate @ scatter)), VoltageMap(())
-    # The gain is that of the standardised data, and the residual is left to be computed.
-    averaged = WeighedFit(
-        mean, root @ root.T, unknown, noise, estimate, mean, change_of_a, *map(float, sums)
-    )
-    return averaged, gain + moving
 
 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:

@@ -113,12 +113,12 @@ class Geometry:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
             return np.asarray(self.interpolation[rows] @ (self.table(wave).splines @ spread))
-        if wave not in self._waves and self.reach * self.k[-1] < _LONGEST_PHASE:
-            self._waves[wave] = self.table(wave).at(self.radius)
-        elif wave not in self._waves:
+        if wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
-            unique, back = np.unique(self.radius, return_inverse=True)
-            self._waves[wave] = _wave(wave, unique, self.k, self.across)[back]
+            unique, back = self._distinct
+            short = self.reach * self.k[-1] < _LONGEST_PHASE
+            at = self.table(wave).at(unique) if short else _wave(wave, unique, self.k, self.across)
+            self._waves[wave] = at[back]
         return np.asarray(self._waves[wave][rows] @ spread)
 
     def table(self, wave: int) -> WaveTable:
@@ -129,6 +129,11 @@ class Geometry:
     def interpolation(self) -> csr_array:
         """From coefficients of the tables' splines to the points, shape (n, t), sparse."""
         return self.table(0).interpolation(self.radius)
+
+    @cached_property
+    def _distinct(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """Distances that differ, and the place of each point's among them."""
+        return np.unique(self.radius, return_inverse=True)
 
     @cached_property
     def _waves(self) -> dict[int, FloatArray]:
@@ -249,11 +254,11 @@ class ForwardModel:
         return columns, np.vstack(mixes)
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
-        """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
+        """Derivative of :meth:`signal` by the distance from the centre, in V/m."""
         if self.order:
             slope, _ = self._vector_slopes(geometry, kernel)
             return np.asarray(-geometry.towards[self.axis] * slope)
-        return -self._summed(geometry, 1, self.k * kernel)
+        return -self._summed(geometry, 1, (self.k * kernel.T).T)
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""

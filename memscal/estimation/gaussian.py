@@ -25,7 +25,6 @@ _LONGEST_STEP = 1.0
 _ROUNDING = 1e-10
 
 Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-Shape = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
 
 
 def gauss_newton(
@@ -325,14 +324,9 @@ def _solve(
     return fit
 
 
-def _gaussian_shape(k: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    return gaussian_transfer(k, sigma), gaussian_transfer_slope(k, sigma)
-
-
-def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None) -> GaussianFit:
+def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
-    # ``shape``: transform of a round kernel in place of the Gaussian, and its slope by the width.
-    free, elliptic = model.points.free, 0 if shape else model.points.ellipse
+    free, elliptic = model.points.free, model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)
     centre[free] = theta[2 : 2 + free.sum()]
@@ -340,14 +334,15 @@ def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None
     ellipticity = np.zeros(2)
     ellipticity[:elliptic] = theta[theta.size - elliptic :]
     geometry = model.geometry(centre)
-    kernel, slope = (shape or _gaussian_shape)(model.k, sigma)
+    kernel = gaussian_transfer(model.k, sigma)
     if elliptic:
         columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
         signal, widening, *ovals = columns.T
         shift = model.by_free_centres(amplitude * shift)
     else:
         shift = model.centre_derivative(geometry, amplitude * kernel)
-        signal, widening, *ovals = model.signal(geometry, np.stack([kernel, slope], axis=1)).T
+        both = np.stack([kernel, gaussian_transfer_slope(model.k, sigma)], axis=1)
+        signal, widening, *ovals = model.signal(geometry, both).T
     baseline = model.drift_columns
     oval = [amplitude * column for column in ovals[:elliptic]]
     jacobian = np.column_stack([signal, amplitude * widening, shift, baseline, *oval])

@@ -230,16 +230,21 @@ def fitted_gaussian(points: ScanPoints, *references: RadialSpectrum) -> Gaussian
 
 
 def estimate_profile(
-    points: ScanPoints, *references: RadialSpectrum, angular: bool = False
+    points: ScanPoints,
+    *references: RadialSpectrum,
+    angular: bool = False,
+    start: ProfileEstimate | None = None,
 ) -> ProfileEstimate:
     """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     # With ``angular`` also what of a sensor that was scanned over the plane is not round.
+    # ``start``, of nearly the same voltages at the same points, spares the search.
     model = forward_model(points, references)
-    fit = fit_gaussian_to_points(model, _stated_weights(points))
+    fit = start.gaussian if start else fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
     residual, noise = points.u - fit.predicted, _least_noise(fit)
     angular = angular and points.planar and not model.order
-    outlier = _outliers(points, residual, stated, 2 * OUTLIER_THRESHOLD)
+    first = 2 * OUTLIER_THRESHOLD
+    outlier = start.outlier_weight if start else _outliers(points, residual, stated, first)
     for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
@@ -316,9 +321,8 @@ def log_marginal_likelihood(
     basis = departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = float(estimate.outlier_weight.sum())
-    weighed = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
-    both = weighed.log_marginal_likelihood, weighed.log_marginal_of_uncertainty
-    return np.asarray(both) - volume / 2
+    [weighing] = bayesian.weighings([(reduced, basis)], count, least_noise=least)
+    return np.asarray(weighing.log_marginal_likelihoods) - volume / 2
 
 
 def _least_noise(fit: GaussianFit) -> float:

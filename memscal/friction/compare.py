@@ -479,16 +479,8 @@ def compare_shear(
         Friction coefficients between which to interpolate; the last may be ``inf``.
     loading : str or sequence of str
         ``"incremental"``, ``"total"``, or both.
-    override : bool
-        Accept an artifact of another sensor or film: a message records it.
-    accept_altered : bool
-        Accept files whose content does not fit their digest; recorded like what is overridden.
-    cache : path, optional
-        A folder in which calculated contacts are kept; without it nothing is written.
-    workers : int
-        Processes that calculate contacts.
-    progress : callable or True, optional
-        Told how many loads are measured and contacts calculated: :class:`memscal.Progress`.
+    override, accept_altered, cache, workers, progress
+        As of :func:`memscal.compare`.
 
     Returns
     -------

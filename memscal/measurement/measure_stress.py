@@ -185,9 +185,9 @@ def measure_stress(
     for single in chain(*singles):
         restore.require_contact_size(single, MOST_OF_CONTACT)
     loads = (
-        _measure(origin, single, sensor)
+        _measure(origin, single, sensor, signal)
         for origin, of_scan in zip(origins, singles, strict=True)
-        for single in of_scan
+        for single, signal in zip(of_scan, one_load.contact_signals(of_scan, sensor), strict=True)
     )
     measured = counted(loads, "loads", sum(map(len, singles)))
     profiles, restored, notes = zip(*measured, strict=True)
@@ -262,19 +262,18 @@ def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
 
 
 def _measure(
-    origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction
+    origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
 ) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
     """Return the profile of a scan of one load, with checks and messages of its restoration."""
-    signal = one_load.contact_signal(scan, sensor)
     one_load.require_points(scan, signal)
-    prepared, electronic, noise_estimated = _prepared(scan, sensor, signal)
+    prepared = _prepared(scan, sensor, signal)
     try:
-        restored = restore.restore_known(prepared, sensor)
+        restored = restore.restore_known(prepared.scan, sensor, start=prepared.estimate)
     except (FitError, InputError) as failure:
         raise _placed(failure, scan) from failure
     one_load.require_ends(scan, signal, restored.centre)
-    profile = one_load.measured_profile(origin, scan, electronic, restored, signal)
-    estimated = noise_estimated or restored.points.u_errors is None
+    profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
+    estimated = scan.u_zz_errors is None
     noise = profile.points["zz"].noise if estimated else None
     left_out = {_REPLACED, *_OF_STATED_NOISE} if estimated else {_REPLACED}
     checks = [check for check in restored.checks if check.name not in left_out]
@@ -283,7 +282,7 @@ def _measure(
 
 def _prepared(
     scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
-) -> tuple[Scan, FloatArray, bool]:
+) -> one_load.PreparedScan:
     try:
         return one_load.prepared_scan(scan, sensor, signal)
     except (FitError, InputError) as failure:

@@ -31,14 +31,14 @@ from functools import lru_cache, reduce
 from operator import add
 
 import numpy as np
-from scipy.special import hyp0f1, j0, j1
+from scipy.special import hyp0f1
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import WeighedFit, weigh_departures
+from memscal.estimation.bayesian import WeighedFit, Weighing, weighings
 from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
-from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
+from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
@@ -157,14 +157,24 @@ class _Basis(DepartureBasis):
 
 @dataclass(frozen=True, eq=False)
 class ShapeFit:
-    """The fit of one shape of pressure and of departures from it."""
+    """The average of departures from the fit of one shape of pressure."""
 
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
     state: FloatArray  # (s,): posterior mean
     rows: FloatArray  # (s, p): the state's departure from the fit, by the kernels and the rest
     weighed: WeighedFit  # by departures from the fit
     growth: float  # adopted noise over the posterior's
-    log_marginal: float  # marginal likelihood up to a constant of the scan
+
+    @classmethod
+    def of(cls, start: ProfileEstimate, weighing: Weighing) -> "ShapeFit":
+        """Average the hypotheses about the fit of a shape."""
+        model, fit, weighed = start.model, weighing.reduced.fit, weighing.average()
+        kernels = weighing.basis.kernels(model.k)
+        rows = np.vstack([kernels, np.eye(weighing.basis.flat, kernels.shape[1])[2:]])
+        pressure = fit.conversion_constant * kernels[:, 0]
+        first = np.concatenate([pressure, fit.centre[model.points.free], fit.drift])
+        growth = start.adopted_noise(weighed.noise) / weighed.noise
+        return cls(first + rows @ weighed.mean, rows, weighed, growth)
 
     @property
     def covariance(self) -> FloatArray:
@@ -177,115 +187,72 @@ class ShapeFit:
         return self.rows @ self.weighed.gain
 
 
-#: Steps of the fits on a line, and the largest relative change of a width in one of them; they end
-#: at changes below the last, in units of the parameters' sizes.
-_STEPS, _LONGEST, _SETTLED = 8, 0.5, 1e-7
+def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
+    """Fit the shapes, and weigh departures from each fit."""
+    model, pairs = start.model, []
+    for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
+        about = departure_basis(model, fit)
+        rings = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in about.rings)
+        basis = _Basis(fit.conversion_constant, fit.sigma, about.flat, rings, (), None, shape)
+        pairs.append((ReducedScan.of(model, fit, start.weights), basis))
+    return weighings(pairs, float(start.outlier_weight.sum()))
 
 
-def _fitted_on_line(
-    shapes: Sequence[PressureShape], start: ProfileEstimate, theta: FloatArray, scale: FloatArray
-) -> FloatArray:
-    """Fit force, width, centre and drift of all shapes at once: (shapes, p), from one start."""
-    # By a Taylor series in the shift of the centre, so that the shapes share their waves.
-    points, k, weights = start.points, start.model.k, start.weights
-    axis, middle = int(points.free[0, 1]), theta[2]
-    places, back = np.unique((points.x, points.y)[axis] - middle, return_inverse=True)
-    x = np.multiply.outer(places, k)
-    zero, one = j0(x), j1(x)
-    two = 2 * np.divide(one, x, out=np.full_like(x, 0.5), where=x != 0) - zero
-    three = 4 * np.divide(two, x, out=np.zeros_like(x), where=x != 0) - one
-    # Derivatives of J0(kx) by the centre, over the factorials.
-    waves = np.stack([zero, k * one, k**2 * (two - zero) / 4, k**3 * (three - 3 * one) / 24])
-    waves *= start.model.reference.wavenumbers.weights * start.model.reference.values
-    drift = np.repeat(start.model.drift_columns[:, None], len(shapes), axis=1)
-    fitted = np.tile(theta, (len(shapes), 1))
-    for _ in range(_STEPS):
-        forces, widths, shifts = fitted[:, 0], fitted[:, 1], fitted[:, 2] - middle
-        pairs = zip(shapes, widths, strict=True)
-        transforms = np.stack([shape.transform(k, width) for shape, width in pairs], axis=2)
-        # Axes: terms of the series, points, response or its slope by the width, shapes.
-        terms = (waves @ np.moveaxis(transforms, 1, 0).reshape(k.size, -1))[:, back]
-        terms = (terms * points.load[:, None]).reshape(4, points.u.size, 2, -1)
-        powers = shifts ** np.arange(4)[:, None]
-        signal, widening = np.einsum("ts,tnds->dns", powers, terms)
-        moving = np.einsum("ts,tns->ns", np.arange(1, 4)[:, None] * powers[:3], terms[1:, :, 0])
-        columns = np.stack([signal, forces * widening, forces * moving], axis=2)
-        columns = np.concatenate([columns, drift], axis=2)
-        rest = points.u[:, None] - forces * signal - drift[:, 0] @ fitted[:, 3:].T
-        both = np.concatenate([columns * scale, rest[:, :, None]], axis=2)
-        both = points.standardised(both.reshape(points.u.size, -1), weights).reshape(both.shape)
-        step = (np.linalg.pinv(np.moveaxis(both[..., :-1], 1, 0)) @ both[..., -1].T[..., None])[
-            ..., 0
-        ]
-        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step[:, 1:2]), 1e-300))
-        fitted = fitted + step * scale
-        if np.abs(step).max() < _SETTLED:
-            break
-    return fitted
-
-
-def fit_shape(shape: PressureShape, start: ProfileEstimate, fit: GaussianFit) -> ShapeFit:
-    """Average departures from the fit of a shape."""
-    model, weights = start.model, start.weights
-    rings = departure_basis(model, fit)
-    smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
-    basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), None, shape)
-    reduced = ReducedScan.of(model, fit, weights)
-    weighed = weigh_departures(reduced, basis, float(start.outlier_weight.sum()))
-    kernels = basis.kernels(model.k)
-    rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
-    first = np.concatenate(
-        [fit.conversion_constant * kernels[:, 0], fit.centre[model.points.free], fit.drift]
-    )
-    # Priors are flat in log force, log width and the others: the information's log determinant.
-    flat = fit.jacobian * np.r_[fit.conversion_constant, fit.sigma, np.ones(basis.flat - 2)]
-    root = np.linalg.qr(model.points.standardised(flat, weights), mode="r")
-    log_information = 2 * float(np.log(np.abs(np.diag(root))).sum())
-    return ShapeFit(
-        state=first + rows @ weighed.mean,
-        rows=rows,
-        weighed=weighed,
-        growth=start.adopted_noise(weighed.noise) / weighed.noise,
-        log_marginal=weighed.log_marginal_likelihood - 0.5 * log_information,
-    )
+#: Steps of the fits, and the largest relative change of a width in one of them; they end at changes
+#: below the last.
+_STEPS, _LONGEST, _SETTLED = 8, 0.5, 1e-3
 
 
 def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[GaussianFit]:
-    """Fit force, width, centre and drift of each shape; keep the Gaussian's where that fails."""
-    gaussian, points, free = start.gaussian, start.points, start.points.free
+    """Fit force and width of each shape; keep the Gaussian's where that fails."""
+    # All shapes share the waves about the Gaussian's centre.  From there another one's moves by far
+    # less than its uncertainty: weighing the departures, linear in the centre, takes that step.
+    gaussian, points, drift = start.gaussian, start.points, start.model.drift_columns.shape[1]
     force, width = gaussian.conversion_constant, max(gaussian.sigma, _NARROWEST * points.step)
-    theta = np.concatenate([[force, width], gaussian.centre[free], gaussian.drift])
-    widths = np.full(1 + int(free.sum()), width)
-    scale = np.concatenate([[force], widths, np.full(gaussian.drift.size, np.ptp(points.u))])
-    near = np.tile(theta, (len(shapes), 1))
-    if not points.planar:
-        # Bessel functions at one centre take most steps; the last ones are exact.
-        near = _fitted_on_line(shapes, start, theta, scale)
-    pairs = zip(shapes, near, strict=True)
+    forces, widths = (np.full(len(shapes), value) for value in (force, width))
+    data = points.standardised(points.u, start.weights)
+    for _ in range(_STEPS):
+        columns = _shape_columns(shapes, start, forces, widths)
+        columns[..., 1:-drift] *= width
+        flat = points.standardised(columns.reshape(data.size, -1), start.weights)
+        inverse = np.linalg.pinv(np.moveaxis(flat.reshape(columns.shape), 1, 0))
+        forces, steps, *_ = (inverse @ data).T
+        growth = np.clip(steps * width / widths, -_LONGEST, _LONGEST)
+        widths = widths * (1 + growth)
+        if np.abs(growth).max() < _SETTLED:
+            break
+    fits = (forces > 0) & (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
+    forces, widths = np.where(fits, forces, force), np.where(fits, widths, width)
+    columns, baseline = _shape_columns(shapes, start, forces, widths), gaussian.drift
+    background = start.model.drift_columns @ baseline
     return [
-        _fitted(shape, start, place if _fits(place / scale) else theta, scale)
-        for shape, place in pairs
+        replace(
+            gaussian,
+            conversion_constant=float(forces[i]),
+            sigma=float(widths[i]),
+            ellipticity=np.zeros(2),
+            jacobian=columns[:, i],
+            predicted=forces[i] * columns[:, i, 0] + background,
+        )
+        for i in range(len(shapes))
     ]
 
 
-def _fits(scaled: FloatArray) -> bool:
-    return bool(scaled[0] > 0 and 1 / _FARTHEST < scaled[1] < _FARTHEST)
-
-
-def _fitted(
-    shape: PressureShape, start: ProfileEstimate, theta: FloatArray, scale: FloatArray
-) -> GaussianFit:
-    model, weights, last = start.model, start.weights, list[GaussianFit]()
-
-    def misfit(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        last[:] = [linearise(model, scaled * scale, shape.transform)]
-        residual = model.points.standardised(last[0].predicted - model.points.u, weights)
-        return residual, model.points.standardised(last[0].jacobian, weights) * scale
-
-    best = gauss_newton(misfit, theta / scale, tolerance=_SETTLED)
-    if best is None or not _fits(best):
-        misfit(theta / scale)
-    return last[0]
+def _shape_columns(
+    shapes: Sequence[PressureShape], start: ProfileEstimate, forces: FloatArray, widths: FloatArray
+) -> FloatArray:
+    """Derivatives of the voltages by force, width, centre and drift, (n, shapes, p)."""
+    model, geometry = start.model, start.gaussian.geometry
+    pairs = [shape.transform(model.k, w) for shape, w in zip(shapes, widths, strict=True)]
+    kernels, slopes = (np.stack(each, axis=1) for each in zip(*pairs, strict=True))
+    signal, widening = np.hsplit(model.signal(geometry, np.hstack([kernels, slopes])), 2)
+    radial = forces * model.radial_derivative(geometry, kernels)
+    towards = model.by_free_centres(geometry.towards)
+    drift = np.broadcast_to(
+        model.drift_columns[:, None], (*signal.shape, model.drift_columns.shape[1])
+    )
+    own = np.stack([signal, forces * widening], axis=2)
+    return np.concatenate([own, radial[:, :, None] * towards[:, None], drift], axis=2)
 
 
 #: A shape of less probability is left out.
@@ -341,13 +308,12 @@ def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    shapes = pressure_shapes(scan.set_up.film)
-    pairs = zip(shapes, fitted_shapes(shapes, estimate), strict=True)
-    fits = [fit_shape(shape, estimate, fit) for shape, fit in pairs]
-    log_marginal = np.array([fit.log_marginal for fit in fits])
+    weighed = weighed_shapes(pressure_shapes(scan.set_up.film), estimate)
+    log_marginal = np.array([each.log_marginal_likelihoods[0] for each in weighed])
     weight = np.exp(log_marginal - log_marginal.max())
     kept = np.flatnonzero(weight >= _NEGLIGIBLE)
-    fits, shares = [fits[i] for i in kept], weight[kept] / weight[kept].sum()
+    fits, shares = [ShapeFit.of(estimate, weighed[i]) for i in kept], weight[kept]
+    shares /= shares.sum()
     mean = shares @ np.stack([fit.state for fit in fits])
     gain = reduce(add, (fit.gain * share for fit, share in zip(fits, shares, strict=True)))
     within = sum(share * fit.covariance for fit, share in zip(fits, shares, strict=True))

@@ -392,11 +392,15 @@ def restore(
 
 
 def restore_known(
-    scan: Scan, apparatus: ApparatusFunction, expected: Expected = None
+    scan: Scan,
+    apparatus: ApparatusFunction,
+    expected: Expected = None,
+    start: profile.ProfileEstimate | None = None,
 ) -> Restoration:
     """Restore a stress from a scan and an apparatus function that were checked to fit together."""
+    # ``start``: the pressure of nearly the same voltages.
     points = scan_points.measured_points(scan)
-    estimate, transfer = gaussian_pressure(scan, apparatus, points)
+    estimate, transfer = gaussian_pressure(scan, apparatus, points, start)
     wavenumbers = estimate.model.reference.wavenumbers
     posterior = posterior_of(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
@@ -421,12 +425,15 @@ def restore_known(
 
 
 def gaussian_pressure(
-    scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
+    scan: Scan,
+    apparatus: ApparatusFunction,
+    points: scan_points.ScanPoints,
+    start: profile.ProfileEstimate | None = None,
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
     through, transfer = _of_pressure(scan, apparatus, points)
     with _undetermined():
-        return profile.estimate_profile(points, through), transfer
+        return profile.estimate_profile(points, through, start=start), transfer
 
 
 def plain_pressure(

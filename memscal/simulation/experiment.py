@@ -55,36 +55,17 @@ PAPER_LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
 def simulate_contacts(
-    *,
-    film: ElasticFilm = PAPER_FILM,
-    sphere: Sphere = PAPER_SPHERE,
-    kernel: RadialKernel | None = None,
-    conversion_constant: float = 1e-7,
-    channels: Sequence[str] = ("zz",),
-    shear_kernel: RadialKernel | None = None,
-    shear_conversion_constant: float = 5e-8,
-    load: float | Sequence[float] = PAPER_LOADS,
-    friction: float = 0.0,
-    loading: str = "incremental",
-    interface: Interface | None = None,
-    points: int = 33,
-    spacing: float = 0.5e-3,
-    repeats: int = 1,
-    noise: float = 0.005,
-    load_scatter: float = 0.02,
-    record_loads: bool = False,
-    load_reading: float = 0.002,
-    load_scale: float = 1.0,
-    load_uncertainty: float | None = 0.01,
-    position_error: float = 10e-6,
-    centre: tuple[float, float] = (0.14e-3, 0.0),
-    baseline: float = 0.01,
-    drift: float = 0.005,
-    state_noise: bool = True,
-    lubrication: str = "dry",
-    lubricant: str = "",
-    seed: int = 0,
-) -> Scan:
+    *, film: ElasticFilm = PAPER_FILM, sphere: Sphere = PAPER_SPHERE,
+    kernel: RadialKernel | None = None, conversion_constant: float = 1e-7,
+    channels: Sequence[str] = ("zz",), shear_kernel: RadialKernel | None = None,
+    shear_conversion_constant: float = 5e-8, load: float | Sequence[float] = PAPER_LOADS,
+    friction: float = 0.0, loading: str = "incremental", interface: Interface | None = None,
+    points: int = 33, spacing: float = 0.5e-3, repeats: int = 1, noise: float = 0.005,
+    load_scatter: float = 0.02, record_loads: bool = False, load_reading: float = 0.002,
+    load_scale: float = 1.0, load_uncertainty: float | None = 0.01, position_error: float = 10e-6,
+    centre: tuple[float, float] = (0.14e-3, 0.0), baseline: float = 0.01, drift: float = 0.005,
+    state_noise: bool = True, lubrication: str = "dry", lubricant: str = "", seed: int = 0,
+) -> Scan:  # fmt: skip
     """Simulate a line scan of contacts of a sphere, each pressed anew with a load of its own."""
     # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
     # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
@@ -392,31 +373,17 @@ def simulate_experiment(
     thickness = thickness_factor * reality.film.thickness
     reality = replace(reality, film=replace(reality.film, thickness=thickness))
     shared: dict[str, Any] = {
-        "film": reality.film,
-        "kernel": kernel,
-        "channels": channels,
-        "shear_kernel": shear_kernel,
-        "centre": centre,
-        "baseline": baseline,
-        "drift": drift,
-        "state_noise": state_noise,
+        "film": reality.film, "kernel": kernel, "channels": channels, "shear_kernel": shear_kernel,
+        "centre": centre, "baseline": baseline, "drift": drift, "state_noise": state_noise,
         "load_uncertainty": load_uncertainty,
-    }
+    }  # fmt: skip
     contacts: dict[str, Any] = shared | {
-        "sphere": reality.sphere,
-        "conversion_constant": gain * conversion_constant,
-        "shear_conversion_constant": gain * shear_conversion_constant,
-        "loading": loading,
-        "points": points,
-        "spacing": spacing,
-        "repeats": repeats,
-        "noise": noise,
-        "load_scatter": load_scatter,
-        "record_loads": record_loads,
-        "load_reading": load_reading,
-        "load_scale": reality.load_scale,
-        "position_error": position_error,
-    }
+        "sphere": reality.sphere, "conversion_constant": gain * conversion_constant,
+        "shear_conversion_constant": gain * shear_conversion_constant, "loading": loading,
+        "points": points, "spacing": spacing, "repeats": repeats, "noise": noise,
+        "load_scatter": load_scatter, "record_loads": record_loads, "load_reading": load_reading,
+        "load_scale": reality.load_scale, "position_error": position_error,
+    }  # fmt: skip
     calibration = simulate(
         rod=reality.rod,
         rod_friction=rod_friction,

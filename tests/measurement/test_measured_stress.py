@@ -13,7 +13,7 @@ from memscal import MeasuredProfile, Scan, SourceFile, StressSensor
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.measurement.measure_stress import joined_stress
-from memscal.measurement.measured_profile import contact_signal, prepared_scan
+from memscal.measurement.measured_profile import contact_signals, prepared_scan
 from memscal.measurement.restore import restore_known, single_loads
 
 QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
@@ -87,8 +87,9 @@ def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum()
 def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
     parts = single_loads(made.contact_scan(2))
     for profile, part in zip(made.measured(2).profiles, parts, strict=True):
-        prepared, *_ = prepared_scan(part, SENSOR, contact_signal(part, SENSOR))
-        found, a = restore_known(prepared, SENSOR), made.CONVERSION
+        [signal] = contact_signals([part], SENSOR)
+        prepared = prepared_scan(part, SENSOR, signal)
+        found, a = restore_known(prepared.scan, SENSOR), made.CONVERSION
         nodes = found.posterior.nodes
         sigma = found.posterior.covariance[nodes:, nodes:]
         # Columns by differences: a shifted centre moves every point on the blurred profile.
@@ -244,6 +245,30 @@ def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
     heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
     with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
         memscal.measure_stress(heavy, SENSOR)
+    # Of several, the one that cannot be.
+    scan = made.contact_scan(load=(0.34, 0.69, 1.37))
+    loads = np.where(np.arange(3)[:, None] == 1, 1e6, 1.0) * scan.normal_load
+    heavy = replace(scan, normal_load=loads, source=SourceFile("heavy.h5", ""))
+    with pytest.raises(DomainError, match=r"heavy\.h5, 6\.9e\+05 N, dry"):
+        memscal.measure_stress(heavy, SENSOR)
+
+
+@pytest.mark.parametrize("loads", [(1.37,), made.LOADS, tuple(np.geomspace(0.05, 3.0, 8))])
+def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads: tuple) -> None:
+    scan = made.contact_scan(load=loads)
+    nodes = Wavenumbers.covering(20 / made.EXACT_FILM.thickness, 48e-3)
+    transfer = made.CONVERSION * made.GAUSSIAN.transform(nodes.k)
+    for load, signal in zip(loads, contact_signals(single_loads(scan), SENSOR), strict=True):
+        for i, friction in enumerate((0.0, np.inf)):
+            near = load * np.array([0.99, 1.0, 1.01])
+            contacts = memscal.indent(made.EXACT_FILM, made.SPHERE, load=near, friction=friction)
+            below, at, above = (
+                nodes.synthesise(transfer * contact.base_spectrum(nodes.k), signal.r)
+                for contact in contacts
+            )
+            np.testing.assert_allclose(signal.voltage[i], at, atol=2e-4 * at.max())
+            by_load = (above - below) / 0.02
+            np.testing.assert_allclose(signal.by_load[i], by_load, atol=1e-3 * by_load.max())
 
 
 def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:

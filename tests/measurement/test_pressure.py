@@ -1,14 +1,19 @@
-"""Shapes of pressure: closed forms against quadrature, and what the film makes of a shear."""
+"""Shapes of pressure: closed forms against quadrature, fits against least squares."""
 
 import math
 
 import numpy as np
 import pytest
+from helpers import scans as made
 from helpers.scans import EXACT_FILM
+from scipy.optimize import least_squares
 from scipy.special import jv
 
 from memscal.axisymmetry.hankel import gauss_between
-from memscal.measurement.posterior import PressureShape, pressure_shapes
+from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.points import measured_points
+from memscal.measurement.posterior import PressureShape, pressure_shapes, weighed_shapes
+from memscal.measurement.restore import gaussian_pressure
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 
 K = np.linspace(0.0, 6e3, 41)
@@ -50,3 +55,49 @@ def test_shapes_of_one_width_have_one_mean_square_radius() -> None:
     for shape in normal:
         curvature = 2 * (1 - shape.transform(k, 1e-2)[0][0]) / k[0] ** 2
         assert curvature == pytest.approx(1e-4, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed: int) -> None:
+    scan = made.sphere_scan(made.pressed(), seed=seed)
+    points = measured_points(scan)
+    start, _ = gaussian_pressure(scan, made.known_apparatus(), points)
+    reference, root = start.model.reference, np.sqrt(start.weights)
+    line = np.linspace(-1.0, 1.0, points.u.size)
+    shapes, count = pressure_shapes(EXACT_FILM), float(start.outlier_weight.sum())
+    for shape, weighed in zip(shapes, weighed_shapes(shapes, start), strict=True):
+
+        def residual(theta: np.ndarray, shape: PressureShape = shape) -> np.ndarray:
+            # By ln(force), ln(width), centre (mm), baseline and drift (mV).
+            spectrum = (
+                reference.values * shape.transform(reference.wavenumbers.k, np.exp(theta[1]))[0]
+            )
+            distance = np.abs(points.x - 1e-3 * theta[2])
+            signal = scan.load * reference.wavenumbers.synthesise(spectrum, distance)
+            background = 1e-3 * (theta[3] + theta[4] * line)
+            return np.asarray(root * (np.exp(theta[0]) * signal + background - points.u))
+
+        fit = weighed.reduced.fit
+        units = np.array([fit.conversion_constant, fit.sigma, 1e-3, 1e-3, 1e-3])
+        begin = [np.log(units[0]), np.log(units[1]), *(1e3 * np.r_[fit.centre[0, 0], fit.drift])]
+        best = least_squares(residual, begin, "3-point", x_scale="jac", xtol=1e-12, ftol=1e-12)
+        flat = root[:, None] * fit.jacobian * units
+        step = np.linalg.lstsq(flat, root * (points.u - fit.predicted), rcond=None)[0]
+        uncertainty = np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))
+        assert np.all(np.abs(begin + step - best.x) < 0.01 * uncertainty)
+        # Without departures, noise at its most likely: -2 ln p = nu ln(S/nu) + nu + ln |X'X|.
+        freedom = count - 5
+        loss = freedom * (np.log(2 * best.cost / freedom) + 1)
+        loss += np.linalg.slogdet(best.jac.T @ best.jac)[1] + 3 * np.log(1e6)
+        assert weighed.log_marginals[0] == pytest.approx(-loss / 2, abs=0.01)
+
+
+def test_fits_that_are_weighed_together_are_as_each_by_itself() -> None:
+    scan = made.sphere_scan(made.pressed(), seed=1)
+    start, _ = gaussian_pressure(scan, made.known_apparatus(), measured_points(scan))
+    for weighed in weighed_shapes(pressure_shapes(EXACT_FILM)[:4], start):
+        count = float(start.outlier_weight.sum())
+        one, together = weigh_departures(weighed.reduced, weighed.basis, count), weighed.average()
+        for name in ("mean", "covariance", "probability"):
+            left, right = getattr(one, name), getattr(together, name)
+            np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12 * np.abs(left).max())
