@@ -152,7 +152,8 @@ class DrawnScans:
     @cached_property
     def _nominal(self) -> list[FloatArray]:
         pairs = zip(self.solution.scans, self.solution.estimate.model.references, strict=True)
-        return [_rod(_expected(scan), ref, scan) for scan, ref in pairs]
+        films = (scan.film and scan.film.expected for scan in self.solution.scans)
+        return [_rod(replace(s, film=f), ref, s) for f, (s, ref) in zip(films, pairs, strict=True)]
 
     def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""
@@ -177,10 +178,6 @@ class DrawnScans:
         numbers, g = uncertainty.read_off(solution.deconvolution, self.solution.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
-
-
-def _expected(scan: Scan) -> Scan:
-    return replace(scan, film=scan.film.expected) if scan.film else scan
 
 
 def _rod(scan: Scan, reference: RadialSpectrum, own: Scan) -> FloatArray:

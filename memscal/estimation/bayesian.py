@@ -304,7 +304,7 @@ class WeighedFit:
     noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
-    means: FloatArray  # (h, p): of each hypothesis; zero where it is unlikely
+    means: FloatArray  # (h, all columns): of each hypothesis; zero where it is unlikely
 
     @property
     def gaussian_probability(self) -> float:
@@ -313,7 +313,7 @@ class WeighedFit:
 
     def of_kind(self, name: str, integrals: FloatArray) -> tuple[float, float]:
         """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
-        # ``integrals`` (p,) of the columns that were weighed.
+        # ``integrals`` of all columns that were weighed, before any was left out.
         shares = [p * (h.kind == name) for p, h in zip(self.probability, HYPOTHESES, strict=True)]
         total, change = float(np.sum(shares)), self.means @ integrals
         others = float((self.probability - shares) @ change) / max(1 - total, 1e-300)

@@ -254,12 +254,13 @@ def estimate_profile(
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = _outliers(points, residual, stated, OUTLIER_THRESHOLD)
-        if np.allclose(updated, outlier, atol=0.02):
-            break
-        outlier = updated
-        if rounds_left:
+        # A residual counts by the root of its weight.
+        if rounds_left and not np.allclose(updated**0.5, outlier**0.5, atol=0.02):
+            outlier = updated
             # Of many points there is room for one.
             del weighed
+            continue
+        break
     done_with("departures")
     within = bayesian.supported(basis, weighed)
     raster = raster_noise(points, residual) if angular else None

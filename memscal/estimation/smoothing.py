@@ -155,7 +155,7 @@ def _fitted(
         reference = replace(reference, values=reference.values * blurred)
     spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
-    for _ in range(_ROUNDS):
+    for rounds_left in range(_ROUNDS - 1, -1, -1):
         fitted = spline.fit(y, stated * weight)
         left = (y - fitted.predicted) * np.sqrt(stated / np.clip(fitted.freedom, _LEAST_FREEDOM, 1))
         if points.planar:
@@ -164,7 +164,8 @@ def _fitted(
         else:
             updated = outlier_weights(left, threshold, _LEAST_SCALE)
         threshold = OUTLIER_THRESHOLD
-        if np.allclose(updated, weight, atol=0.02):
+        # A residual counts by the root of its weight.
+        if not rounds_left or np.allclose(updated**0.5, weight**0.5, atol=0.02):
             break
         weight = updated
     return spline.transform @ fitted.gain, fitted.predicted, weight

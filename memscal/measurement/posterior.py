@@ -198,44 +198,44 @@ def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> l
     return weighings(pairs, float(start.outlier_weight.sum()))
 
 
-#: Steps of the fits, and the largest relative change of a width in one of them; they end at changes
-#: below the last.
-_STEPS, _LONGEST, _SETTLED = 8, 0.5, 1e-3
+#: Steps of the fits; largest relative change of a width in one; what is left where it has settled.
+_STEPS, _LONGEST, _SETTLED = 20, 0.5, 1e-3
 
 
 def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[GaussianFit]:
     """Fit force and width of each shape; keep the Gaussian's where that fails."""
-    # All shapes share the waves about the Gaussian's centre.  From there another one's moves by far
-    # less than its uncertainty: weighing the departures, linear in the centre, takes that step.
+    # All shapes share the waves about the Gaussian's centre.  Another one's lies within a tenth of
+    # the width from there: weighing the departures, linear in the centre, takes that step.
     gaussian, points, drift = start.gaussian, start.points, start.model.drift_columns.shape[1]
     force, width = gaussian.conversion_constant, max(gaussian.sigma, _NARROWEST * points.step)
     forces, widths = (np.full(len(shapes), value) for value in (force, width))
     data = points.standardised(points.u, start.weights)
+    growth = np.zeros_like(widths)
     for _ in range(_STEPS):
         columns = _shape_columns(shapes, start, forces, widths)
         columns[..., 1:-drift] *= width
         flat = points.standardised(columns.reshape(data.size, -1), start.weights)
         inverse = np.linalg.pinv(np.moveaxis(flat.reshape(columns.shape), 1, 0))
         forces, steps, *_ = (inverse @ data).T
-        growth = np.clip(steps * width / widths, -_LONGEST, _LONGEST)
+        # A step that turns back is half as long as the last, so that no width swings for ever.
+        ahead = steps * width / widths
+        longest = np.where(ahead * growth < 0, np.abs(growth) / 2, _LONGEST)
+        growth = np.clip(ahead, -longest, longest)
         widths = widths * (1 + growth)
-        if np.abs(growth).max() < _SETTLED:
+        if np.abs(ahead).max() < _SETTLED:
             break
-    fits = (forces > 0) & (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
+    fits = (forces > 0) & (np.abs(ahead) < _SETTLED)
+    fits &= (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
     forces, widths = np.where(fits, forces, force), np.where(fits, widths, width)
-    columns, baseline = _shape_columns(shapes, start, forces, widths), gaussian.drift
-    background = start.model.drift_columns @ baseline
+    columns = np.moveaxis(_shape_columns(shapes, start, forces, widths), 1, 0)
+    background = start.model.drift_columns @ gaussian.drift
     return [
         replace(
-            gaussian,
-            conversion_constant=float(forces[i]),
-            sigma=float(widths[i]),
-            ellipticity=np.zeros(2),
-            jacobian=columns[:, i],
-            predicted=forces[i] * columns[:, i, 0] + background,
+            gaussian, conversion_constant=float(force), sigma=float(width), ellipticity=np.zeros(2),
+            jacobian=jacobian, predicted=force * jacobian[:, 0] + background,
         )
-        for i in range(len(shapes))
-    ]
+        for force, width, jacobian in zip(forces, widths, columns, strict=True)
+    ]  # fmt: skip
 
 
 def _shape_columns(

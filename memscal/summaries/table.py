@@ -232,7 +232,7 @@ def _parts(
     columns: Sequence[Sequence[str]], labels: int, width: int
 ) -> Iterator[list[tuple[Sequence[str], int]]]:
     """Divide columns, names first, among tables of a width; yield each with its columns' widths."""
-    tight = [max(map(_longest_chunk, column)) for column in columns]
+    tight = [max(len(s) for cell in col for s in _BETWEEN_WORDS.split(cell)) for col in columns]
     folding = [
         max(least, min(_PROSE, max(map(len, column[1:]), default=0)))
         for least, column in zip(tight, columns, strict=True)
@@ -260,7 +260,3 @@ def _parts(
             part = [*range(labels)]
         part.append(j)
     yield widened(part)
-
-
-def _longest_chunk(cell: str) -> int:
-    return max(map(len, _BETWEEN_WORDS.split(cell)))

@@ -61,6 +61,20 @@ def test_ten_outliers_are_listed_the_largest_first_and_the_others_counted() -> N
     assert listed[10].startswith("3 more outliers")
 
 
+def test_gross_outliers_leave_the_noise_as_it_is() -> None:
+    ratios = []
+    for seed in range(24):
+        scan, rng = simulated(noise=0.005, seed=seed), np.random.default_rng(seed)
+        chosen = rng.choice(scan.u_zz.size, 3, replace=False)
+        off = np.zeros_like(scan.u_zz)
+        off[chosen] = rng.choice([-1, 1], 3) * rng.uniform(0.1, 0.6, 3) * scan.u_zz.max()
+        noises = [estimated(s).weighed.noise for s in (scan, replace(scan, u_zz=scan.u_zz + off))]
+        ratios.append(noises[1] / noises[0])
+    # Without three of 65 points the noise moves by some hundredths.
+    assert np.max(ratios) < 1.15
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.02)
+
+
 def test_repeats_narrow_the_uncertainty_as_their_square_root() -> None:
     one, nine = estimated(simulated(seed=5)), estimated(simulated(seed=5, repeats=9))
     variances = [

@@ -101,3 +101,19 @@ def test_fits_that_are_weighed_together_are_as_each_by_itself() -> None:
         for name in ("mean", "covariance", "probability"):
             left, right = getattr(one, name), getattr(together, name)
             np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12 * np.abs(left).max())
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.02, 0.05])
+def test_a_fit_that_does_not_settle_takes_the_gaussian(noise: float) -> None:
+    # The slope by the width of a narrow pressure vanishes with the width: steps swing.
+    contact = made.pressed(indenter=made.EXACT_ROD)
+    for seed in range(8):
+        scan = made.sphere_scan(contact, noise=noise, seed=seed)
+        start, _ = gaussian_pressure(scan, made.known_apparatus(), measured_points(scan))
+        root = np.sqrt(start.weights)
+        for weighed in weighed_shapes(pressure_shapes(EXACT_FILM), start):
+            fit = weighed.reduced.fit
+            rest = root * (scan.u_zz - fit.predicted)
+            step = np.linalg.lstsq(root[:, None] * fit.jacobian, rest, rcond=None)[0]
+            gaussian = max(start.gaussian.sigma, 0.2 * start.points.step)
+            assert abs(step[1]) < 2e-3 * fit.sigma or fit.sigma == gaussian
