@@ -152,8 +152,7 @@ class DrawnScans:
     @cached_property
     def _nominal(self) -> list[FloatArray]:
         pairs = zip(self.solution.scans, self.solution.estimate.model.references, strict=True)
-        films = (scan.film and scan.film.expected for scan in self.solution.scans)
-        return [_rod(replace(s, film=f), ref, s) for f, (s, ref) in zip(films, pairs, strict=True)]
+        return [_rod(replace(s, film=s.film and s.film.expected), ref, s) for s, ref in pairs]
 
     def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""

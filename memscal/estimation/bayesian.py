@@ -59,7 +59,7 @@ class Bayesian:
 
 @dataclass(frozen=True, eq=False)
 class _Sensors:
-    """Weighted data and columns of flat prior about f sensors: of each fit Gaussian, families."""
+    """Weighted data and columns of flat prior about f sensors: each fit's Gaussian and families."""
 
     start: FloatArray  # (f, p): the sensor among all parameters
     root: FloatArray  # (f, p, flat): of the flat ones' covariance, for noise of unit variance
