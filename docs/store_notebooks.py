@@ -9,7 +9,7 @@ import io
 import math
 import re
 import sys
-from itertools import zip_longest
+from difflib import SequenceMatcher
 from pathlib import Path
 
 import jupytext
@@ -37,8 +37,18 @@ def smaller(png: str) -> str:
 
 
 def kept(outputs: list[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
-    """Return outputs as they are stored; progress and warnings are not."""
-    chosen = [o for o in outputs if o.get("name", "stdout") == "stdout"]
+    """Return outputs as they are stored; progress and warnings are not.
+
+    A kernel may send what a cell prints in several pieces, on a busy machine within a line.
+    """
+    chosen: list[nbformat.NotebookNode] = []
+    for output in outputs:
+        if output.output_type != "stream":
+            chosen.append(output)
+        elif output.name == "stdout" and chosen and chosen[-1].output_type == "stream":
+            chosen[-1].text += output.text
+        elif output.name == "stdout":
+            chosen.append(output)
     for output in chosen:
         if output.output_type == "stream":
             output.text = LOCAL.sub("", output.text)
@@ -74,20 +84,26 @@ def printed(book: Path) -> list[str]:
 
 
 def differences(stored: list[str], executed: list[str]) -> list[str]:
-    """Return pairs of lines that differ in a word, or in a number by more than 2 % and 0.02."""
+    """Return the lines that differ in a word, or in a number by more than 2 % and 0.02."""
 
-    def same(ours: str, theirs: str) -> bool:
-        numbers = [
-            [float(n.replace("−", "-")) for n in NUMBER.findall(line)] for line in (ours, theirs)
-        ]
-        words = [NUMBER.sub("", line).replace("-", "").split() for line in (ours, theirs)]
-        close = (
-            math.isclose(a, b, rel_tol=0.02, abs_tol=0.02) for a, b in zip(*numbers, strict=False)
-        )
-        return words[0] == words[1] and len(numbers[0]) == len(numbers[1]) and all(close)
+    def words(line: str) -> str:
+        return " ".join(NUMBER.sub("0", line).replace("-", "").split())
 
-    pairs = zip_longest(stored, executed, fillvalue="(no line)")
-    return [f"- {a}\n+ {b}" for a, b in pairs if a != b and not same(a, b)]
+    def close(ours: str, theirs: str) -> bool:
+        numbers = ([float(n.replace("−", "-")) for n in NUMBER.findall(x)] for x in (ours, theirs))
+        pairs = zip(*numbers, strict=True)
+        return all(math.isclose(a, b, rel_tol=0.02, abs_tol=0.02) for a, b in pairs)
+
+    found = []
+    matcher = SequenceMatcher(None, [*map(words, stored)], [*map(words, executed)], autojunk=False)
+    for tag, first, last, start, stop in matcher.get_opcodes():
+        ours, theirs = stored[first:last], executed[start:stop]
+        if tag == "equal":
+            pairs = zip(ours, theirs, strict=True)
+            found += [f"- {a}\n+ {b}" for a, b in pairs if not close(a, b)]
+        else:
+            found.append("\n".join([*(f"- {a}" for a in ours), *(f"+ {b}" for b in theirs)]))
+    return found
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 
 import jupytext
+import nbformat
 import pytest
 from helpers.bench import Bench
 
@@ -156,6 +157,19 @@ def test_a_stored_output_differs_by_a_word_a_line_or_more_than_the_last_digit_of
         changed = [*stored[:line], other, *stored[line + 1 :]]
         assert len(differences(stored, changed)) == 1
     assert len(differences(stored, stored[:2])) == 1
+    assert differences(stored[1:], stored) == ["+ A = 1.017e+00 mV"]
+
+
+def test_what_a_kernel_sends_in_pieces_is_stored_as_one_text() -> None:
+    kept = runpy.run_path(str(DOCS / "store_notebooks.py"))["kept"]
+
+    def stream(text: str, name: str = "stdout") -> nbformat.NotebookNode:
+        return nbformat.v4.new_output("stream", name=name, text=text)
+
+    picture = nbformat.v4.new_output("display_data", {"text/plain": "<Figure>"})
+    sent = [stream("all checks"), stream("a warning\n", "stderr"), stream(" passed"), stream("\n")]
+    outputs = kept([*sent, picture, stream("x = 1\n")])
+    assert outputs == [stream("all checks passed\n"), picture, stream("x = 1\n")]
 
 
 def test_every_picture_is_there_with_words_and_made_by_a_command_or_script_of_the_page() -> None:
