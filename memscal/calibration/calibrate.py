@@ -1,6 +1,5 @@
 """Calibration: from rod scans to an apparatus function with its covariance and checks."""
 
-import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
@@ -8,7 +7,6 @@ from os import PathLike
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
-import scipy
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
@@ -50,14 +48,13 @@ from memscal.model.apparatus import (
 from memscal.model.checks import Message, QualityCheck, override_messages
 from memscal.model.film import LINEAR
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.provenance import Process, accepted_alterations, timestamp
+from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.result import Result
 from memscal.model.scan import Scan, common_circumstances
 from memscal.model.sizes import MOST_OF_LINES
 from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, done_with, in_steps, reported
-from memscal.version import __version__
 
 #: Parameters that differ between a division and the Bayesian estimate.
 _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
@@ -76,7 +73,6 @@ def assemble(
     # Film and indenter are as ``stated`` by the scan where nothing was calculated with them.
     scan, reference = solution.scan, _table(solution.stress)
     channel = solution.estimate.points.channel
-    versions = {"numpy": np.__version__, "scipy": scipy.__version__}
     record: dict[str, Any] = {
         **configuration,
         "grid": dict(solution.choice.reasons),
@@ -110,12 +106,8 @@ def assemble(
         sensor=scan.sensor if channel == "zz" else replace(scan.sensor, channel=channel),
         load=None if results.parameters.reading.per != "Pa" else scan.load,
         reference=reference,
-        process=Process(
-            program="memscal",
-            version=__version__,
-            date=timestamp(),
+        process=Process.of_now(
             configuration=record,
-            environment={"python": platform.python_version(), **versions},
             messages=messages,
             input_scan=scan.source,
             input_reference=reference.source,

@@ -48,9 +48,13 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: boo
     shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
     look = style.mark(profile.lubrication, colour) | {"ls": "none", "mew": 0.7, "ms": 2.6}
     r, stress = profile.r / MM, profile.s_zz / KPA
-    axes.errorbar(r[shown], stress[shown], yerr=bars[shown] / KPA, elinewidth=0.6, **look)
+    if many := r.size > style.SCATTER_THRESHOLD:
+        look |= {"marker": ".", "mfc": colour, "ms": 1.5, "mew": 0}
+        axes.plot(r[shown], stress[shown], rasterized=True, zorder=1, **look)
+    else:
+        axes.errorbar(r[shown], stress[shown], yerr=bars[shown] / KPA, elinewidth=0.6, **look)
     if not shown.all():
-        axes.plot(r[~shown], stress[~shown], alpha=0.3, **look)
+        axes.plot(r[~shown], stress[~shown], alpha=0.3, rasterized=many, **look)
     radius = profile.contact_radius / MM
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
@@ -58,10 +62,12 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: boo
 def _legend(figure: Figure, measured: MeasuredStress, colours: dict[str, str]) -> None:
     """Name loads by colour and states by mark, once for both panels."""
     handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
+    largest = max(profile.r.size for profile in measured.profiles)
+    bars = "" if largest > style.SCATTER_THRESHOLD else ", ±2u"
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
         handle = Line2D([], [], lw=0.8, ms=3.2, **style.mark(state, "0.2"))
         handle.set_linestyle("--" if state == "lubricated" else "-")
-        handle.set_label(f"{state or 'measured'}, ±2u")
+        handle.set_label(f"{state or 'measured'}{bars}")
         handles.append(handle)
     radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
     handles.append(radius)

@@ -160,7 +160,6 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
         yield path, records.STRESS_PROFILE
-        yield path.replace("/entry/", "/entry/covariances/"), records.STRESS_COVARIANCE
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:

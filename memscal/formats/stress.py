@@ -15,7 +15,9 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si, to_json
 from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
+from memscal.model.arrays import FloatArray
 from memscal.model.checks import override_messages
+from memscal.model.correlation import square_root
 from memscal.model.measured_stress import (
     MeasuredPoints,
     MeasuredProfile,
@@ -24,7 +26,6 @@ from memscal.model.measured_stress import (
 )
 from memscal.model.notation import Reading
 from memscal.model.provenance import SourceFile, accepted_alterations
-from memscal.model.quantities import Quantity, record
 from memscal.model.records import points_record
 
 _CHANNELS = ("zz", "xz", "yz")
@@ -87,10 +88,8 @@ def _scan_group(scan: MeasuredScan) -> Group:
 
 
 _BUDGET = {"force": "force", "maximum": "stress"}
-_PREFIX = "covariance_"
 _MOST_SCANS = 10_000
 _PROCESS = "/entry/process"
-_AXES = ("r", "r_prime")
 
 
 def read_stress(path: str | os.PathLike[str], *, accept_altered: bool = False) -> MeasuredStress:
@@ -224,18 +223,13 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
 
 
 def _beside(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
-    """Return covariances, budgets, fitted curves and points of all profiles."""
+    """Return roots of covariances, budgets, fitted curves and points of all profiles."""
     # Apart from the profiles: programs that read NeXus take a NXdata within another for its signal.
     groups_of: dict[str, dict[str, Node]] = {}
     for i, profile in enumerate(profiles, 1):
         of, name = profile.scan.reading, f"profile_{i}"
-        covariance = write_record(records.STRESS_COVARIANCE, profile)
-        by_source = profile.covariances.items()
-        parts = {_PREFIX + source: si(c, "stress squared", _AXES) for source, c in by_source}
-        sources = {"sources": to_json("sources", list(profile.covariances))}
-        covariance = replace(covariance, children={**covariance.children, **parts, **sources})
         budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
-        groups_of.setdefault("covariances", {})[name] = covariance
+        groups_of.setdefault("roots", {})[name] = _roots_group(profile)
         groups_of.setdefault("budgets", {})[name] = groups.budget_group(budget, _BUDGET)
         if profile.curve_r.size:
             groups_of.setdefault("curves", {})[name] = write_record(records.STRESS_CURVE, profile)
@@ -243,6 +237,17 @@ def _beside(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
             group = write_record(points_record(channel).read_in(of), points)
             groups_of.setdefault(f"points_{channel}", {})[name] = group
     return {name: Group("NXcollection", of_profiles) for name, of_profiles in groups_of.items()}
+
+
+def _roots_group(profile: MeasuredProfile) -> Group:
+    children: dict[str, Node] = {"sources": to_json("sources", list(profile.roots))}
+    children["r"] = si(profile.r, "length", ("r",))
+    for source, root in profile.roots.items():
+        axes = ("r", f"{source}_column")[: root.ndim]
+        children[source] = si(root, "stress", axes)
+        if root.ndim > 1:
+            children[axes[1]] = writer.index_axis(axes[1], root.shape[1])
+    return Group("NXcollection", children)
 
 
 def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
@@ -261,17 +266,28 @@ def _beside_or_in(file: SafeFile, group: str, name: str, within: str) -> str:
     return beside if file.has(beside := f"/entry/{group}/{name}") else within
 
 
+def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, FloatArray]:
+    """Read the roots of a profile's covariance; of a file before them, those of its matrices."""
+    where, prefix, dimension = f"/entry/roots/{name}", "", "stress"
+    if before := not file.has(where):
+        where = _beside_or_in(file, "covariances", name, path)
+        prefix, dimension = "covariance_", "stress squared"
+    roots: dict[str, FloatArray] = {}
+    for source in text_list(file, f"{where}/sources"):
+        stored = values.require_array(file, place := f"{where}/{prefix}{source}", dimension)
+        shape = (n, n) if before else (n, *stored.shape[1:2])
+        if stored.shape != shape or not np.isfinite(stored).all():
+            raise FormatError(f"{file.where(place)} should hold finite numbers in {n} rows.")
+        roots[source] = square_root(stored) if before else stored
+    return roots
+
+
 def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProfile:
     arrays = read_record(records.STRESS_PROFILE, file, path)
     n, name = arrays["r"].size, path.rpartition("/")[2]
-    of_covariance = _beside_or_in(file, "covariances", name, path)
-    sources = text_list(file, f"{of_covariance}/sources")
-    of_sources = [
-        Quantity(_PREFIX + name, "stress squared", axes=_AXES, required=True) for name in sources
-    ]
-    stored = read_record(record("NXdata", *of_sources), file, of_covariance, sizes={"r": n})
+    roots = _read_roots(file, name, path, n)
     budget = groups.read_budget(file, _beside_or_in(file, "budgets", name, f"{path}/budget"))
-    if not sources or not budget.keys() >= _BUDGET.keys():
+    if not roots or not budget.keys() >= _BUDGET.keys():
         problem = f"{file.where(path)} states no covariance of its stress, or no budget."
         raise FormatError(problem, why="Measured stress without uncertainty means little.")
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
@@ -286,7 +302,7 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     return MeasuredProfile(
         scan=scan,
         **{name: value for name, value in profile.items() if name in fields},
-        covariances={source: stored[f"{_PREFIX}{source}"] for source in sources},
+        roots=roots,
         force_budget=budget["force"],
         maximum_budget=budget["maximum"],
         points=_read_points(file, name, scan.reading),

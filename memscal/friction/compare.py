@@ -34,13 +34,14 @@ from memscal.friction.results import (
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
-from memscal.measurement.restore import accept_other_sensor
+from memscal.measurement.restore import accept_other_sensor, single_loads
 from memscal.model.arrays import require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.provenance import accepted_alterations
 from memscal.model.scan import Scan
+from memscal.model.sizes import MOST_COMPARED, MOST_COMPARED_TOGETHER, too_large
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, reported
@@ -226,6 +227,8 @@ def compare(
     if lubricated not in (None, FRICTIONLESS, APART):
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
+    require_contacts(scans_of(opened))
+    _require_few(opened, sheared=shear is not None)
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     tangential = None
@@ -264,10 +267,28 @@ def compare(
     return replace(comparison, interface=laws, messages=(*comparison.messages, *laws.messages))
 
 
+def _require_few(contacts: Sequence[Scan | MeasuredStress], *, sheared: bool = False) -> None:
+    """Refuse more points than are compared; ``sheared``: each is read by two channels."""
+    sizes, together = [0], sheared
+    for item in contacts:
+        if isinstance(item, Scan):
+            sizes += [single.u_zz.size for single in single_loads(item)]
+            together |= item.u_zz_correlation is not None
+        else:
+            points = [p.points["zz"] for p in item.profiles if "zz" in p.points]
+            sizes += [of.u.size for of in points]
+            together |= any(of.correlation is not None for of in points)
+    cure = "Average neighbouring readings, or leave out repeats."
+    what, of = "What is compared", "readings of one load that share noise (correlation, shear)"
+    if (size := sum(sizes)) > MOST_COMPARED:
+        raise too_large(what, size, MOST_COMPARED, "points of all loads", cure=cure)
+    if together and (size := (1 + sheared) * max(sizes)) > MOST_COMPARED_TOGETHER:
+        raise too_large(what, size, MOST_COMPARED_TOGETHER, of, cure=cure)
+
+
 def _measured(
     contacts: Sequence[Scan | MeasuredStress], apparatus: ApparatusFunction, override: bool
 ) -> MeasuredStress:
-    require_contacts(scans_of(contacts))
     scans = [item for item in contacts if isinstance(item, Scan)]
     if len(scans) == len(contacts):
         return measure_stress(scans, apparatus, override=override)
@@ -512,6 +533,7 @@ def compare_shear(
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     measured = opened_stress(measured, accept_altered=accept_altered)
     require_contacts(measured.scans)
+    _require_few([measured])
     notes = _accept_tangential(measured, sensor, override=override)
     families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, _channels(measured, sensor, families))

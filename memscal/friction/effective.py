@@ -20,6 +20,7 @@ from memscal.friction.likelihood import (
     likelihood,
     points_at,
     predict,
+    standardise,
 )
 from memscal.friction.results import BoundedEstimate, DryAgainstLubricated, Interval, LoadComparison
 from memscal.model.arrays import FloatArray
@@ -330,13 +331,12 @@ def dry_against_lubricated(
     both = list(zip(sides, predicted, kept, strict=True))
     # What the frictionless contact says of other places and loads is taken off both.
     dry, wet = ((side.u - of_side.signal[0])[places] for side, of_side, places in both)
-    covariance = sum(_covariance(side, p)[np.ix_(places, places)] for side, p, places in both)
     flat = np.column_stack([sides[0].flat, predicted[0].slope[0] * sides[0].side])[kept[0]]
-    root = np.linalg.cholesky(np.asarray(covariance))
-    basis = np.linalg.qr(np.linalg.solve(root, flat))[0]
-    left = np.linalg.solve(root, dry - wet)
-    left = left - basis @ (basis.T @ left)
-    chi_square, degrees = float(left @ left), left.size - flat.shape[1]
+    noise, correlation = _noise(both)
+    left = points_at(sides[0].offset[kept[0]], sides[0], dry - wet, noise)
+    left, nothing = replace(left, flat=flat, correlation=correlation), np.zeros((1, noise.size))
+    of_noise = standardise(left, Predicted(nothing, nothing, nothing, nothing, {}))
+    chi_square, degrees = float(np.sum(of_noise.residual**2)), left.degrees
     difference, errors = _difference(profiles, sides, predicted, kept, sensor, conversion_share)
     top = profiles[0].maximum - profiles[1].maximum
     random = (random_uncertainty(profile.maximum_budget) for profile in profiles)
@@ -358,19 +358,27 @@ def dry_against_lubricated(
 
 def _common(dry: FloatArray, wet: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the indices of places that both scans measured, a quarter of a step apart at most."""
-    nearest = np.abs(np.subtract.outer(dry, wet)).argmin(axis=1)
+    nearest = np.searchsorted((wet[1:] + wet[:-1]) / 2, dry)
     step = float(np.median(np.diff(dry))) if dry.size > 1 else 0.0
     close = np.abs(dry - wet[nearest]) < _CLOSE * step
     first, where = np.unique(nearest[close], return_index=True)
     return close.nonzero()[0][where], first
 
 
-def _covariance(points: LoadPoints, predicted: Predicted) -> FloatArray:
-    """Covariance of the voltages, without what both scans share, in V^2."""
-    noise = np.outer(points.noise, points.noise)
-    noise = np.diag(np.diag(noise)) if points.correlation is None else noise * points.correlation
-    moved = (predicted.slope[0] * points.x_errors) ** 2
-    return np.asarray(noise + np.diag((predicted.by_load[0] * points.load_errors) ** 2 + moved))
+def _noise(
+    both: Sequence[tuple[LoadPoints, Predicted, NDArray[np.intp]]],
+) -> tuple[FloatArray, FloatArray | None]:
+    """Noise of a difference, in V, without what both scans share, and its correlation if any."""
+    variance, shared = np.zeros(()), None
+    for points, predicted, places in both:
+        moved = predicted.by_load[0] * points.load_errors, predicted.slope[0] * points.x_errors
+        variance = variance + np.sum(np.square([points.noise, *moved]), axis=0)[places]
+        if points.correlation is not None:
+            apart = points.correlation - np.eye(points.u.size)
+            covariance = (np.outer(points.noise, points.noise) * apart)[np.ix_(places, places)]
+            shared = covariance if shared is None else shared + covariance
+    noise = np.sqrt(variance)
+    return noise, None if shared is None else shared / np.outer(noise, noise) + np.eye(noise.size)
 
 
 def _difference(
@@ -390,7 +398,6 @@ def _difference(
     difference = dry - wet - moved / sensor.conversion_constant
     variance = (conversion_share * difference) ** 2
     for profile, order in zip(profiles, orders, strict=True):
-        for source, covariance in profile.covariances.items():
-            if source != "conversion_constant":
-                variance = variance + np.diag(covariance)[order]
+        sources = (source for source in profile.roots if source != "conversion_constant")
+        variance = variance + profile.errors_by(*sources)[order] ** 2
     return difference, np.sqrt(variance)

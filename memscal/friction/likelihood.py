@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 from scipy.special import j0, j1
 
@@ -73,24 +73,30 @@ class LoadPoints:
 
     def averaged(self) -> LoadPoints:
         """Return the mean of the repeats at each position, sorted by position."""
-        places, back = np.unique(np.round(self.offset, 12), return_inverse=True)
-        mean = np.zeros((places.size, self.u.size))
-        mean[back, np.arange(self.u.size)] = 1.0
-        mean /= mean.sum(axis=1, keepdims=True)
-        inner = np.eye(self.u.size) if self.correlation is None else self.correlation
-        covariance = mean @ (np.outer(self.noise, self.noise) * inner) @ mean.T
-        noise = np.sqrt(np.diag(covariance))
+        rounded = np.round(self.offset, 12)
+        order = np.argsort(rounded, kind="stable")
+        places, starts, counts = np.unique(rounded[order], return_index=True, return_counts=True)
+
+        def mean(values: FloatArray) -> FloatArray:
+            return np.asarray((np.add.reduceat(values[order], starts, axis=0).T / counts).T)
+
+        noise, correlation = np.sqrt(mean(self.noise**2) / counts), None
+        if self.correlation is not None:
+            single = np.outer(self.noise, self.noise) * self.correlation
+            covariance = mean(mean(single).T)
+            noise = np.sqrt(np.diag(covariance))
+            correlation = covariance / np.outer(noise, noise)
         return replace(
             self,
-            u=mean @ self.u,
+            u=mean(self.u),
             offset=places,
-            log_load=mean @ self.log_load,
+            log_load=mean(self.log_load),
             noise=noise,
-            load_errors=np.sqrt(mean**2 @ self.load_errors**2),
+            load_errors=np.sqrt(mean(self.load_errors**2) / counts),
             # The stage errs alike in every repeat.
-            x_errors=mean @ self.x_errors,
-            flat=mean @ self.flat,
-            correlation=None if self.correlation is None else covariance / np.outer(noise, noise),
+            x_errors=mean(self.x_errors),
+            flat=mean(self.flat),
+            correlation=correlation,
         )
 
 
@@ -131,15 +137,15 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
 
 
 def points_at(
-    offset: FloatArray, like: LoadPoints, u: float = 0.0, noise: float = 0.0
+    offset: FloatArray, like: LoadPoints, u: ArrayLike = 0.0, noise: ArrayLike = 0.0
 ) -> LoadPoints:
     """Return points of the nominal load at places (n,), with the load's uncertainties of others."""
     nothing = np.zeros(offset.size)
     return LoadPoints(
-        u=nothing + u,
+        u=nothing + np.asarray(u),
         offset=offset,
         log_load=nothing,
-        noise=nothing + noise,
+        noise=nothing + np.asarray(noise),
         load_errors=nothing,
         x_errors=nothing,
         flat=np.zeros((offset.size, 0)),
@@ -283,9 +289,17 @@ class Standardised:
     residual: FloatArray  # (V, n): measured less calculated voltage
     slope: FloatArray  # (V, n): derivative by the bounded coordinate
     columns: Mapping[str, FloatArray]  # (V, n, q): systematic changes
-    noises: Mapping[str, FloatArray]  # roots (V, n, n) of each kind's covariance; (V, n): diagonal
+    points: LoadPoints
+    kinds: Mapping[str, FloatArray]  # (V, n): each kind of noise, in V
     volume: FloatArray  # (V,): log-determinants of N and of the flat information
     degrees: int
+
+    def noises(self, index: int) -> dict[str, FloatArray]:
+        """Roots of each kind's covariance at one value, in units of all noise: (n,) or (n, n)."""
+        # Made when they are asked for: of all values, matrices over the points fill the memory.
+        kinds = {name: kind[index : index + 1] for name, kind in self.kinds.items()}
+        whitener = _whitener(self.points, kinds)
+        return {name: _scaled(whitener, self.points, name, kinds[name])[0] for name in kinds}
 
     def held(self, count: int) -> Standardised:
         """Return the load with its parameter held at the first value, at ``count`` of others'."""
@@ -297,7 +311,8 @@ class Standardised:
             residual=first(self.residual),
             slope=np.zeros((count, *self.slope.shape[1:])),
             columns={source: first(column) for source, column in self.columns.items()},
-            noises={name: first(root) for name, root in self.noises.items()},
+            points=self.points,
+            kinds={name: first(kind) for name, kind in self.kinds.items()},
             volume=first(self.volume),
             degrees=self.degrees,
         )
@@ -374,7 +389,8 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
         residual=projected(points.u - predicted.signal),
         slope=projected(predicted.by_coordinate),
         columns={source: projected(column) for source, column in predicted.columns.items()},
-        noises={name: _scaled(whitener, points, name, kind) for name, kind in kinds.items()},
+        points=points,
+        kinds=kinds,
         volume=2 * np.log(diagonal).sum(axis=-1) - 2 * np.log(pivots).sum(axis=-1),
         degrees=points.degrees,
     )
@@ -462,8 +478,8 @@ class Likelihood:
         shares: dict[str, float] = {}
         pieces = np.split(gain, np.cumsum([load.residual.shape[1] for load in self.loads])[:-1])
         for piece, load in zip(pieces, self.loads, strict=True):
-            for name, root in load.noises.items():
-                share = root[index] * piece if root.ndim == 2 else root[index].T @ piece
+            for name, root in load.noises(index).items():
+                share = root * piece if root.ndim == 1 else root.T @ piece
                 shares[name] = float(np.hypot(shares.get(name, 0.0), np.linalg.norm(share)))
         columns, start = self._systematic[0][index], 0
         for source, width in _widths(self.loads).items():

@@ -285,11 +285,6 @@ class InterfaceLaw:
     degrees: int
     p_value: float
 
-    @property
-    def log_occam(self) -> float:
-        """Logarithm of Occam's factor: what the law loses for what it leaves free."""
-        return self.log_evidence - self.log_likelihood
-
 
 @dataclass(frozen=True)
 class PriorChoice:

@@ -1,14 +1,12 @@
 """Measurement of stress from contact scans with a calibrated sensor, with its checks."""
 
 import math
-import platform
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from os import PathLike
 
 import numpy as np
-import scipy
 from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
@@ -22,12 +20,10 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.positions import require_span
-from memscal.model.provenance import Process, accepted_alterations, timestamp
+from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.scan import Scan
-from memscal.model.sizes import MOST_OF_CONTACT
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, counted, reported
-from memscal.version import __version__
 
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale", "load")
@@ -183,7 +179,7 @@ def measure_stress(
     origins = tuple(one_load.measured_scan(data) for data in scans)
     singles = [restore.single_loads(data) for data in scans]
     for single in chain(*singles):
-        restore.require_contact_size(single, MOST_OF_CONTACT)
+        restore.require_contact_size(single)
     loads = (
         _measure(origin, single, sensor, signal)
         for origin, of_scan in zip(origins, singles, strict=True)
@@ -199,16 +195,8 @@ def measure_stress(
         conversion_constant_uncertainty=sensor.parameters.uncertainty("conversion_constant"),
         checks=checks,
         overridden=overridden,
-        process=Process(
-            program="memscal",
-            version=__version__,
-            date=timestamp(),
+        process=Process.of_now(
             configuration={"override": list(overridden)},
-            environment={
-                "python": platform.python_version(),
-                "numpy": np.__version__,
-                "scipy": scipy.__version__,
-            },
             messages=tuple(_messages(notes, sensor, checks, overridden)),
         ),
         artifact=sensor.source,

@@ -11,6 +11,7 @@ only where the scan does not determine it.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Load
 from memscal.model.arrays import FloatArray
-from memscal.model.correlation import scaled
+from memscal.model.correlation import scaled, square_root
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
@@ -301,17 +302,23 @@ def measured_profile(
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
     a, estimate = restored.apparatus.conversion_constant, restored.posterior.estimate
-    average, x, y = _averaging(restored, restored.noise / np.sqrt(estimate.outlier_weight))
+    noise = restored.noise / np.sqrt(estimate.outlier_weight)
+    average, x, y = _averaging(restored, noise)
     drift = restored.posterior.state[restored.posterior.nodes + int(restored.points.free.sum()) :]
     level = average @ (restored.points.u - estimate.model.drift_columns @ drift)
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     average, s_zz = average[order], level[order] / a
-    root = average @ (restored.noise_root / a)
     relative = restored.apparatus.parameters.uncertainty("conversion_constant") / a
-    covariances = {
-        "noise": root @ root.T,
-        "conversion_constant": np.outer(s_zz, s_zz) * relative**2,
+    if (factor := restored.points.decorrelation) is None:
+        of_noise = np.sqrt(average.power(2) @ noise**2)
+    else:
+        # Of repeats there are more columns than positions.
+        correlated = noise[:, None] * factor.correlate(np.eye(noise.size))
+        of_noise = np.linalg.qr((average @ correlated).T)[1].T
+    roots = {
+        "noise": of_noise / a,
+        "conversion_constant": relative * s_zz[:, None],
         **_of_place(restored, average),
     }
     maximum, budget = _on_axis(restored)
@@ -324,7 +331,7 @@ def measured_profile(
         y=y[order],
         r=r[order],
         s_zz=s_zz,
-        covariances=covariances,
+        roots=roots,
         force=restored.force,
         force_budget=restored.force_budget,
         maximum=maximum,
@@ -380,19 +387,18 @@ def _of_channel(
     )
 
 
-def _averaging(
-    restored: Restoration, noise: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Matrix (n, points) that averages repeats by their weight, and the n positions."""
+def _averaging(restored: Restoration, noise: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
+    """Sparse matrix (n, points) that averages repeats by their weight, and the n positions."""
+    from scipy.sparse import csr_array
+
     places = np.stack([restored.points.x, restored.points.y])
     unique, back = np.unique(places, axis=1, return_inverse=True)
-    average = np.zeros((unique.shape[1], noise.size))
-    average[back.ravel(), np.arange(noise.size)] = noise**-2
-    return average / average.sum(axis=1, keepdims=True), unique[0], unique[1]
+    share = noise**-2 / np.bincount(back := back.ravel(), noise**-2)[back]
+    return csr_array((share, (back, np.arange(noise.size)))), unique[0], unique[1]
 
 
-def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatArray]:
-    """Covariance that centre, baseline and drift bring, shared out without a rest."""
+def _of_place(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
+    """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
     posterior, model = restored.posterior, restored.posterior.estimate.model
     nodes, free = posterior.nodes, restored.points.free
     geometry = model.geometry(np.atleast_2d(restored.centre))
@@ -404,8 +410,8 @@ def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatA
     carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
     of_centre = columns[0] + columns[1] @ carried.T
     return {
-        "centre": of_centre @ sigma[:n, :n] @ of_centre.T,
-        "baseline": columns[1] @ (sigma[n:, n:] - sigma[n:, :n] @ carried) @ columns[1].T,
+        "centre": of_centre @ square_root(sigma[:n, :n]),
+        "baseline": columns[1] @ square_root(sigma[n:, n:] - sigma[n:, :n] @ carried),
     }
 
 

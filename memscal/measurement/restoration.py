@@ -252,12 +252,6 @@ class Restoration(Result, Checked):
         return self.posterior.noise_ratio * self.posterior.estimate.noise
 
     @property
-    def noise_root(self) -> FloatArray:
-        """Square root of the voltages' covariance, shape (n, n), in V; outliers' raised."""
-        unit = np.eye(self.points.u.size)
-        return self.posterior.noise_ratio * self.posterior.estimate.drawn_noise(unit)
-
-    @property
     def degrees(self) -> float:
         """Points less parameters without prior: outliers count by their weight."""
         estimate = self.posterior.estimate

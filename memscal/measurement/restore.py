@@ -29,7 +29,7 @@ from memscal.model.positions import require_span
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
-from memscal.model.sizes import MOST_RESTORED, too_large
+from memscal.model.sizes import MOST_OF_CONTACT, MOST_OF_CORRELATED_CONTACT, too_large
 from memscal.parallel import single_threaded
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
@@ -109,19 +109,21 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
     return load
 
 
-def require_contact_size(scan: Scan, most: int) -> None:
+def require_contact_size(scan: Scan) -> None:
     """Refuse a contact of more points than its stress is restored or measured from."""
+    free = scan.u_zz_correlation is None
+    most = MOST_OF_CONTACT if free else MOST_OF_CORRELATED_CONTACT
     if (size := scan.u_zz.size) > most:
         named = scan.source.file_name if scan.source else "The scan"
-        why = "Its stress has a covariance, which takes memory."
+        of = "points of one load" if free else "points of one load, of correlated noise"
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
+        raise too_large(named, size, most, of, cure=cure)
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     """Refuse a scan of several loads of a curved indenter, of many points, or without cov(G)."""
     require_covariance(apparatus)
-    require_contact_size(scan, MOST_RESTORED)
+    require_contact_size(scan)
     require_span(scan)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):

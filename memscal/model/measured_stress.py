@@ -13,7 +13,6 @@ that this conversion gives back, so that what was saved and read again is equal 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from os import PathLike
 from typing import Any, ClassVar, TypeVar
 
@@ -115,10 +114,11 @@ class MeasuredProfile(ByContent):
         one position are averaged by their weights.
     s_zz : ndarray, shape (n,)
         Stress there, in Pa, positive in compression.
-    covariances : mapping of str to ndarray, shape (n, n)
-        Its covariance by source, in Pa^2: ``noise`` (electronic, of loads and of positions),
-        ``conversion_constant``, ``centre``, ``baseline`` (with drift; what centre and baseline
-        share is the centre's).
+    roots : mapping of str to ndarray, shape (n,) or (n, p)
+        Square roots of its covariance by source, in Pa: (n,) standard uncertainties that are
+        independent from point to point, (n, p) columns whose outer products add up to the
+        covariance.  ``noise`` (electronic, of loads and of positions), ``conversion_constant``,
+        ``centre``, ``baseline`` (with drift; what centre and baseline share is the centre's).
     force, force_budget : float, mapping of str to float
         Integral of the stress over the plane and its standard uncertainty by source, in N.
     maximum, maximum_budget : float, mapping of str to float
@@ -144,7 +144,7 @@ class MeasuredProfile(ByContent):
     y: FloatArray
     r: FloatArray
     s_zz: FloatArray
-    covariances: Mapping[str, FloatArray]
+    roots: Mapping[str, FloatArray]
     force: float
     force_budget: Mapping[str, float]
     maximum: float
@@ -161,8 +161,8 @@ class MeasuredProfile(ByContent):
     def __post_init__(self) -> None:
         _freeze(self, "s_zz", "curve_s_zz")
         _freeze(self, "x", "y", "r", "centre", "centre_uncertainty", "curve_r", scale=_FILE_SCALE)
-        frozen = {source: frozen_array(values) for source, values in self.covariances.items()}
-        object.__setattr__(self, "covariances", frozen)
+        frozen = {source: frozen_array(values) for source, values in self.roots.items()}
+        object.__setattr__(self, "roots", frozen)
         for name in ("baseline", "baseline_uncertainty", "contact_radius"):
             object.__setattr__(self, name, _kept(getattr(self, name)))
 
@@ -187,15 +187,21 @@ class MeasuredProfile(ByContent):
         """0 or 1: along which of x and y the scan ran; 0 of a raster."""
         return 0 if np.ptp(self.x) > 0 else 1
 
-    @cached_property
+    @property
     def covariance(self) -> FloatArray:
-        """Covariance of ``s_zz``, all sources together, in Pa^2."""
-        return np.asarray(np.sum(list(self.covariances.values()), axis=0))
+        """Covariance of ``s_zz``, shape (n, n), all sources together, in Pa^2."""
+        squares = (np.diag(r**2) if r.ndim == 1 else r @ r.T for r in self.roots.values())
+        return np.asarray(sum(squares))
 
     @property
     def s_zz_errors(self) -> FloatArray:
         """Standard uncertainty of ``s_zz``, in Pa."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+        return self.errors_by(*self.roots)
+
+    def errors_by(self, *sources: str) -> FloatArray:
+        """Standard uncertainty of ``s_zz`` by some of the sources, shape (n,), in Pa."""
+        roots = [self.roots[source].reshape(self.r.size, -1) for source in sources]
+        return np.asarray(np.linalg.norm(np.hstack(roots), axis=1))
 
     @property
     def force_uncertainty(self) -> float:

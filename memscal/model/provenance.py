@@ -1,13 +1,15 @@
 """Provenance of data: files that were read, processing, time."""
 
 import os
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Self
 
 from memscal.errors import InputError
 from memscal.model.checks import Message
+from memscal.version import __version__
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,16 @@ class Process:
     messages: tuple[Message, ...] = ()
     input_scan: SourceFile | None = None
     input_reference: SourceFile | None = None
+
+    @classmethod
+    def of_now(cls, **stated: Any) -> Self:
+        """Return the process of this program, now, with the versions of what it runs on."""
+        import numpy as np
+        import scipy
+
+        versions = {"numpy": np.__version__, "scipy": scipy.__version__}
+        stated["environment"] = {"python": platform.python_version(), **versions}
+        return cls(program="memscal", version=__version__, date=timestamp(), **stated)
 
 
 def timestamp() -> str:

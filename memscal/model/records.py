@@ -243,13 +243,6 @@ STRESS_PROFILE = record(
     Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R, required=True),
     signal="s_zz",
 )
-STRESS_COVARIANCE = record(
-    "NXdata",
-    STRESS_PROFILE.quantities[0],
-    Quantity("r", _L, "distance from the centre", axes=("r_prime",), stored="r_prime"),
-    Quantity("covariance", "stress squared", "covariance of S_zz", axes=_RR, required=True),
-    signal="covariance",
-)
 STRESS_NUMBERS = record(
     "NXdata",
     *measured(Quantity("load", "force", "load", "P", required=True)),

@@ -5,9 +5,11 @@ from memscal.errors import InputError
 #: Points that a calibration takes: of lines, of a raster, and with a stated correlation of noise,
 #: of which the cube of their number is worked with.
 MOST_OF_LINES, MOST_OF_RASTER, MOST_CORRELATED = 2_000_000, 1_000_000, 4_000
-#: Points of one load of a contact: its profile has a covariance of all pairs; a restored stress of
-#: its radii.
-MOST_OF_CONTACT, MOST_RESTORED = 4_000, 100_000
+#: Points of one load of a contact, and where their noise is correlated; of all loads that are
+#: compared; and readings of one load that share noise, by a correlation or with the shear: of each
+#: coefficient there is a matrix over them.
+MOST_OF_CONTACT, MOST_OF_CORRELATED_CONTACT = 100_000, 2_000
+MOST_COMPARED, MOST_COMPARED_TOGETHER = 25_000, 500
 #: Rows and columns of a table, and pixels along a side of a reference that is a field.
 MOST_ROWS, MOST_COLUMNS, MOST_PIXELS = 20_000_000, 1_000, 2_048
 #: Tags of XML in the sheets of a workbook (four for a cell), and in all else of it: of each of them

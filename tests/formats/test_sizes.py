@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers import scans as made
 from helpers.builders import make_film
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +22,7 @@ from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.tables import text_table
 from memscal.formats.tables.scan import import_table
 from memscal.formats.tables.text_table import TextTable, Wanted
+from memscal.friction import compare as compare_module
 from memscal.model import positions as places_module
 from memscal.model.positions import places_of
 from memscal.model.scan import BRANCHES
@@ -167,10 +169,39 @@ def test_what_is_too_large_is_refused_with_size_limit_and_cure(
 
 
 def test_a_contact_of_too_many_points_does_nothing():
-    apparatus = memscal.calibrate(memscal.simulate()).apparatus
-    for measured, size in ((memscal.measure_stress, 4001), (memscal.restore, 100_001)):
-        with pytest.raises(InputError, match=rf"{size:,} points of one load(.|\n)*Average"):
-            measured(memscal.simulate(points=size), apparatus)
+    apparatus = memscal.calibrate(memscal.simulate(), method="bayesian").apparatus
+    scan = memscal.simulate(points=2001)
+    band = np.outer(np.ones(2001), [1.0, 0.2])
+    band[-1, 1] = 0
+    correlated = replace(scan, u_zz_correlation=band)
+    for measured in (memscal.measure_stress, memscal.restore):
+        for wrong in (memscal.simulate(points=100_001), correlated):
+            words = rf"{wrong.x.size:,} points of one load(.|\n)*Average"
+            with pytest.raises(InputError, match=words):
+                measured(wrong, apparatus)
+
+
+def went_on(*_: Any, **__: Any) -> None:
+    pytest.fail("it went on")
+
+
+def test_a_comparison_of_too_many_points_does_nothing(monkeypatch: pytest.MonkeyPatch):
+    apparatus, ones = made.known_apparatus(), np.ones(len(made.LOADS))
+    none = dict.fromkeys(("u_zz_errors", "x_errors", "normal_load_errors"))
+    plain: Any = replace(made.contact_scan(), **none)
+    monkeypatch.setattr(compare_module, "measure_stress", went_on)
+
+    def refused(count: int, words: str, **options: Any) -> None:
+        x = np.linspace(-5e-3, 5e-3, count)
+        u, load = np.outer(ones, np.exp(-(x**2) / 1e-6)), np.outer(made.LOADS, np.ones(count))
+        correlation = np.eye(count) if options.pop("correlated", False) else None
+        scan = replace(plain, x=x, u_zz=u, normal_load=load, u_zz_correlation=correlation)
+        with pytest.raises(InputError, match=rf"What is compared has {words}(.|\n)*Average"):
+            memscal.compare(scan, apparatus, **options)
+
+    refused(25_000 // ones.size + 1, "25,00. points of all loads, but at most 25,000")
+    refused(501, "501 readings of one load", correlated=True)
+    refused(251, "502 readings of one load", shear=apparatus)
 
 
 def test_a_file_of_too_many_points_is_refused_before_its_arrays_are_read(tmp_path, monkeypatch):

@@ -59,7 +59,7 @@ def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfi
     made: dict[str, Any] = {
         "scan": SCANS[1], "load": load, "load_uncertainty": 0.01 * load, "r": r, "x": x, "y": 0 * x,
         "s_zz": 1e5 * load * np.exp(-(r**2) / 1e-6),
-        "covariances": {"noise": 1e4 * root @ root.T, "centre": 10.0 * np.ones((n, n))},
+        "roots": {"noise": 100 * np.abs(root[0]), "centre": 10.0 * root[:, :2]},
         "force": 1.01 * load, "force_budget": {"scan": 0.003, "apparatus": 0.004},
         "maximum": 1e5 * load, "maximum_budget": {"noise": 120.0},
         "centre": np.array([1.23456789e-4, 0.0]), "centre_uncertainty": np.array([1e-5 / 3, 0.0]),
@@ -104,7 +104,7 @@ def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path: Path):
 
 @pytest.mark.parametrize("change", [
     {"force": 1.0}, {"scan": replace(SCANS[1], synthetic=True)}, {"points": {}},
-    {"covariances": {"noise": np.eye(9)}}, {"s_zz": np.full(9, np.nan)},
+    {"roots": {"noise": np.eye(9)}}, {"s_zz": np.full(9, np.nan)},
 ])  # fmt: skip
 def test_stress_that_differs_anywhere_is_not_equal(change):
     first, second = make_stress().profiles
@@ -140,10 +140,10 @@ def test_other_programs_find_a_plottable_group_for_each_load(path: Path):
         signal = default[default.attrs["signal"]]
         assert signal.shape == (9,)
         assert signal.attrs["units"] == "Pa"
-        covariance = file["entry/covariances"][file["entry"].attrs["default"]]["covariance"]
-        assert covariance.attrs["units"] == "Pa^2"
-        errors = default["s_zz_errors"][()]
-        np.testing.assert_allclose(errors**2, np.diag(covariance[()]), rtol=1e-12)
+        roots = file["entry/roots"][file["entry"].attrs["default"]]
+        assert roots["noise"].attrs["units"] == "Pa"
+        variance = roots["noise"][()] ** 2 + np.sum(roots["centre"][()] ** 2, axis=1)
+        np.testing.assert_allclose(default["s_zz_errors"][()] ** 2, variance, rtol=1e-12)
 
 
 def test_a_changed_number_is_found_out(path: Path):

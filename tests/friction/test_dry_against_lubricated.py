@@ -21,10 +21,11 @@ LOAD = 1
 def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     """What a comparison reads of a measured profile."""
     stress = points.u / CONVERSION
-    noise = np.diag((points.noise / CONVERSION) ** 2)
+    noise = points.noise / CONVERSION
     return SimpleNamespace(
         lubrication=lubrication, load=load, x=points.offset, s_zz=stress,
-        covariances={"noise": noise, "conversion_constant": 1e-4 * np.outer(stress, stress)},
+        roots={"noise": noise, "conversion_constant": 1e-2 * stress[:, None]},
+        errors_by=lambda source: {"noise": noise}[source],
         maximum=float(stress.max()), maximum_budget={"noise": 100.0, "apparatus": 500.0},
     )  # fmt: skip
 

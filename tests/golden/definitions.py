@@ -80,7 +80,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             "": record(
                 "NXdata", *records.STRESS_PROFILE.quantities, *records.STRESS_NUMBERS.quantities
             ),
-            **dict.fromkeys(("covariances", "budgets", "curves"), _ANYTHING),
+            **dict.fromkeys(("roots", "budgets", "curves"), _ANYTHING),
             **dict.fromkeys(("points_zz", "points_xz", "points_yz"), _ANYTHING),
             "sensor": records.CONVERSION, "scans": _ANYTHING, "inputs": _ANYTHING,
             "quality": _ANYTHING, **_MEASURED_ON, "process": records.PROCESS,

@@ -117,6 +117,7 @@ def test_files_of_version_0_1_say_what_they_said(runs: Runs):
     assert_allclose([profile.load, profile.force, profile.maximum], [0.5, 0.505, 5e4])
     assert_allclose(profile.r, [0, 0.5e-3, 0.5e-3, 1e-3, 1e-3, 1.5e-3, 2e-3], atol=1e-12)
     assert_allclose(profile.s_zz, 5e4 * np.exp(-((profile.r / 1e-3) ** 2)))
-    assert_allclose(profile.covariance, sum(profile.covariances.values()))
+    errors = [profile.errors_by(source) for source in profile.roots]
+    assert_allclose(np.diag(profile.covariance), np.sum(np.square(errors), axis=0))
     assert_allclose([*profile.centre, profile.baseline], [1.2e-4, 0.0, 1e-5])
     assert profile.lubrication == "dry"

@@ -66,7 +66,7 @@ def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
 def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
     exact, found = made.measured(3), made.measured(3, conversion_uncertainty=0.02)
     for before, after in zip(exact.profiles, found.profiles, strict=True):
-        part = after.covariances["conversion_constant"]
+        part = after.roots["conversion_constant"] @ after.roots["conversion_constant"].T
         np.testing.assert_allclose(part, 4e-4 * np.outer(after.s_zz, after.s_zz), rtol=1e-9)
         np.testing.assert_allclose(
             after.covariance - part, before.covariance, rtol=0.05, atol=1e-4 * part.max()
@@ -100,11 +100,8 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
         xi = 2 * (profile.x - profile.x.min()) / np.ptp(profile.x) - 1
         columns = np.column_stack([slope, -np.ones_like(xi) / a, -xi / a])
         joint = columns @ sigma @ columns.T
-        stated = profile.covariances["centre"] + profile.covariances["baseline"]
-        np.testing.assert_allclose(stated, joint, atol=0.02 * np.abs(joint).max())
-        for source in ("centre", "baseline"):
-            values = np.linalg.eigvalsh(profile.covariances[source])
-            assert values.min() > -1e-9 * values.max()
+        roots = np.hstack([profile.roots["centre"], profile.roots["baseline"]])
+        np.testing.assert_allclose(roots @ roots.T, joint, atol=0.02 * np.abs(joint).max())
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.15, np.inf])
@@ -152,8 +149,34 @@ def test_repeats_at_one_position_are_averaged() -> None:
     once, thrice = made.measured(5), made.measured(5, repeats=3)
     for few, many in zip(once.profiles, thrice.profiles, strict=True):
         assert many.r.size == few.r.size == 33
-        ratio = np.diag(few.covariances["noise"]) / np.diag(many.covariances["noise"])
-        assert np.median(ratio) == pytest.approx(3.0, rel=0.25)
+        ratio = few.roots["noise"] / many.roots["noise"]
+        assert np.median(ratio**2) == pytest.approx(3.0, rel=0.25)
+
+
+def test_correlated_noise_is_averaged_with_its_correlation() -> None:
+    scan = made.contact_scan(6, repeats=2, load_scatter=0.0, load_reading=0.0, record_loads=False)
+    near = 0.4 ** np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
+    scan = replace(scan, x_errors=None, u_zz_correlation=near)
+    for profile in memscal.measure_stress(scan, SENSOR).profiles:
+        points = profile.points["zz"]
+        assert points.correlation is not None
+        covariance = np.outer(points.weight, points.weight) ** -0.5 * points.correlation
+        mean = (profile.x[:, None] == points.x) * points.weight
+        mean /= mean.sum(axis=1, keepdims=True)
+        expected, found = mean @ covariance @ mean.T, profile.roots["noise"]
+        found = found @ found.T
+        np.testing.assert_allclose(found / found[0, 0], expected / expected[0, 0], atol=1e-9)
+
+
+def test_files_of_many_points_grow_with_their_number(tmp_path: Path) -> None:
+    sizes = []
+    for count in (1000, 8000):
+        scan = memscal.simulate(film=SENSOR.film, points=count)
+        found = memscal.measure_stress(scan, SENSOR)
+        found.save(tmp_path / f"{count}.h5")
+        assert memscal.read_stress(tmp_path / f"{count}.h5") == found
+        sizes.append((tmp_path / f"{count}.h5").stat().st_size)
+    assert sizes[1] < 8 * sizes[0]
 
 
 def test_a_rod_is_measured_like_a_sphere() -> None:
