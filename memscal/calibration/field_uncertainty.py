@@ -30,9 +30,8 @@ from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.voltage_map import BLOCK
+from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import FloatArray
-from memscal.model.correlation import square_root
 from memscal.progress import counted
 
 ComplexArray: TypeAlias = NDArray[np.complex128]

@@ -37,11 +37,10 @@ from memscal.estimation.reference import (
     reference_sensitivities,
 )
 from memscal.estimation.smoothing import SmoothedProfile
-from memscal.estimation.voltage_map import DENSE, VoltageMap, triangular
+from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
-from memscal.model.correlation import square_root
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 

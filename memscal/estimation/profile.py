@@ -20,10 +20,9 @@ from memscal.estimation.gaussian import (
     robust_scale,
 )
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.voltage_map import DENSE, VoltageMap
+from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
-from memscal.model.correlation import square_root
 from memscal.progress import done_with
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.

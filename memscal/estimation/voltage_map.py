@@ -6,6 +6,7 @@ points; of more, as products of a small matrix and few columns over the points.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -181,3 +182,14 @@ def orthonormalised(
         block = columns[start : start + BLOCK]
         block[:, : len(right)] = block @ turn
     return columns[:, : len(right)], np.asarray(singular[:, None] * right * scale)
+
+
+def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
+    """A square root of a covariance that may be singular, scaled by the given variances."""
+    scale = np.maximum(np.diag(covariance) if variances is None else variances, 0.0)
+    safe = np.where(scale > 0, np.sqrt(scale), 1.0)
+    scaled = covariance / np.outer(safe, safe)
+    with contextlib.suppress(np.linalg.LinAlgError):
+        return np.asarray(safe[:, None] * np.linalg.cholesky(scaled))
+    values, vectors = np.linalg.eigh(scaled)
+    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

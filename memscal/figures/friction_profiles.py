@@ -15,6 +15,8 @@ from memscal.figures.style import (
     ALONG_RADIUS,
     COLOURS,
     EXPANDED,
+    SCATTER_THRESHOLD,
+    draw_measured,
     legend_above,
     load_looks,
     mark,
@@ -115,7 +117,8 @@ def _draw_points(
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
             look = mark(at_load.lubrication, colour) | _BARS | {"alpha": alpha}
-            axes.errorbar(r[shown], s[shown], bars[shown], label=label or "_points", **look)
+            look |= {"many": s.size > SCATTER_THRESHOLD, "label": label or "_points"}
+            draw_measured(axes, r[shown], s[shown], bars[shown], **look)
 
 
 def share_limits(panels: Sequence[Axes]) -> None:
@@ -283,7 +286,8 @@ def _draw_set(
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
     stress, errors = (profile.s_zz - less) / unit, EXPANDED * profile.s_zz_errors / unit
-    axes.errorbar(profile.r / MM, stress, errors, label="_points", **look)
+    look |= {"many": stress.size > SCATTER_THRESHOLD, "label": "_points"}
+    draw_measured(axes, profile.r / MM, stress, errors, **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
 
 

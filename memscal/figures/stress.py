@@ -47,14 +47,11 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: boo
     bars = EXPANDED * profile.s_zz_errors
     shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
     look = style.mark(profile.lubrication, colour) | {"ls": "none", "mew": 0.7, "ms": 2.6}
+    look |= {"many": profile.r.size > style.SCATTER_THRESHOLD, "elinewidth": 0.6}
     r, stress = profile.r / MM, profile.s_zz / KPA
-    if many := r.size > style.SCATTER_THRESHOLD:
-        look |= {"marker": ".", "mfc": colour, "ms": 1.5, "mew": 0}
-        axes.plot(r[shown], stress[shown], rasterized=True, zorder=1, **look)
-    else:
-        axes.errorbar(r[shown], stress[shown], yerr=bars[shown] / KPA, elinewidth=0.6, **look)
+    style.draw_measured(axes, r[shown], stress[shown], bars[shown] / KPA, **look)
     if not shown.all():
-        axes.plot(r[~shown], stress[~shown], alpha=0.3, rasterized=many, **look)
+        style.draw_measured(axes, r[~shown], stress[~shown], None, alpha=0.3, **look)
     radius = profile.contact_radius / MM
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
@@ -62,12 +59,12 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: boo
 def _legend(figure: Figure, measured: MeasuredStress, colours: dict[str, str]) -> None:
     """Name loads by colour and states by mark, once for both panels."""
     handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
-    largest = max(profile.r.size for profile in measured.profiles)
-    bars = "" if largest > style.SCATTER_THRESHOLD else ", ±2u"
+    many = min(profile.r.size for profile in measured.profiles) > style.SCATTER_THRESHOLD
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
-        handle = Line2D([], [], lw=0.8, ms=3.2, **style.mark(state, "0.2"))
+        look = style.mark(state, "0.2") | ({"marker": "."} if many else {})
+        handle = Line2D([], [], lw=0.8, ms=3.2, **look)
         handle.set_linestyle("--" if state == "lubricated" else "-")
-        handle.set_label(f"{state or 'measured'}{bars}")
+        handle.set_label(f"{state or 'measured'}{'' if many else ', ±2u'}")
         handles.append(handle)
     radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
     handles.append(radius)

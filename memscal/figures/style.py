@@ -168,6 +168,18 @@ def mark(lubrication: str, colour: str) -> dict[str, Any]:
     return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}
 
 
+def draw_measured(
+    axes: Axes, x: FloatArray, y: FloatArray, bars: FloatArray | None, *, many: bool, **look: Any
+) -> None:
+    """Draw measured points with bars; dots alone of many."""
+    if many:
+        of_dots = {"marker": ".", "mfc": look["color"], "ms": 1.5, "mew": 0, "zorder": 1}
+        look = {name: value for name, value in look.items() if name != "elinewidth"} | of_dots
+        axes.plot(x, y, rasterized=True, **look)
+    else:
+        axes.errorbar(x, y, bars, **look)
+
+
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
     """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones."""
     kept, last = [], -np.inf

@@ -17,7 +17,6 @@ from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import override_messages
-from memscal.model.correlation import square_root
 from memscal.model.measured_stress import (
     MeasuredPoints,
     MeasuredProfile,
@@ -87,6 +86,8 @@ def _scan_group(scan: MeasuredScan) -> Group:
     return Group("NXcollection", children)
 
 
+#: Correlations below this are rounding.
+_ROUNDING = 1e-9
 _BUDGET = {"force": "force", "maximum": "stress"}
 _MOST_SCANS = 10_000
 _PROCESS = "/entry/process"
@@ -243,8 +244,8 @@ def _roots_group(profile: MeasuredProfile) -> Group:
     children: dict[str, Node] = {"sources": to_json("sources", list(profile.roots))}
     children["r"] = si(profile.r, "length", ("r",))
     for source, root in profile.roots.items():
-        axes = ("r", f"{source}_column")[: root.ndim]
-        children[source] = si(root, "stress", axes)
+        axes = ("r", f"column_{source}")[: root.ndim]
+        children[f"root_{source}"] = si(root, "stress", axes)
         if root.ndim > 1:
             children[axes[1]] = writer.index_axis(axes[1], root.shape[1])
     return Group("NXcollection", children)
@@ -266,9 +267,25 @@ def _beside_or_in(file: SafeFile, group: str, name: str, within: str) -> str:
     return beside if file.has(beside := f"/entry/{group}/{name}") else within
 
 
+def _root_of(covariance: FloatArray, where: str) -> FloatArray:
+    """Return a square root of a covariance, of as many columns as its rank."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        correlation = covariance * unit * unit[:, None]
+    if np.abs(correlation).max() <= 1 + _ROUNDING and not covariance[scale == 0].any():
+        if not (correlation - np.diag(np.diag(correlation))).any():
+            return scale
+        values, vectors = np.linalg.eigh(correlation)
+        if values[0] > -_ROUNDING * values[-1]:
+            kept = values > _ROUNDING * values[-1]
+            return np.asarray(scale[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
+    raise FormatError(f"{where} is no covariance: some combination has less than no variance.")
+
+
 def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, FloatArray]:
     """Read the roots of a profile's covariance; of a file before them, those of its matrices."""
-    where, prefix, dimension = f"/entry/roots/{name}", "", "stress"
+    where, prefix, dimension = f"/entry/roots/{name}", "root_", "stress"
     if before := not file.has(where):
         where = _beside_or_in(file, "covariances", name, path)
         prefix, dimension = "covariance_", "stress squared"
@@ -276,9 +293,9 @@ def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, Float
     for source in text_list(file, f"{where}/sources"):
         stored = values.require_array(file, place := f"{where}/{prefix}{source}", dimension)
         shape = (n, n) if before else (n, *stored.shape[1:2])
-        if stored.shape != shape or not np.isfinite(stored).all():
+        if stored.shape != shape or not stored.size or not np.isfinite(stored).all():
             raise FormatError(f"{file.where(place)} should hold finite numbers in {n} rows.")
-        roots[source] = square_root(stored) if before else stored
+        roots[source] = _root_of(stored, file.where(place)) if before else stored
     return roots
 
 

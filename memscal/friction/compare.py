@@ -1,7 +1,7 @@
 """From contact scans and a calibrated sensor to the friction that explains what it measured."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 from os import PathLike
@@ -11,7 +11,7 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
-from memscal.estimation.points import TANGENTIAL, accepted_differences
+from memscal.estimation.points import TANGENTIAL, accepted_differences, measured_mask
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction import effective
@@ -23,7 +23,7 @@ from memscal.friction.checks import (
     synthetic_messages,
 )
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import Channel, load_points, sensor_of
+from memscal.friction.likelihood import Channel, load_points, require_line, sensor_of
 from memscal.friction.model_comparison import compare_interface
 from memscal.friction.results import (
     BoundedEstimate,
@@ -34,7 +34,7 @@ from memscal.friction.results import (
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
-from memscal.measurement.restore import accept_other_sensor, single_loads
+from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
 from memscal.model.arrays import require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
@@ -57,6 +57,8 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
     for scan in scans:
         place = scan.source.file_name if scan.source else "The scan"
+        if isinstance(scan, Scan) and scan.y is not None:
+            require_line(place, scan.x, scan.y)
         if not isinstance(scan.indenter, Sphere):
             raise InputError(
                 f"{place} was made with a rod, not with a sphere."
@@ -228,15 +230,15 @@ def compare(
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
     require_contacts(scans_of(opened))
-    _require_few(opened, sheared=shear is not None)
+    of_shear = None if shear is None else opened_apparatus(shear, accept_altered=accept_altered)
+    _require_few(opened, "zz", *([of_shear.sensor.channel] if of_shear else []))
     measured = _measured(opened, sensor, override)
     setting = _setting(measured, cache, workers)
     tangential = None
-    if shear is not None:
+    if of_shear is not None:
         if references is not None:
             problem = "Profiles of another program and the shear are asked for."
             raise InputError(problem, cure="Leave one of them out: those profiles have no shear.")
-        of_shear = opened_apparatus(shear, accept_altered=accept_altered)
         notes = _accept_tangential(measured, of_shear, override=override)
         sheared = _families(setting, friction, loading, order=1)
         tangential = of_shear, sheared, notes
@@ -267,23 +269,32 @@ def compare(
     return replace(comparison, interface=laws, messages=(*comparison.messages, *laws.messages))
 
 
-def _require_few(contacts: Sequence[Scan | MeasuredStress], *, sheared: bool = False) -> None:
-    """Refuse more points than are compared; ``sheared``: each is read by two channels."""
-    sizes, together = [0], sheared
-    for item in contacts:
-        if isinstance(item, Scan):
-            sizes += [single.u_zz.size for single in single_loads(item)]
-            together |= item.u_zz_correlation is not None
-        else:
-            points = [p.points["zz"] for p in item.profiles if "zz" in p.points]
-            sizes += [of.u.size for of in points]
-            together |= any(of.correlation is not None for of in points)
-    cure = "Average neighbouring readings, or leave out repeats."
-    what, of = "What is compared", "readings of one load that share noise (correlation, shear)"
-    if (size := sum(sizes)) > MOST_COMPARED:
-        raise too_large(what, size, MOST_COMPARED, "points of all loads", cure=cure)
-    if together and (size := (1 + sheared) * max(sizes)) > MOST_COMPARED_TOGETHER:
-        raise too_large(what, size, MOST_COMPARED_TOGETHER, of, cure=cure)
+def _readings(
+    item: Scan | MeasuredStress, channels: Sequence[str]
+) -> Iterator[tuple[str, int, bool]]:
+    """Yield the name of each load, its readings of channels, and whether these share noise."""
+    if isinstance(item, Scan):
+        for one in single_loads(item):
+            shared = len(channels) > 1 or one.u_zz_correlation is not None
+            yield load_of(one), len(channels) * int(measured_mask(one).sum()), shared
+        return
+    for profile in item.profiles:
+        points = [profile.points[channel] for channel in channels if channel in profile.points]
+        shared = len(points) > 1 or any(of.correlation is not None for of in points)
+        yield profile.label, sum(of.u.size for of in points), shared
+
+
+def _require_few(contacts: Sequence[Scan | MeasuredStress], *channels: str) -> None:
+    """Refuse more readings of the channels than are compared."""
+    loads = [load for item in contacts for load in _readings(item, channels)]
+    for name, size, shared in loads:
+        if shared and size > MOST_COMPARED_TOGETHER:
+            of = "readings that share noise (a correlation, or two channels)"
+            cure = "Average neighbouring readings, or compare without correlation and shear."
+            raise too_large(name, size, MOST_COMPARED_TOGETHER, of, cure=cure)
+    if (total := sum(size for _, size, _ in loads)) > MOST_COMPARED:
+        cure = "Average neighbouring readings, or leave out repeats."
+        raise too_large("What is compared", total, MOST_COMPARED, "readings", cure=cure)
 
 
 def _measured(
@@ -533,7 +544,7 @@ def compare_shear(
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     measured = opened_stress(measured, accept_altered=accept_altered)
     require_contacts(measured.scans)
-    _require_few([measured])
+    _require_few([measured], sensor.sensor.channel)
     notes = _accept_tangential(measured, sensor, override=override)
     families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, _channels(measured, sensor, families))

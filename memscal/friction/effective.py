@@ -390,7 +390,8 @@ def _difference(
     conversion_share: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Return dry minus lubricated stress at the dry scan's places, and its uncertainty, in Pa."""
-    orders = [np.argsort(profiles[i].x)[kept[i]] for i in range(2)]
+    along = [(profile.x, profile.y)[profile.axis] for profile in profiles]
+    orders = [np.argsort(along[i])[kept[i]] for i in range(2)]
     dry, wet = (profiles[i].s_zz[orders[i]] for i in range(2))
     farther = sides[0].radius[kept[0]] - sides[1].radius[kept[1]]
     heavier = math.log(profiles[0].load / profiles[1].load)

@@ -100,6 +100,19 @@ class LoadPoints:
         )
 
 
+#: Positions that spread across a line by less than this share of its length are on it.
+_NARROW = 0.01
+
+
+def require_line(name: str, x: FloatArray, y: FloatArray) -> None:
+    """Refuse a contact that was scanned over a plane, or on a line across x and y."""
+    spreads = np.ptp(x), np.ptp(y)
+    if min(spreads) > _NARROW * max(spreads):
+        why = "Contacts are compared along lines through their centre."
+        cure = "Give a line scan along x or y; memscal restore takes a plane."
+        raise InputError(f"{name} was scanned over x and y.", why=why, cure=cure)
+
+
 def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     """Return the points of a measured profile, with the noise that is stated, or was estimated."""
     points = profile.points.get(channel)
@@ -108,6 +121,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         why = "Its file is of version 1.0, which kept the profiles alone."
         cure = "Make it again with memscal apply, or give the scans."
         raise InputError(problem, why=why, cure=cure)
+    require_line(profile.label, profile.x, profile.y)
     if points is None:
         raise InputError(
             f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",

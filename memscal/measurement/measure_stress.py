@@ -22,6 +22,7 @@ from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, Measure
 from memscal.model.positions import require_span
 from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.scan import Scan
+from memscal.model.sizes import MOST_OF_CORRELATED_CONTACT
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, counted, reported
 
@@ -180,6 +181,9 @@ def measure_stress(
     singles = [restore.single_loads(data) for data in scans]
     for single in chain(*singles):
         restore.require_contact_size(single)
+        if single.u_zz_correlation is not None:
+            most, of = MOST_OF_CORRELATED_CONTACT, ", of correlated noise"
+            restore.require_contact_size(single, most, of)
     loads = (
         _measure(origin, single, sensor, signal)
         for origin, of_scan in zip(origins, singles, strict=True)

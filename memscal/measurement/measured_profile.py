@@ -20,6 +20,7 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import ConvergenceError, DomainError, FitError, InputError
 from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
+from memscal.estimation.voltage_map import square_root
 from memscal.measurement.posterior import (
     apparatus_changes,
     film_transfer,
@@ -34,7 +35,7 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Load
 from memscal.model.arrays import FloatArray
-from memscal.model.correlation import scaled, square_root
+from memscal.model.correlation import scaled
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan

@@ -29,7 +29,7 @@ from memscal.model.positions import require_span
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
-from memscal.model.sizes import MOST_OF_CONTACT, MOST_OF_CORRELATED_CONTACT, too_large
+from memscal.model.sizes import MOST_OF_CONTACT, too_large
 from memscal.parallel import single_threaded
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
@@ -109,15 +109,12 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
     return load
 
 
-def require_contact_size(scan: Scan) -> None:
+def require_contact_size(scan: Scan, most: int = MOST_OF_CONTACT, of: str = "") -> None:
     """Refuse a contact of more points than its stress is restored or measured from."""
-    free = scan.u_zz_correlation is None
-    most = MOST_OF_CONTACT if free else MOST_OF_CORRELATED_CONTACT
     if (size := scan.u_zz.size) > most:
         named = scan.source.file_name if scan.source else "The scan"
-        of = "points of one load" if free else "points of one load, of correlated noise"
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, of, cure=cure)
+        raise too_large(named, size, most, f"points of one load{of}", cure=cure)
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:

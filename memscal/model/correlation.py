@@ -3,8 +3,6 @@
 In the banded form column j is the correlation of each point with the j-th one after it.
 """
 
-import contextlib
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -117,14 +115,3 @@ def root_of(correlation: FloatArray) -> FloatArray:
     if is_banded(correlation):
         return np.asarray(cholesky_banded(correlation.T, lower=True), dtype=np.float64)
     return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
-
-
-def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
-    """A square root of a covariance that may be singular, scaled by the given variances."""
-    scale = np.maximum(np.diag(covariance) if variances is None else variances, 0.0)
-    safe = np.where(scale > 0, np.sqrt(scale), 1.0)
-    scaled = covariance / np.outer(safe, safe)
-    with contextlib.suppress(np.linalg.LinAlgError):
-        return np.asarray(safe[:, None] * np.linalg.cholesky(scaled))
-    values, vectors = np.linalg.eigh(scaled)
-    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats.artifact import write_artifact
-from memscal.formats.hdf5 import reader as hdf5_reader
+from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 from memscal.formats.scan import read_scan, write_scan
 
@@ -258,7 +258,7 @@ def test_a_group_in_the_place_of_a_dataset_is_refused(edited: Edit):
 def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
     edited: Edit, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(hdf5_reader, "MOST_HDF5_BYTES", 2**17)
+    monkeypatch.setattr(limits, "MOST_HDF5_BYTES", 2**17)
 
     def make(group: h5py.Group) -> None:
         group.create_dataset("u_zz", data=np.zeros(2**13), compression="gzip")  # 64 KiB

@@ -173,12 +173,14 @@ def test_a_contact_of_too_many_points_does_nothing():
     scan = memscal.simulate(points=2001)
     band = np.outer(np.ones(2001), [1.0, 0.2])
     band[-1, 1] = 0
-    correlated = replace(scan, u_zz_correlation=band)
-    for measured in (memscal.measure_stress, memscal.restore):
-        for wrong in (memscal.simulate(points=100_001), correlated):
-            words = rf"{wrong.x.size:,} points of one load(.|\n)*Average"
-            with pytest.raises(InputError, match=words):
-                measured(wrong, apparatus)
+    correlated, large = replace(scan, u_zz_correlation=band), memscal.simulate(points=100_001)
+    for measured, wrong in (
+        (memscal.measure_stress, large), (memscal.restore, large),
+        (memscal.measure_stress, correlated),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=rf"{wrong.x.size:,} points of one load(.|\n)*Average"):
+            measured(wrong, apparatus)
+    assert memscal.restore(correlated, apparatus).points.u.size == 2001
 
 
 def went_on(*_: Any, **__: Any) -> None:
@@ -196,12 +198,13 @@ def test_a_comparison_of_too_many_points_does_nothing(monkeypatch: pytest.Monkey
         u, load = np.outer(ones, np.exp(-(x**2) / 1e-6)), np.outer(made.LOADS, np.ones(count))
         correlation = np.eye(count) if options.pop("correlated", False) else None
         scan = replace(plain, x=x, u_zz=u, normal_load=load, u_zz_correlation=correlation)
-        with pytest.raises(InputError, match=rf"What is compared has {words}(.|\n)*Average"):
+        with pytest.raises(InputError, match=rf"{words}(.|\n)*Average"):
             memscal.compare(scan, apparatus, **options)
 
-    refused(25_000 // ones.size + 1, "25,00. points of all loads, but at most 25,000")
-    refused(501, "501 readings of one load", correlated=True)
-    refused(251, "502 readings of one load", shear=apparatus)
+    refused(25_000 // ones.size + 1, "What is compared has 25,00. readings, but at most 25,000")
+    refused(501, "0.34 N, dry has 501 readings that share noise", correlated=True)
+    sheared = replace(apparatus, sensor=replace(apparatus.sensor, channel="xz"))
+    refused(251, "0.34 N, dry has 502 readings that share noise", shear=sheared)
 
 
 def test_a_file_of_too_many_points_is_refused_before_its_arrays_are_read(tmp_path, monkeypatch):

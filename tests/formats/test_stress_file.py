@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 import memscal
 from memscal import MeasuredPoints, MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.errors import FormatError, InputError, MemscalError, UnitError
+from memscal.formats.hdf5 import limits
 from memscal.formats.inspection import check
 from memscal.formats.stress import read_stress, write_stress
 from memscal.model.checks import QualityCheck
@@ -141,8 +142,8 @@ def test_other_programs_find_a_plottable_group_for_each_load(path: Path):
         assert signal.shape == (9,)
         assert signal.attrs["units"] == "Pa"
         roots = file["entry/roots"][file["entry"].attrs["default"]]
-        assert roots["noise"].attrs["units"] == "Pa"
-        variance = roots["noise"][()] ** 2 + np.sum(roots["centre"][()] ** 2, axis=1)
+        assert roots["root_noise"].attrs["units"] == "Pa"
+        variance = roots["root_noise"][()] ** 2 + np.sum(roots["root_centre"][()] ** 2, axis=1)
         np.testing.assert_allclose(default["s_zz_errors"][()] ** 2, variance, rtol=1e-12)
 
 
@@ -164,6 +165,35 @@ def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path: Path):
     make_stress(profiles=(wrong,)).save(tmp_path / "b.h5")
     with pytest.raises(FormatError, match=r"profile_1/normal_load has shape \(5,\), but its axes"):
         read_stress(tmp_path / "b.h5")
+
+
+@pytest.mark.parametrize("wrong", [np.ones(5), np.full(7, np.nan), np.ones((7, 0)), np.ones(())])
+def test_a_root_of_another_shape_or_not_finite_is_refused_by_its_path(path: Path, wrong):
+    with h5py.File(path, "r+") as file:
+        del file["entry/roots/profile_1/root_noise"]
+        file["entry/roots/profile_1/root_noise"] = wrong
+        file["entry/roots/profile_1/root_noise"].attrs["units"] = "Pa"
+    with pytest.raises(FormatError, match="profile_1/root_noise should hold finite numbers in 7"):
+        read_stress(path, accept_altered=True)
+
+
+@pytest.mark.parametrize("factor", [-1.0, 1e200, np.nan])
+def test_a_covariance_of_an_older_file_must_be_one(tmp_path: Path, factor: float):
+    path = tmp_path / "old.stress.h5"
+    path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
+    with h5py.File(path, "r+") as file:
+        [place] = (p for p in ("entry/profile_1", "entry/covariances/profile_1") if p in file)
+        stored = file[place]["covariance_noise"]
+        stored[0, 1:] = factor * np.abs(stored[0, 0]) * (1 + np.arange(stored.shape[0] - 1))
+    with pytest.raises(FormatError, match=r"covariance_noise (is no covariance|should hold)"):
+        read_stress(path, accept_altered=True)
+
+
+def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(limits, "MOST_HDF5_BYTES", 2**16)
+    with pytest.raises(InputError, match=r"bytes, but at most 65,536 are taken(.|\n)*fewer"):
+        make_stress().save(tmp_path / "a.h5")
+    assert not list(tmp_path.iterdir())
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -143,6 +143,26 @@ def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus) -> None
     assert reading.interval.low > 0
 
 
+def test_dry_against_lubricated_is_the_same_along_y(made, apparatus, found, kept) -> None:
+    scans = [replace(scan, direction="y") for scan in (made.dry, made.lubricated)]
+    along_y = memscal.compare(scans, apparatus, friction=FRICTION, cache=kept)
+    for one, other in zip(
+        along_y.dry_against_lubricated, found.dry_against_lubricated, strict=True
+    ):
+        np.testing.assert_allclose(one.difference, other.difference, atol=1e-6 * other.maximum)
+        assert one.chi_square == pytest.approx(other.chi_square, rel=1e-6)
+
+
+def test_a_contact_over_a_plane_is_refused(made: Experiment, apparatus) -> None:
+    axis = np.linspace(-5e-3, 5e-3, 9)
+    u = np.exp(-np.add.outer(axis**2, axis**2) / 2e-6)
+    raster = memscal.Scan(
+        x=axis, y=axis, u_zz=u, load=1.0, film=made.dry.film, indenter=made.dry.indenter
+    )
+    with pytest.raises(InputError, match=r"was scanned over x and y(.|\n)*line scan"):
+        memscal.compare(raster, apparatus)
+
+
 def test_a_rod_scan_is_refused(made: Experiment, apparatus: memscal.ApparatusFunction) -> None:
     with pytest.raises(InputError, match=r"made with a rod, not with a sphere[\s\S]*calibrate"):
         memscal.compare(made.rod, apparatus)

@@ -23,7 +23,7 @@ def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     stress = points.u / CONVERSION
     noise = points.noise / CONVERSION
     return SimpleNamespace(
-        lubrication=lubrication, load=load, x=points.offset, s_zz=stress,
+        lubrication=lubrication, load=load, x=points.offset, y=0 * stress, axis=0, s_zz=stress,
         roots={"noise": noise, "conversion_constant": 1e-2 * stress[:, None]},
         errors_by=lambda source: {"noise": noise}[source],
         maximum=float(stress.max()), maximum_budget={"noise": 100.0, "apparatus": 500.0},

@@ -174,9 +174,11 @@ def test_files_of_many_points_grow_with_their_number(tmp_path: Path) -> None:
         scan = memscal.simulate(film=SENSOR.film, points=count)
         found = memscal.measure_stress(scan, SENSOR)
         found.save(tmp_path / f"{count}.h5")
+        found.plot().savefig(tmp_path / "many.svg")
         assert memscal.read_stress(tmp_path / f"{count}.h5") == found
         sizes.append((tmp_path / f"{count}.h5").stat().st_size)
     assert sizes[1] < 8 * sizes[0]
+    assert (tmp_path / "many.svg").stat().st_size < 500_000
 
 
 def test_a_rod_is_measured_like_a_sphere() -> None:

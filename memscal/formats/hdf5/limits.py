@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import h5py
 
 from memscal.errors import UnsafeFileError
-from memscal.model.sizes import MOST_ARRAY_BYTES
+from memscal.model.sizes import MOST_ARRAY_BYTES, MOST_HDF5_BYTES
 
 _DESCRIPTOR, _OBJECT = 16, 16  # _OBJECT: header of an object in a global heap
 _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
@@ -146,6 +146,16 @@ _MAX_CHUNKS, _MIN_CHUNK_LIMIT = 2**16, 2**20
 #: Chunks at the edges of an array of four axes may make it this many times as large.
 _MAX_MARGIN = 16
 _UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
+
+
+#: Bytes that may be held of any file, and more for each of its bytes: packed readings of noise
+#: stand for two or three bytes each, and arrays without noise beside them for many.
+_USUAL, _MOST_PER_BYTE = 2**26, 64
+
+
+def most_held(size: int) -> int:
+    """Return how many bytes may be held of a file of this size."""
+    return min(MOST_HDF5_BYTES, _USUAL + _MOST_PER_BYTE * size)
 
 
 def refuse(where: str, problem: str, why: str) -> UnsafeFileError:

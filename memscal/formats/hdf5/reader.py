@@ -46,9 +46,6 @@ def damage_named(
 
 
 _MAX_ATTRIBUTE_BYTES, _MAX_ATTRIBUTE_ITEMS = 2**16, 64
-#: Bytes that may be held of any file, and more for each of its bytes: packed readings of noise
-#: stand for two or three bytes each, and arrays without noise beside them for many.
-_USUAL, _MOST_PER_BYTE = 2**26, 64
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -87,7 +84,7 @@ class SafeFile:
         self._data = data
         self._opened: dict[str, Any] = {"/": file["/"].id}
         # Of a small file no more than it may well stand for.
-        self._budget = self._most = min(MOST_HDF5_BYTES, _USUAL + _MOST_PER_BYTE * len(data))
+        self._budget = self._most = limits.most_held(len(data))
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
         self._listed: frozenset[str] | None = None

@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
 from memscal.formats.files import atomic_write_bytes
+from memscal.formats.hdf5.limits import most_held
 from memscal.formats.units import from_si
 from memscal.model.notation import printable
+from memscal.model.sizes import too_large
 
 SCAN_SCHEMA = "memscal-scan"
 REFERENCE_SCHEMA = "memscal-reference"
@@ -219,7 +221,14 @@ def tree_to_bytes(root: Group) -> bytes:
                 for name, value in _attributes(node).items():
                     _write_attribute(text, name, value)
         _attach_scales(file, root)
-    return memory.getvalue()
+    data = memory.getvalue()
+    numbers = (node.values for _, node in walk(root) if isinstance(node, Number))
+    held = max(len(data), sum(8 * np.size(values) for values in numbers))
+    if held > (most := most_held(len(data))):
+        why = "The file could not be read again."
+        cure = "Write fewer scans, loads or points into one file."
+        raise too_large("What is to be written", held, most, "bytes", why=why, cure=cure)
+    return data
 
 
 def _with_contents(root: Group, text: str) -> Group:
