@@ -192,7 +192,8 @@ def draw_profiles(
         lines += [f"{line}: {label}" for line, label in words]
         _note(axes, "\n".join(lines), (0.97, 0.95))
     axes.set_ylabel("blurred stress $S_{zz}$ (kPa)")
-    legend_above(axes, columns=4 if not logarithmic else 2)
+    points = max(at_load.profile.r.size for at_load in loads)
+    legend_above(axes, columns=2 if logarithmic else 4, points=0 if logarithmic else points)
 
 
 def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
@@ -224,7 +225,8 @@ def _plot_residuals(
         profile, look = at_load.profile, mark(at_load.lubrication, colour)
         calculated = calculated_at(comparison, at_load, friction)
         z = (profile.s_zz - calculated) / profile.s_zz_errors
-        axes.plot(profile.r / MM, z, ls="none", ms=2.5, mew=0.6, **look)
+        look |= {"many": z.size > SCATTER_THRESHOLD, "ls": "none", "ms": 2.5, "mew": 0.6}
+        draw_measured(axes, profile.r / MM, z, None, **look)
 
 
 def friction_set_figure(

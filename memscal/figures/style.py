@@ -171,13 +171,14 @@ def mark(lubrication: str, colour: str) -> dict[str, Any]:
 def draw_measured(
     axes: Axes, x: FloatArray, y: FloatArray, bars: FloatArray | None, *, many: bool, **look: Any
 ) -> None:
-    """Draw measured points with bars; dots alone of many."""
-    if many:
-        of_dots = {"marker": ".", "mfc": look["color"], "ms": 1.5, "mew": 0, "zorder": 1}
-        look = {name: value for name, value in look.items() if name != "elinewidth"} | of_dots
-        axes.plot(x, y, rasterized=True, **look)
-    else:
+    """Draw measured points, with bars if there are any; of many, dots alone."""
+    if bars is not None and not many:
         axes.errorbar(x, y, bars, **look)
+        return
+    look.pop("elinewidth", None)
+    if many:
+        look |= {"marker": ".", "mfc": look["color"], "ms": 1.5, "mew": 0, "zorder": 1}
+    axes.plot(x, y, rasterized=many, **look)
 
 
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
