@@ -21,7 +21,9 @@ _DECADES = 1e-3
 
 def measured_stress_figure(measured: MeasuredStress) -> Figure:
     """Draw the measured profiles of all loads against the distance from the centre."""
-    with style.panels_of(3.6, 1, 2) as (figure, panels):
+    # Dots of many points have no bars.
+    many = min(profile.r.size for profile in measured.profiles) > style.SCATTER_THRESHOLD
+    with style.panels_of(3.6, 1, 2, "" if many else style.COVERAGE_NOTE) as (figure, panels):
         looks = style.load_looks(profile.load for profile in measured.profiles)
         scales = ("linear scale", "logarithmic scale; pale: less than 2u")
         for axes, scale in zip(panels, scales, strict=True):
@@ -35,7 +37,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         panels[1].set_yscale("log")
         panels[1].set_ylim(_DECADES * top, 1.6 * top)
         panels[1].yaxis.set_major_formatter("{x:g}")
-        _legend(figure, measured, dict(looks.values()))
+        _legend(figure, measured, dict(looks.values()), many=many)
     return figure
 
 
@@ -56,10 +58,11 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: boo
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
 
-def _legend(figure: Figure, measured: MeasuredStress, colours: dict[str, str]) -> None:
+def _legend(
+    figure: Figure, measured: MeasuredStress, colours: dict[str, str], *, many: bool
+) -> None:
     """Name loads by colour and states by mark, once for both panels."""
     handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
-    many = min(profile.r.size for profile in measured.profiles) > style.SCATTER_THRESHOLD
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
         look = style.mark(state, "0.2") | ({"marker": "."} if many else {})
         handle = Line2D([], [], lw=0.8, ms=3.2, **look)

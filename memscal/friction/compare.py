@@ -57,8 +57,6 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
     for scan in scans:
         place = scan.source.file_name if scan.source else "The scan"
-        if isinstance(scan, Scan) and scan.y is not None:
-            require_line(place, scan.x, scan.y)
         if not isinstance(scan.indenter, Sphere):
             raise InputError(
                 f"{place} was made with a rod, not with a sphere."
@@ -68,6 +66,8 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
                 "grow: a rod scan calibrates a sensor.",
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",
             )
+        if isinstance(scan, Scan) and scan.y is not None:
+            require_line(place, scan.x, scan.y)
         if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
             problem = f"{place} states another film or sphere than the first scan."
             why = "Scans that are compared together share the calculated contacts."
@@ -207,8 +207,9 @@ def compare(
     Raises
     ------
     InputError
-        If a scan is not a sphere's, scans differ in film or sphere, or artifact and scan do not
-        belong together.
+        If a scan is not a sphere's or is over a plane, scans differ in film or sphere, artifact and
+        scan do not belong together, or there are too many readings (25,000; 500 of one load that
+        share noise, by a correlation or with the shear).
     FitError
         If a load determines no stress.
 
@@ -290,11 +291,13 @@ def _require_few(contacts: Sequence[Scan | MeasuredStress], *channels: str) -> N
     for name, size, shared in loads:
         if shared and size > MOST_COMPARED_TOGETHER:
             of = "readings that share noise (a correlation, or two channels)"
+            why = "A matrix over them is held in memory for each friction coefficient."
             cure = "Average neighbouring readings, or compare without correlation and shear."
-            raise too_large(name, size, MOST_COMPARED_TOGETHER, of, cure=cure)
+            raise too_large(name, size, MOST_COMPARED_TOGETHER, of, why=why, cure=cure)
     if (total := sum(size for _, size, _ in loads)) > MOST_COMPARED:
+        what, why = "What is compared", "Columns over them are held for each friction coefficient."
         cure = "Average neighbouring readings, or leave out repeats."
-        raise too_large("What is compared", total, MOST_COMPARED, "readings", cure=cure)
+        raise too_large(what, total, MOST_COMPARED, "readings", why=why, cure=cure)
 
 
 def _measured(

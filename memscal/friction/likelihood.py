@@ -303,7 +303,7 @@ class Standardised:
     residual: FloatArray  # (V, n): measured less calculated voltage
     slope: FloatArray  # (V, n): derivative by the bounded coordinate
     columns: Mapping[str, FloatArray]  # (V, n, q): systematic changes
-    points: LoadPoints
+    points: LoadPoints  # whose noise it is
     kinds: Mapping[str, FloatArray]  # (V, n): each kind of noise, in V
     volume: FloatArray  # (V,): log-determinants of N and of the flat information
     degrees: int

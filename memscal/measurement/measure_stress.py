@@ -182,8 +182,8 @@ def measure_stress(
     for single in chain(*singles):
         restore.require_contact_size(single)
         if single.u_zz_correlation is not None:
-            most, of = MOST_OF_CORRELATED_CONTACT, ", of correlated noise"
-            restore.require_contact_size(single, most, of)
+            why = "Their noise is correlated: of each load two matrices over them are kept."
+            restore.require_contact_size(single, MOST_OF_CORRELATED_CONTACT, why)
     loads = (
         _measure(origin, single, sensor, signal)
         for origin, of_scan in zip(origins, singles, strict=True)

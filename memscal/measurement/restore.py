@@ -109,12 +109,15 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
     return load
 
 
-def require_contact_size(scan: Scan, most: int = MOST_OF_CONTACT, of: str = "") -> None:
+_HELD = "Columns over all of them are held in memory."
+
+
+def require_contact_size(scan: Scan, most: int = MOST_OF_CONTACT, why: str = _HELD) -> None:
     """Refuse a contact of more points than its stress is restored or measured from."""
     if (size := scan.u_zz.size) > most:
         named = scan.source.file_name if scan.source else "The scan"
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, f"points of one load{of}", cure=cure)
+        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:

@@ -189,7 +189,7 @@ class MeasuredProfile(ByContent):
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of ``s_zz``, shape (n, n), all sources together, in Pa^2."""
+        """Covariance of ``s_zz``, shape (n, n), in Pa^2; of very many points use ``roots``."""
         squares = (np.diag(r**2) if r.ndim == 1 else r @ r.T for r in self.roots.values())
         return np.asarray(sum(squares))
 

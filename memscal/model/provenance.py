@@ -1,7 +1,6 @@
 """Provenance of data: files that were read, processing, time."""
 
 import os
-import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -59,6 +58,8 @@ class Process:
     @classmethod
     def of_now(cls, **stated: Any) -> Self:
         """Return the process of this program, now, with the versions of what it runs on."""
+        import platform
+
         import numpy as np
         import scipy
 

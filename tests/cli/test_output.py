@@ -157,3 +157,13 @@ def test_progress_is_a_line_now_and_then_where_nobody_watches(monkeypatch):
             if item == 0:
                 wait_for(written.getvalue, r"Sweeping: 1 of 3 draws, \d+ s left \(\d+ s\)\n")
     assert re.fullmatch(r"(Sweeping(: [123] of 3 draws[^\r\n]*)? \(\d+ s\)\n)+", written.getvalue())
+
+
+def test_progress_waits_between_two_lines(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sys, "stderr", written := io.StringIO())
+    monkeypatch.setattr("memscal.cli.output._IN_LINES", (0.01, 3600.0))
+    with working("Sweeping"):
+        wait_for(written.getvalue, r"\n")
+        for _ in counted(range(3), "draws", 3):
+            time.sleep(0.05)
+    assert written.getvalue().count("\n") == 1

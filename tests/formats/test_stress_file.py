@@ -182,11 +182,25 @@ def test_a_covariance_of_an_older_file_must_be_one(tmp_path: Path, factor: float
     path = tmp_path / "old.stress.h5"
     path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
     with h5py.File(path, "r+") as file:
-        [place] = (p for p in ("entry/profile_1", "entry/covariances/profile_1") if p in file)
-        stored = file[place]["covariance_noise"]
+        stored = file["entry/profile_1/covariance_noise"]
         stored[0, 1:] = factor * np.abs(stored[0, 0]) * (1 + np.arange(stored.shape[0] - 1))
     with pytest.raises(FormatError, match=r"covariance_noise (is no covariance|should hold)"):
         read_stress(path, accept_altered=True)
+
+
+def test_covariances_beside_the_profiles_are_read_like_those_within(tmp_path: Path):
+    path = tmp_path / "old.stress.h5"
+    path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
+    [within] = memscal.read_stress(path).profiles
+    with h5py.File(path, "r+") as file:
+        expected = file["entry/profile_1/covariance"][()]
+        for name in [n for n in file["entry/profile_1"] if n.startswith(("covariance", "sources"))]:
+            file.require_group("entry/covariances/profile_1")
+            file.move(f"entry/profile_1/{name}", f"entry/covariances/profile_1/{name}")
+    [beside] = memscal.read_stress(path, accept_altered=True).profiles
+    for profile in (within, beside):
+        close = 1e-9 * np.abs(expected).max()
+        np.testing.assert_allclose(profile.covariance, expected, rtol=0, atol=close)
 
 
 def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, monkeypatch):
