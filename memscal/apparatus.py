@@ -155,7 +155,8 @@ class ApparatusFunction(Result, ApparatusData):
         and with it too small an A.  Artifacts that do not state the correlation count none.
         """
         operator, blurred = self._operator(r, sigma_zz)
-        profile, a = self.radial_profile, self.conversion_constant
+        profile = self.radial_profile
+        a = self.conversion_constant
         u_a = self.parameters.uncertainty("conversion_constant")
         variance = (a * self.convolve_uncertainty(r, sigma_zz)) ** 2 + (blurred * u_a) ** 2
         if profile.conversion_correlation is not None:
@@ -192,7 +193,8 @@ class ApparatusFunction(Result, ApparatusData):
         """
         if self.plane is None:
             return self
-        of_profile, g = ApparatusField.of_profile(self.radial_profile), self.plane.g
+        of_profile = ApparatusField.of_profile(self.radial_profile)
+        g = self.plane.g
         alike = g.shape == of_profile.g.shape and np.allclose(g, of_profile.g, 0, _ROUND * g.max())
         return replace(self, plane=None) if alike else self
 
@@ -230,7 +232,9 @@ class ApparatusFunction(Result, ApparatusData):
         if self.order:
             problem = f"Channel {self.sensor.channel} measures a component of a vector field."
             raise InputError(problem, cure="Give the radial profile of the shear, without y.")
-        stress, g, offsets = np.asarray(sigma_zz, dtype=np.float64), self.field, []
+        stress = np.asarray(sigma_zz, dtype=np.float64)
+        g = self.field
+        offsets = []
         if stress.ndim != 2 or not np.isfinite(stress).all():
             problem = "sigma_zz is no field (y, x) of finite stresses."
             raise InputError(problem, cure="Give an array of two axes without missing values.")
@@ -255,11 +259,14 @@ class ApparatusFunction(Result, ApparatusData):
         self._require_decayed(edge, float(np.abs(stress).max()), "the edge of the field")
         outside = [(abs(o) > abs(a).max()) for o, a in zip(offsets, (g.x, g.y), strict=True)]
         kernel = RectBivariateSpline(g.y, g.x, g.g)(offsets[1], offsets[0])
-        kernel[outside[1]], kernel[:, outside[0]] = 0.0, 0.0
+        kernel[outside[1]] = 0.0
+        kernel[:, outside[0]] = 0.0
         cell = float((offsets[0][1] - offsets[0][0]) * (offsets[1][1] - offsets[1][0]))
         # The kernel has its zero in the middle, and may be larger than the field.
-        first_y, first_x = len(kernel) // 2, kernel.shape[-1] // 2
-        last_y, last_x = first_y + len(stress), first_x + stress.shape[1]
+        first_y = len(kernel) // 2
+        first_x = kernel.shape[-1] // 2
+        last_y = first_y + len(stress)
+        last_x = first_x + stress.shape[1]
         return np.asarray(fftconvolve(stress, kernel)[first_y:last_y, first_x:last_x] * cell)
 
     def _require_fine(self, step: float) -> None:
@@ -287,7 +294,8 @@ class ApparatusFunction(Result, ApparatusData):
         return np.where(radii <= support[-1], spline(np.minimum(radii, support[-1])), 0.0)
 
     def _checked(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        radii, stress = finite_vector("r", r), finite_vector("sigma_zz", sigma_zz)
+        radii = finite_vector("r", r)
+        stress = finite_vector("sigma_zz", sigma_zz)
         if radii.shape != stress.shape:
             raise InputError(f"There are {stress.size} stresses for {radii.size} radii.")
         require_increasing("r", radii)
@@ -347,7 +355,8 @@ def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -
 
     with open_hdf5(path, accept_altered=accept_altered) as file:
         data = artifact_from(file)
-        digest, source = file.attribute("/", DIGEST_ATTRIBUTE), file.source
+        digest = file.attribute("/", DIGEST_ATTRIBUTE)
+        source = file.source
     apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
     object.__setattr__(apparatus, "source", source)
     # Written again, it might have another digest by rounding: the file's is kept.

@@ -29,7 +29,9 @@ class MemscalError(Exception):
     exit_code = 3
 
     def __init__(self, problem: str, *, why: str = "", cure: str = "") -> None:
-        self.problem, self.why, self.cure = problem, why, cure
+        self.problem = problem
+        self.why = why
+        self.cure = cure
         super().__init__("\n".join(text for text in (problem, why, cure) if text))
 
 

@@ -98,7 +98,8 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     os.environ.update(dict.fromkeys(unset, "1"))
     _SET_BY_POOL.update(unset)
     context: Any = SpawnContext()
-    context.Process, data = _process, spawn.get_preparation_data("")
+    context.Process = _process
+    data = spawn.get_preparation_data("")
     theirs, ours = context.Pipe(duplex=False)
     told = theirs, {key: data[key] for key in _OF_SCRIPT if key in data}
     pool = ProcessPoolExecutor(workers, context, initializer=_begin_worker, initargs=told)
@@ -129,7 +130,8 @@ def _start_without_script(process: Any) -> Any:
     from multiprocessing.context import SpawnProcess
 
     with _STARTING:
-        prepared, ours = spawn.get_preparation_data, get_ident()
+        prepared = spawn.get_preparation_data
+        ours = get_ident()
 
         def without_script(name: str) -> dict[str, object]:
             left_out = _OF_SCRIPT if get_ident() == ours else ()
@@ -180,9 +182,11 @@ def _begin_worker(lifeline: Connection, script: Mapping[str, Any]) -> None:
 
 
 #: Items that a task has at the most; tasks in flight for each worker.
-_LARGEST_CHUNK, _TASKS = 16, 4
+_LARGEST_CHUNK = 16
+_TASKS = 4
 #: Workers of an executor that does not say how many it has; seconds that a cluster has to answer.
-_WORKERS, _CONNECTING = 64, 30
+_WORKERS = 64
+_CONNECTING = 30
 
 
 def shared(
@@ -194,10 +198,12 @@ def shared(
 ) -> Iterator[Any]:
     """Yield what a function returns for each item, in their order; one worker is this process."""
     # Items are taken as workers become free, so that neither they nor results pile up.
-    source, tasks = iter(items), deque["Future[list[Any]]"]()
+    source = iter(items)
+    tasks = deque["Future[list[Any]]"]()
     if executor is not None:
         workers = getattr(executor, "_max_workers", None) or _WORKERS
-    chunk, small = _LARGEST_CHUNK, list[int]()
+    chunk = _LARGEST_CHUNK
+    small = list[int]()
     if isinstance(items, Sized):
         chunk = max(2, min(chunk, len(items) // (4 * workers)))
         workers = min(workers, -(-len(items) // chunk))

@@ -121,7 +121,8 @@ def hushed() -> Iterator[None]:
 @contextmanager
 def in_steps(*steps: str) -> Iterator[None]:
     """Begin a task of named steps; what is called within says which it is done with."""
-    tell, done = counter("steps", len(steps)), 0
+    tell = counter("steps", len(steps))
+    done = 0
 
     def hear(step: str) -> None:
         # What is repeated within a later step, as by another law of the film, counts for nothing.
@@ -155,7 +156,8 @@ def reported(function: _Function) -> _Function:
 
 def counter(task: str, total: float) -> Callable[..., None]:
     """Begin a task; return what is called with how much of it is done, and was done before."""
-    listener, start = _LISTENER.get(), monotonic()
+    listener = _LISTENER.get()
+    start = monotonic()
     if listener is _nobody:
         return lambda *_: None
     said = start
@@ -181,7 +183,8 @@ def counted(
     kept: Callable[[_Item], bool] = lambda _: False,
 ) -> Iterator[_Item]:
     """Begin a task; return its items, told of as they come: their sizes, what was done before."""
-    tell, rest = counter(task, total), iter(items)
+    tell = counter(task, total)
+    rest = iter(items)
 
     def each() -> Iterator[_Item]:
         done: float = 0

@@ -64,11 +64,13 @@ def pango() -> None:
 @pytest.fixture(scope="session", autouse=True)
 def _every_file_is_valid(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Validate the files that tests write against our application definitions."""
-    encode, seen = writer.tree_to_bytes, set[frozenset[str]]()
+    encode = writer.tree_to_bytes
+    seen = set[frozenset[str]]()
     folder = tmp_path_factory.mktemp("nexus")
 
     def validated(root: writer.Group) -> bytes:
-        data, layout = encode(root), structure(root)
+        data = encode(root)
+        layout = structure(root)
         if layout not in seen and root.attributes.get(writer.SCHEMA_ATTRIBUTE) in writer.DEFINED:
             if not seen:
                 definitions_folder(folder / "definitions")

@@ -28,14 +28,18 @@ RADII = np.linspace(0.0, 12e-3, 601)
 
 def with_kernel(kernel: Callable[[FloatArray], FloatArray]) -> ApparatusFunction:
     """An apparatus function of this radial profile, tabulated out to 6 mm."""
-    r, k = np.linspace(0.0, SUPPORT, 401), np.linspace(0.0, 2.5e4, 101)
+    r = np.linspace(0.0, SUPPORT, 401)
+    k = np.linspace(0.0, 2.5e4, 101)
     g = kernel(r)
     errors = 0.02 * g
     radial = ApparatusRadial(r, g, errors, g, np.diag(errors**2))
     transfer = TransferFunction(
-        k=k, modulus=np.exp(-((k * SIGMA) ** 2) / 2), modulus_errors=np.zeros(101),
-        window=np.ones(101), resolved_wavenumber=3.7e3,
-    )  # fmt: skip
+        k=k,
+        modulus=np.exp(-((k * SIGMA) ** 2) / 2),
+        modulus_errors=np.zeros(101),
+        window=np.ones(101),
+        resolved_wavenumber=3.7e3,
+    )
     data = make_artifact(radial_profile=radial, transfer=transfer)
     return ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
 
@@ -96,12 +100,14 @@ def elliptic(x: FloatArray, y: FloatArray, covariance: FloatArray) -> FloatArray
 
 
 def test_a_field_is_convolved_with_g_over_the_plane() -> None:
-    sensor, force = np.array([[0.5, 0.2], [0.2, 0.3]]) * 1e-6, np.array([[1.0, -0.6], [-0.6, 2.0]])
+    sensor = np.array([[0.5, 0.2], [0.2, 0.3]]) * 1e-6
+    force = np.array([[1.0, -0.6], [-0.6, 2.0]])
     axis = np.linspace(-4e-3, 4e-3, 161)
     field = ApparatusField(axis, axis, elliptic(axis, axis, sensor), np.zeros((161, 161)))
     data = make_artifact(plane=field)
     apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
-    x, y = np.linspace(-8e-3, 8e-3, 101), np.linspace(-9e-3, 9e-3, 91)
+    x = np.linspace(-8e-3, 8e-3, 101)
+    y = np.linspace(-9e-3, 9e-3, 91)
     stress = 3.0 * elliptic(x, y, force * 1e-6)
     exact = 3.0 * elliptic(x, y, sensor + force * 1e-6)
     blurred = apparatus.convolve(x, stress, y=y)
@@ -135,16 +141,22 @@ def test_the_force_is_kept_up_to_the_integral_of_the_apparatus_function() -> Non
 @given(a=st.floats(-1e3, 1e3, width=16), b=st.floats(-1e3, 1e3, width=16))
 def test_the_convolution_is_linear(a: float, b: float) -> None:
     apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
-    one, two = unit_gaussian(RADII, 1e-3), unit_gaussian(RADII, 0.6e-3) * (RADII / 1e-3) ** 2
+    one = unit_gaussian(RADII, 1e-3)
+    two = unit_gaussian(RADII, 0.6e-3) * (RADII / 1e-3) ** 2
     together = apparatus.convolve(RADII, a * one + b * two)
     apart = a * apparatus.convolve(RADII, one) + b * apparatus.convolve(RADII, two)
     np.testing.assert_allclose(together, apart, atol=1e-9 * (abs(a) + abs(b)) * one[0])
 
 
-@pytest.mark.parametrize("uneven", [
-    np.concatenate([np.linspace(0.0, 4e-3, 300), np.geomspace(4e-3, 12e-3, 60)[1:]]),
-    np.concatenate([np.linspace(0.0, 6e-3, 301), [8e-3, 10e-3, 12e-3]]),  # where there is no stress
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "uneven",
+    [
+        np.concatenate([np.linspace(0.0, 4e-3, 300), np.geomspace(4e-3, 12e-3, 60)[1:]]),
+        np.concatenate(
+            [np.linspace(0.0, 6e-3, 301), [8e-3, 10e-3, 12e-3]]
+        ),  # where there is no stress
+    ],
+)
 def test_uneven_radii_give_the_same_as_even_ones(apparatus: ApparatusFunction, uneven) -> None:
     found = apparatus.convolve(uneven, unit_gaussian(uneven, 0.9e-3))
     exact = unit_gaussian(uneven, float(np.hypot(0.9e-3, SIGMA)))
@@ -175,26 +187,30 @@ def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus) ->
 
 def test_beyond_the_support_there_is_nothing() -> None:
     apparatus = with_kernel(np.ones_like)
-    inside, outside = SUPPORT * (1 - 1e-12), SUPPORT * (1 + 1e-12)
+    inside = SUPPORT * (1 - 1e-12)
+    outside = SUPPORT * (1 + 1e-12)
     assert apparatus.radial(inside) == pytest.approx(1.0)
     np.testing.assert_array_equal(apparatus.radial([outside, -outside, 1.0]), 0.0)
     np.testing.assert_array_equal(apparatus.radial_uncertainty([outside, 1.0]), 0.0)
 
 
-@pytest.mark.parametrize(("r", "sigma", "problem"), [
-    (RADII * 1e3, unit_gaussian(RADII, 1e-3), "r reaches 12 m"),
-    (RADII[::40], unit_gaussian(RADII[::40], 1e-3), "every 0.8 mm, coarser"),
-    (RADII[:101], unit_gaussian(RADII[:101], 1e-3), "13.5% of the largest stress is left"),
-    (RADII[:-1], unit_gaussian(RADII, 1e-3), "601 stresses for 600 radii"),
-    (RADII[::-1], unit_gaussian(RADII, 1e-3), "r must increase"),
-    (RADII - 1e-4, unit_gaussian(RADII, 1e-3), "r begins at -0.0001 m"),
-    (RADII[100:], unit_gaussian(RADII[100:], 1e-3), "r begins at 0.002 m"),
-    (np.outer([1, 1], RADII), np.outer([1, 1], RADII), "r has shape"),
-    ([], [], "r has shape"),
-    (RADII, np.full(601, np.nan), "sigma_zz holds a value that is not finite"),
-    (RADII[:3], [1.0, 0.5, 0.0], "3 radii cannot be interpolated"),
-    ([0.0], [1.0], "cannot be interpolated"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("r", "sigma", "problem"),
+    [
+        (RADII * 1e3, unit_gaussian(RADII, 1e-3), "r reaches 12 m"),
+        (RADII[::40], unit_gaussian(RADII[::40], 1e-3), "every 0.8 mm, coarser"),
+        (RADII[:101], unit_gaussian(RADII[:101], 1e-3), "13.5% of the largest stress is left"),
+        (RADII[:-1], unit_gaussian(RADII, 1e-3), "601 stresses for 600 radii"),
+        (RADII[::-1], unit_gaussian(RADII, 1e-3), "r must increase"),
+        (RADII - 1e-4, unit_gaussian(RADII, 1e-3), "r begins at -0.0001 m"),
+        (RADII[100:], unit_gaussian(RADII[100:], 1e-3), "r begins at 0.002 m"),
+        (np.outer([1, 1], RADII), np.outer([1, 1], RADII), "r has shape"),
+        ([], [], "r has shape"),
+        (RADII, np.full(601, np.nan), "sigma_zz holds a value that is not finite"),
+        (RADII[:3], [1.0, 0.5, 0.0], "3 radii cannot be interpolated"),
+        ([0.0], [1.0], "cannot be interpolated"),
+    ],
+)
 def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, problem) -> None:
     for method in (apparatus.convolve, apparatus.predict):
         with pytest.raises(InputError, match=problem) as caught:
@@ -224,7 +240,8 @@ def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path: Pa
     assert read.content_digest != whole.content_digest
     np.testing.assert_allclose(read.field.g, whole.field.g, atol=1e-5 * whole.field.g.max())
     np.testing.assert_allclose(read.field.g_errors, whole.field.g_errors, rtol=1e-6)
-    x, y = np.linspace(-8e-3, 8e-3, 101), np.linspace(-9e-3, 9e-3, 91)
+    x = np.linspace(-8e-3, 8e-3, 101)
+    y = np.linspace(-9e-3, 9e-3, 91)
     stress = elliptic(x, y, np.array([[1.0, -0.6], [-0.6, 2.0]]) * 1e-6)
     expected = whole.convolve(x, stress, y=y)
     np.testing.assert_allclose(read.convolve(x, stress, y=y), expected, atol=1e-5 * expected.max())
@@ -243,11 +260,14 @@ def test_g_that_is_not_round_stays_in_a_compact_artifact() -> None:
 
 def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
     """Predicted voltages of a sphere's stress scatter as the artifact's covariances say."""
-    film, rod = EXACT_FILM, EXACT_ROD
+    film = EXACT_FILM
+    rod = EXACT_ROD
     sphere = memscal.indent(film, memscal.Sphere(radius=20e-3), load=1.0)
     r = np.linspace(0.0, 12e-3, 241)
     stress = sphere.base_stress(r)
-    predicted, stated, blurred = [], [], []
+    predicted = []
+    stated = []
+    blurred = []
     for seed in range(40):
         scan = memscal.simulate(
             film=film, rod=rod, noise=0.005, seed=seed, load_uncertainty=None, kernel=TAILS
@@ -256,7 +276,8 @@ def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
         predicted.append(apparatus.predict(r, stress)[:60:6])
         stated.append(apparatus.predict_uncertainty(r, stress)[:60:6])
         blurred.append(apparatus.convolve_uncertainty(r, stress)[:60:6])
-    scatter, said = np.std(predicted, axis=0, ddof=1), np.sqrt(np.mean(np.square(stated), axis=0))
+    scatter = np.std(predicted, axis=0, ddof=1)
+    said = np.sqrt(np.mean(np.square(stated), axis=0))
     # A standard deviation of 40 is known to 11 %: what is stated also counts what does not scatter.
     assert np.all(scatter < 1.5 * said)
     assert np.all(said < 3 * scatter)
@@ -280,12 +301,15 @@ def test_an_uncertainty_is_the_root_of_its_variance(deviations: list[float]) -> 
     assert "another" not in parameters
 
 
-@pytest.mark.parametrize(("values", "covariance", "units"), [
-    (np.zeros(3), np.zeros((2, 2)), ()),
-    (np.zeros(2), np.zeros((3, 3)), ()),
-    (np.zeros(2), np.zeros(2), ()),
-    (np.zeros(2), np.zeros((2, 2)), ("m",)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("values", "covariance", "units"),
+    [
+        (np.zeros(3), np.zeros((2, 2)), ()),
+        (np.zeros(2), np.zeros((3, 3)), ()),
+        (np.zeros(2), np.zeros(2), ()),
+        (np.zeros(2), np.zeros((2, 2)), ("m",)),
+    ],
+)
 def test_parameters_that_do_not_fit_together_are_refused(values, covariance, units) -> None:
     with pytest.raises(InputError, match="2 parameter names"):
         ParameterSet(("a", "b"), values, covariance, units)

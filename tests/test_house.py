@@ -23,8 +23,14 @@ FLOW = [
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
 USERS_OF_FORMATS = {
-    "apparatus", "calibration", "certificate", "figures", "cli", "friction", "measurement",
-}  # fmt: skip
+    "apparatus",
+    "calibration",
+    "certificate",
+    "figures",
+    "cli",
+    "friction",
+    "measurement",
+}
 
 ONLY_IN = {
     "h5py": {"formats"}, "pint": {"formats"}, "meshio": {"formats"}, "matplotlib": {"figures"},
@@ -36,8 +42,11 @@ SLOW = {
     "distributed", "matplotlib", "meshio", "openpyxl", "pint", "pyarrow", "skfem", "skimage",
     "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats", "weasyprint",
 }  # fmt: skip
-LONGEST, SHORT = 600, 120
-MOST_MODULES, MOST_LINES, MOST_LINES_OF_TESTS = 187, 41_950, 27_800
+LONGEST = 600
+SHORT = 120
+MOST_MODULES = 187
+MOST_LINES = 41_950
+MOST_LINES_OF_TESTS = 27_800
 SHORT_WITH_ONE_IMPORTER = {
     "memscal.cli.commands": "asking for help imports it and nothing that a command needs"
 }

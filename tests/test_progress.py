@@ -72,8 +72,11 @@ def test_public_functions_tell_their_callback(tmp_path) -> None:
     memscal.calibrate(memscal.simulate(seed=1, points=17), progress=heard.append)
     inputs = [("uncertain inputs", done, 3) for done in (1, 2, 3)]
     assert told(heard) == [
-        *(("steps", done, 5) for done in (1, 2, 3)), *inputs, ("steps", 4, 5), ("steps", 5, 5)
-    ]  # fmt: skip
+        *(("steps", done, 5) for done in (1, 2, 3)),
+        *inputs,
+        ("steps", 4, 5),
+        ("steps", 5, 5),
+    ]
     heard.clear()
     with reporting(heard.append):
         memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")

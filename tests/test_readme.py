@@ -101,7 +101,8 @@ def test_the_example_in_python_runs() -> None:
     names: dict[str, object] = {}
     for example in EXAMPLES:
         exec(compile(example, "README.md", "exec"), names)
-    fitted, stated = names["fitted"], numbers(EXAMPLES[0].split("# ")[-1])[:3]
+    fitted = names["fitted"]
+    stated = numbers(EXAMPLES[0].split("# ")[-1])[:3]
     found = (fitted.value, fitted.interval.low, fitted.interval.high)
     assert stated == pytest.approx(found, rel=0.02)
     assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)

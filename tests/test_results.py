@@ -64,7 +64,8 @@ def test_draws_are_told_in_the_units_of_the_rest(drawn: memscal.MonteCarlo) -> N
     told = drawn.to_dict()
     assert (told["draws"], told["seed"]) == (6, 4)
     assert {"noise", "thickness", "poisson_ratio", "rod_radius", "load"} < set(told["sources"])
-    width, shown = drawn["gaussian_sigma"], told["parameters"]["gaussian_sigma"]
+    width = drawn["gaussian_sigma"]
+    shown = told["parameters"]["gaussian_sigma"]
     assert (shown["unit"], shown["agrees"]) == ("mm", shown["reason"] == "")
     assert shown["standard_uncertainty"] == pytest.approx(width.uncertainty * 1e3, rel=1e-6)
     assert shown["interval_95"] == pytest.approx(1e3 * np.array(width.symmetric), rel=1e-6)
@@ -105,7 +106,8 @@ def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, met
                 if isinstance(stored, np.ndarray):
                     found = getattr(getattr(ours, record), name)
                     np.testing.assert_allclose(found, stored, atol=1e-9 * np.abs(stored).max())
-    a, values = loaded.conversion_constant, loaded.to_dict()
+    a = loaded.conversion_constant
+    values = loaded.to_dict()
     assert a == pytest.approx(apparatus.parameters["conversion_constant"], rel=1e-12)
     assert list(values["estimates"]) == [*methods, "gaussian"]
     assert loaded.other.method == methods[1]
@@ -156,7 +158,8 @@ def test_arrays_stand_on_their_axes_in_si_units(calibration, loaded) -> None:
     pytest.importorskip("xarray")
     for result, apparatus in ((calibration, calibration.apparatus), (loaded, loaded)):
         arrays = result.to_xarray()
-        profile, field = apparatus.radial_profile, apparatus.field
+        profile = apparatus.radial_profile
+        field = apparatus.field
         for name, dims, values, unit in (
             ("g", ("r",), profile.g, "1/m^2"),
             ("r", ("r",), profile.r, "m"),

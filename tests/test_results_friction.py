@@ -26,22 +26,31 @@ def reading(
     value: float | None, low: float, high: float | None, *, u: float | None = 0.02, **fields: Any
 ) -> BoundedEstimate:
     made = BoundedEstimate(
-        value=value, standard_uncertainty=u, interval=Interval(low, high),
-        reason="" if value is not None else "a lower bound", values=np.array([0.0, 0.1, math.inf]),
-        deviance=np.array([40.0, 30.0, 50.0]), degrees=29, least=30.0, p_value=0.4,
-    )  # fmt: skip
+        value=value,
+        standard_uncertainty=u,
+        interval=Interval(low, high),
+        reason="" if value is not None else "a lower bound",
+        values=np.array([0.0, 0.1, math.inf]),
+        deviance=np.array([40.0, 30.0, 50.0]),
+        degrees=29,
+        least=30.0,
+        p_value=0.4,
+    )
     return replace(made, **fields)
 
 
-@pytest.mark.parametrize(("found", "text"), [
-    (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
-    (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
-    (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
-    (reading(None, 12.51, None), "above 12 (95 %)"),
-    (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
-    (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
-    (reading(None, 0.0, None), "not identifiable"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("found", "text"),
+    [
+        (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
+        (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
+        (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
+        (reading(None, 12.51, None), "above 12 (95 %)"),
+        (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
+        (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
+        (reading(None, 0.0, None), "not identifiable"),
+    ],
+)
 def test_an_estimate_prints_its_interval_or_a_bound(found: BoundedEstimate, text: str) -> None:
     assert str(found) == text
     assert text in repr(found)
@@ -62,8 +71,11 @@ def test_a_comparison_prints_tables_within_eighty_columns(found: FrictionCompari
     [likelihood] = [t for t in tables(many) if t.title.startswith("-2 ln(p/p_max)")]
     heads = [text.splitlines() for text in likelihood.plain().split("\n\n")]
     assert len(heads) > 1
-    shown = " ".join(line for part in heads for line in part[: part.index(next(
-        line for line in part if line.startswith("  -")))])  # fmt: skip
+    shown = " ".join(
+        line
+        for part in heads
+        for line in part[: part.index(next(line for line in part if line.startswith("  -")))]
+    )
     assert set(likelihood.head[4:]) <= set(shown.split())
     assert "1.8 [1.4, 2.3] um" in str(found)
     for words in ("for it, very strong", "against it, positive", str(found.interface)):
@@ -169,7 +181,8 @@ def messages(
 
 
 def test_definitions_of_the_loading_that_disagree_are_told() -> None:
-    near, far = reading(0.25, 0.2, 0.3), reading(0.29, 0.24, 0.36)
+    near = reading(0.25, 0.2, 0.3)
+    far = reading(0.29, 0.24, 0.36)
     assert "disagree for the dry loads by 0.04" in messages(near, far)
     assert "disagree" not in messages(near, reading(0.26, 0.21, 0.31))
     bound = reading(None, 0.2, None)
@@ -216,7 +229,8 @@ def test_lubricated_loads_that_exclude_no_friction_fail_their_check() -> None:
 
 
 def test_a_misfit_of_all_loads_fails_though_one_loading_is_enough_to_pass() -> None:
-    bad, good = reading(0.1, 0.05, 0.2, least=90.0, p_value=1e-8), reading(0.1, 0.05, 0.2)
+    bad = reading(0.1, 0.05, 0.2, least=90.0, p_value=1e-8)
+    good = reading(0.1, 0.05, 0.2)
     assert not comparison_checks({}, {"dry": {"total": bad}})[0].passed
     assert comparison_checks({}, {"dry": {"incremental": good, "total": bad}})[0].passed
     assert reading(None, 0.05, None).best == 0.1

@@ -124,7 +124,8 @@ class RadialSpectrum:
 
     def plane(self, ky: FloatArray, kx: FloatArray) -> FloatArray:
         """Transform over the plane, (ky, kx); zero beyond the last node."""
-        k, nodes = np.hypot.outer(ky, kx), self.wavenumbers.k
+        nodes = self.wavenumbers.k
+        k = np.hypot.outer(ky, kx)
         return np.where(k <= nodes[-1], radial_spline(nodes, self.values)(k), 0.0)
 
 

@@ -47,7 +47,8 @@ def blurred_disc(r: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatA
     """Discs of unit integral, blurred by Gaussians, at radii ``r`` (m), in 1/m^2."""
     # A point blurred from r falls into the disc: a non-central chi-square probability.
     place, edge = np.broadcast_arrays(np.asarray(r) / sigma, radius / sigma)
-    share, near = np.zeros(place.shape), place < edge + _FARTHEST
+    share = np.zeros(place.shape)
+    near = place < edge + _FARTHEST
     share[near] = chndtr(edge[near] ** 2, 2, place[near] ** 2)
     return np.asarray(share / (np.pi * radius**2))
 

@@ -37,7 +37,9 @@ from memscal.version import __version__
 
 _LONGEST_STEM = 80
 #: Shards, as many as balance the workers, and the scans of one.
-_SHARDS, _SMALLEST, _LARGEST = 64, 4, 256
+_SHARDS = 64
+_SMALLEST = 4
+_LARGEST = 256
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,8 @@ class Batch:
     def shards(self) -> Iterator[Shard]:
         """Yield the shards in their order, listing the scans as they are needed."""
         assert self.shard_size is not None
-        scans, size = manifest_scans(self.source), self.shard_size
+        scans = manifest_scans(self.source)
+        size = self.shard_size
         shards = iter(lambda: tuple(islice(scans, size)), ())
         yield from (Shard(i, i * size, some) for i, some in enumerate(shards))
 
@@ -138,9 +141,12 @@ class Batch:
 
     def _counted(self) -> int:
         """Return how many scans there are; refuse a list of which none is there."""
-        count, there, first = 0, False, ""
+        count = 0
+        there = False
+        first = ""
         for scan in manifest_scans(self.source):
-            count, first = count + 1, first or scan.path
+            count = count + 1
+            first = first or scan.path
             there = there or (self.folder / scan.path).exists()
         if not count:
             cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
@@ -157,7 +163,8 @@ class Batch:
     def run(self, executor: Executor, most: Callable[[], int]) -> Iterator[ShardOutcome]:
         """Yield the outcomes of the shards as they are done, of which ``most()`` are in flight."""
         write_batch(self.results, {"scans": self.count, "shard_size": self.shard_size})
-        shards, tasks = self.shards(), set[Future[ShardOutcome]]()
+        shards = self.shards()
+        tasks = set[Future[ShardOutcome]]()
         lost: list[str] = []
         try:
             while True:
@@ -236,7 +243,8 @@ def _sha256_of_file(path: Path) -> str | None:
 
 def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     """Calibrate a scan and return its row; an error is a row, too."""
-    item, path = shard.scans[i], batch.folder / shard.scans[i].path
+    item = shard.scans[i]
+    path = batch.folder / shard.scans[i].path
     row: dict[str, Any] = {"place": shard.first + i, **asdict(item), "passed": False}
     row |= {"calibrated_at": timestamp(), "options_sha256": batch.options_sha256}
     row |= {"version": batch.version, "error": None}

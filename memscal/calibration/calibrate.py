@@ -71,7 +71,8 @@ def assemble(
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are as ``stated`` by the scan where nothing was calculated with them.
-    scan, reference = solution.scan, _table(solution.stress)
+    scan = solution.scan
+    reference = _table(solution.stress)
     channel = solution.estimate.points.channel
     record: dict[str, Any] = {
         **configuration,
@@ -87,7 +88,8 @@ def assemble(
         record["further_scans"] = [
             s and {"file_name": s.file_name, "sha256": s.sha256} for s in sources
         ]
-    g, plane = solution.deconvolution.g, results.field_errors
+    g = solution.deconvolution.g
+    plane = results.field_errors
     if plane is None:
         errors = np.sqrt(np.diag(results.radial_covariance))
         plane = g.grid.to_image(np.interp(g.grid.radius, g.r, errors))
@@ -128,7 +130,8 @@ def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
 
 
 def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:
-    g, covariance = deconvolution.g, results.radial_covariance
+    g = deconvolution.g
+    covariance = results.radial_covariance
     gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
     errors = np.sqrt(np.diag(covariance))
     with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
@@ -138,8 +141,10 @@ def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) 
 
 
 def _transfer(solution: Solution, results: Results) -> TransferFunction:
-    fields, deconvolution = solution.fields, solution.deconvolution
-    a, quotient = deconvolution.conversion_constant, deconvolution.quotient
+    fields = solution.fields
+    deconvolution = solution.deconvolution
+    a = deconvolution.conversion_constant
+    quotient = deconvolution.quotient
     k, transfer = fields.grid.axis_transfer(quotient.values)
     window = fields.along_axis(quotient.window)[1]
     return TransferFunction(
@@ -148,7 +153,8 @@ def _transfer(solution: Solution, results: Results) -> TransferFunction:
 
 
 def _reconvolution(solution: Solution) -> Reconvolution:
-    estimate, points = solution.estimate, solution.estimate.points
+    points = solution.estimate.points
+    estimate = solution.estimate
     # A raster is shown against the distance from the centre, a line against the position.
     along = points.x if points.free[0, 0] else points.y
     place = estimate.distance if points.planar or points.scans > 1 else along
@@ -159,7 +165,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     elif points.scans > 1 and estimate.model.order:
         # The sign of a shear depends on the side.
         place = estimate.offset[estimate.model.axis]
-    order, predicted = np.argsort(place, kind="stable"), solution.deconvolution.predicted
+    order = np.argsort(place, kind="stable")
+    predicted = solution.deconvolution.predicted
     columns = {
         "x": place,
         "u_zz": points.u,
@@ -356,12 +363,20 @@ def calibrate(
     """
     pairs = correlations or {}
     prepared = prepare(
-        opened_scans(scan, MOST_OF_LINES, accept_altered=accept_altered), reference, alternative,
+        opened_scans(scan, MOST_OF_LINES, accept_altered=accept_altered),
+        reference,
+        alternative,
         (film_law, mooney_rivlin_ratio, rod_friction),
-        pixel_size=pixel_size, override=override, accept_altered=accept_altered, relative=relative,
-    )  # fmt: skip
-    scans, stresses, owners = prepared.scans, list(prepared.stresses), prepared.owners
-    reading, as_stated = prepared.reading, prepared.as_stated
+        pixel_size=pixel_size,
+        override=override,
+        accept_altered=accept_altered,
+        relative=relative,
+    )
+    scans = prepared.scans
+    stresses = list(prepared.stresses)
+    owners = prepared.owners
+    reading = prepared.reading
+    as_stated = prepared.as_stated
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
@@ -476,7 +491,8 @@ def prepare(
     if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
         # Under another law than the linear one each load has a stress of its own shape.
         of_loads, owners = scans_by_load(scans)
-        scans, references = tuple(of_loads), [None] * len(of_loads)
+        scans = tuple(of_loads)
+        references = [None] * len(of_loads)
     stresses = tuple(reference_profile(s, r) for s, r in zip(scans, references, strict=True))
     peak = float(np.abs(_table(stresses[0]).sigma_zz).max()) if relative else None
     scans = tuple(at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True))
@@ -558,7 +574,10 @@ def _read(
 def _effects(
     solution: Solution, alternatives: Sequence[BaseStress | None] | None
 ) -> Mapping[str, InputEffect]:
-    scans, estimate, spectra, others = solution.scans, solution.estimate, None, None
+    scans = solution.scans
+    estimate = solution.estimate
+    spectra = None
+    others = None
     if alternatives is not None:
         pairs = zip(solution.owners, solution.stresses, strict=True)
         others = [alternatives[i] or stress for i, stress in pairs]

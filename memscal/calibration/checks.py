@@ -51,7 +51,8 @@ def _size(estimate: ProfileEstimate, residuals: Residuals, model: FreeModel) -> 
         pure = unexplained.pure_error_test(estimate, model)
         if pure is None:
             return []
-        outcome, noise = pure, ""
+        outcome = pure
+        noise = ""
         compared = "with the scatter of repeats, as no noise is stated: an F ratio"
     meaning = (
         f"What no radial G can explain of the scan, compared {compared}. A failure means that "
@@ -109,9 +110,11 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
         )
         return check("axisymmetry", uneven.fall, math.inf, meaning)
     extra = assumptions.symmetry_test(estimate)
-    parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
+    parity = "odd"
+    failure = ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:
-        parity, failure = "even", " by more than their sign: cross-talk of the normal stress, "
+        parity = "even"
+        failure = " by more than their sign: cross-talk of the normal stress, "
         failure += "a tilted rod, or an uneven film"
     meaning = (
         f"Fall of chi-square by {extra.count} {parity} columns, which then make up "
@@ -177,8 +180,10 @@ def _repeat_centres(solution: Solution) -> list[QualityCheck]:
 
 def _held_out(solution: Solution) -> list[QualityCheck]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
-    estimate, points = solution.estimate, solution.estimate.points
-    load, scan = assumptions.load_groups(points.load), np.array(solution.owners)[points.scan]
+    points = solution.estimate.points
+    estimate = solution.estimate
+    load = assumptions.load_groups(points.load)
+    scan = np.array(solution.owners)[points.scan]
     # Where every repeat has a load, or a scan, of its own, it is held out under that name.
     repeat = not _same(points.repeat, load) and not _same(points.repeat, scan)
     checks = [
@@ -237,7 +242,8 @@ def quality_checks(
     solution: Solution, results: Results, division: DivisionMap | None
 ) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan; ``division`` is the one by either method."""
-    estimate, model = solution.estimate, unexplained.free_model(solution.estimate)
+    model = unexplained.free_model(solution.estimate)
+    estimate = solution.estimate
     residuals = unexplained.residuals_of(estimate, model)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
@@ -284,7 +290,8 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
 
 def _constraint(solution: Solution) -> list[QualityCheck]:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
-    regulariser, estimate = solution.method, solution.estimate
+    regulariser = solution.method
+    estimate = solution.estimate
     if not (isinstance(regulariser, Bayesian) and regulariser.constrained):
         return []
     weights = estimate.weights / estimate.noise_scale**2
@@ -294,7 +301,8 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
     ]
     # As many combinations of departures as the scan determines, and as a constraint may remove.
     determined = unexplained.free_model(estimate).design.shape[1] - estimate.basis.flat
-    rise, limit = max(misfits[0] - misfits[1], 0.0), chi_square_limit(max(determined, 1))
+    rise = max(misfits[0] - misfits[1], 0.0)
+    limit = chi_square_limit(max(determined, 1))
     meaning = (
         "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
         "estimate. A failure means that the scan contradicts it: leave it out."
@@ -324,7 +332,8 @@ def _agreements(
     )
     parameters = results.parameters
     i, j = (parameters.names.index(name) for name in _WIDTHS)
-    c, (fitted, deconvolved) = parameters.covariance, parameters.values[[i, j]]
+    c = parameters.covariance
+    (fitted, deconvolved) = parameters.values[[i, j]]
     # The misfit is what is looked for: no allowance is made for it.
     variance = c[i, i] + c[j, j] - 2 * c[i, j] - results.budget[_WIDTHS[0]]["misfit"] ** 2
     # Differences below a fifth of a percent are negligible, however small their noise.
@@ -334,8 +343,10 @@ def _agreements(
 
 def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
-    estimate, deconvolution = solution.estimate, solution.deconvolution
-    a, g = deconvolution.conversion_constant, deconvolution.g
+    estimate = solution.estimate
+    deconvolution = solution.deconvolution
+    a = deconvolution.conversion_constant
+    g = deconvolution.g
     ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
     widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
@@ -369,7 +380,8 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
 
 def _set_up(solution: Solution) -> list[QualityCheck]:
     """Film, band, reach, baseline, force and outliers."""
-    estimate, resolved = solution.estimate, solution.band.resolved
+    estimate = solution.estimate
+    resolved = solution.band.resolved
     sigma = estimate.gaussian.sigma
     change = 2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal
     force = abs(carried_force(solution.stress, estimate.model.reference) - 1.0)
@@ -411,7 +423,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
 
 def _indentation(solution: Solution, results: Results) -> QualityCheck:
     """Compare the depth with the thickness: beyond the limit a linear film is formal."""
-    film, depths = solution.scan.set_up.film, []
+    film = solution.scan.set_up.film
+    depths = []
     pairs = zip(solution.scans, solution.stresses, strict=True)
     for set_up, stress in ((scan.set_up, stress) for scan, stress in pairs if scan.film):
         depth = stress.depth or press_rod(*set_up.under(LINEAR)).depth

@@ -31,13 +31,21 @@ from memscal.model.scan import Scan
 _MISFIT = 0.03
 #: A length is at fault if another value lowers chi-square by this much, in which residuals beyond
 #: so many standard deviations count linearly; values up to the last rise fit as well as the best.
-_CLEARLY, _KNEE, _AS_GOOD = 25.0, 3.0, 4.0
+_CLEARLY = 25.0
+_KNEE = 3.0
+_AS_GOOD = 4.0
 #: Factors are tried by this ratio, on so many points, until the misfit has risen by this factor.  A
 #: length is followed up if a factor leaves less than this share of the misfit.
-_RATIO, _MOST_POINTS, _RISEN, _PROMISING, _HALVINGS = 1.4, 200, 1.05, 0.9, 7
+_RATIO = 1.4
+_MOST_POINTS = 200
+_RISEN = 1.05
+_PROMISING = 0.9
+_HALVINGS = 7
 #: Lengths are scaled until the scan spans so many thicknesses of the film, and a rod until its
 #: radius is so small a share of the thickness that it acts as a point.
-_LONGEST_SPAN, _USUAL_SPAN, _THINNEST = 60.0, 8.0, 0.02
+_LONGEST_SPAN = 60.0
+_USUAL_SPAN = 8.0
+_THINNEST = 0.02
 #: Load of the rods that are tried, in N: the reference per newton does not depend on it.
 _LOAD = 1e-6
 
@@ -64,7 +72,8 @@ def diagnosed(
 
 def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     """Return the error for a sensor too narrow for its film: no stated length is at fault."""
-    model, fit = estimate.model, estimate.gaussian
+    model = estimate.model
+    fit = estimate.gaussian
     # Near zero the voltage changes with the square of the width, whose uncertainty is finite.
     slope = fit.jacobian.copy()
     slope[:, 1] = model.signal(fit.geometry, -0.5 * fit.conversion_constant * model.k**2)
@@ -131,7 +140,8 @@ class _Length:
         unit = f" ({words}?)" if words else ""
         if self.stated == 1.0:
             return f"{self.place} {limit}{factor:.3g} times as large{unit}"
-        value, stated = factor * self.stated * 1e3, self.stated * 1e3
+        value = factor * self.stated * 1e3
+        stated = self.stated * 1e3
         return f"{self.place} of {limit}{value:.3g} mm in place of {stated:.4g} mm{unit}"
 
 
@@ -182,7 +192,8 @@ class _Search:
             return None
         others = " or ".join(length.place for length in fits if not fits[length])
         beyond = f" No other value of {others} makes it fit." if others else ""
-        source, cause = self.scans[0].source, "; or with ".join(causes)
+        source = self.scans[0].source
+        cause = "; or with ".join(causes)
         return FitError(
             f"{f'{source.file_name}: the' if source else 'The'} scan is narrower than its "
             "reference, the stress at the base of the film as stated.",
@@ -213,7 +224,8 @@ class _Search:
             tried.append(self._trial(length, float(np.exp(exponent))))
             return min(tried[-1].loss(noise), 1e300)
 
-        middle, reach = np.log(tried[0].factor), np.log(_RATIO)
+        middle = np.log(tried[0].factor)
+        reach = np.log(_RATIO)
         bounds = (middle - reach, middle + reach)
         minimize_scalar(loss, bounds=bounds, options={"xatol": 5e-3, "maxiter": 15})
         return min(tried, key=lambda trial: trial.loss(noise))
@@ -223,7 +235,8 @@ class _Search:
         enough = best.loss(noise) + _AS_GOOD
         if trials[-1].loss(noise) > enough or len(trials) < length.factors.size:
             return length.scaled(best.factor)
-        near, far = 1.0, best.factor
+        near = 1.0
+        far = best.factor
         for _ in range(_HALVINGS):
             middle = float(np.sqrt(near * far))
             fits = self._trial(length, middle).loss(noise) <= enough
@@ -231,7 +244,8 @@ class _Search:
         return length.scaled(far, "at most " if far < 1 else "at least ")
 
     def _trial(self, length: _Length, factor: float) -> _Trial:
-        points, stresses = self.points, self.stresses
+        points = self.points
+        stresses = self.stresses
         if length.path == "data/x":
             points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
         else:
@@ -250,7 +264,8 @@ class _Search:
 def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
     """Return the linear rod with one length scaled, or a profile at scaled radii."""
     if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != "reference/r":
-        film, rod = stress.film, stress.indenter
+        film = stress.film
+        rod = stress.indenter
         if path == "indenter/radius":
             rod = replace(rod, radius=rod.radius * factor)
         else:

@@ -24,7 +24,8 @@ from memscal.model.arrays import FloatArray
 
 #: Draws: their standard deviation is known to 1/sqrt(2 n), 10 % for 50.  Restorations of large
 #: images take fewer, by the number of pixels, so that they take 1 to 4 s: 12 of 361 by 361.
-_MOST, _FEWEST = 50, 12
+_MOST = 50
+_FEWEST = 12
 _PIXELS = 1.6e6
 _LINEAR = (WhiteNoise, Tikhonov, Wiener, Bayesian)
 
@@ -40,15 +41,21 @@ def drawn_scatter(solution: Solution) -> DrawnScatter | None:
         return None
     count = draw_count(solution)
     rng = np.random.default_rng([0, count])
-    errors, results, failure = [], [], ""
+    errors = []
+    results = []
+    failure = ""
     method: Any = solution.method
     seeded = is_dataclass(method) and hasattr(method, "seed")
-    estimate, weighed = solution.estimate, solution.estimate.weighed
-    model, predicted, basis = estimate.model, estimate.predicted, estimate.basis
+    weighed = solution.estimate.weighed
+    estimate = solution.estimate
+    model = estimate.model
+    predicted = estimate.predicted
+    basis = estimate.basis
     for _ in range(count):
         # Noise of the voltages (n,), in V, with which the estimate moves to first order.
         error = estimate.drawn_noise(rng.standard_normal(predicted.size))
-        new_seed, change = int(rng.integers(2**32)), weighed.gain @ error
+        new_seed = int(rng.integers(2**32))
+        change = weighed.gain @ error
         drawn_model = replace(model, points=replace(model.points, u=predicted + error))
         left = error - basis.voltages(model, estimate.gaussian, change)
         drawn = replace(weighed, mean=weighed.mean + change, residual=left)

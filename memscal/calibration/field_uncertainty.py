@@ -39,7 +39,8 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 #: Windows below this have closed: what they pass of the noise's variance is no larger.
 _CLOSED = 1e-6
 #: Nodes of the posterior's errors for each Gaussian width; columns that are made at a time.
-_PER_WIDTH, _COLUMNS = 6.0, 16
+_PER_WIDTH = 6.0
+_COLUMNS = 16
 
 
 def field_errors(
@@ -52,7 +53,8 @@ def field_errors(
     from scipy.interpolate import RectBivariateSpline
 
     fields: Any = solution.fields
-    estimate, g = solution.estimate, deconvolution.g
+    estimate = solution.estimate
+    g = deconvolution.g
     inputs = np.zeros((estimate.points.u.size, 0))
     if effects:
         voltages = np.array([effect.voltage for effect in effects.values()])
@@ -85,7 +87,8 @@ def _kernels(
     radius = np.hypot.outer(y, x).ravel()
     step = min(x[1] - x[0], estimate.gaussian.sigma / _PER_WIDTH) / 2
     table = np.arange(0.0, float(radius.max()) + 4 * step, step)
-    radial, rows = estimate.basis.radial(table), max(BLOCK // x.size, 1)
+    radial = estimate.basis.radial(table)
+    rows = max(BLOCK // x.size, 1)
 
     def combined(coefficients: FloatArray) -> FloatArray:
         round_ = CubicSpline(table, radial @ coefficients)(radius)
@@ -99,13 +102,18 @@ def _kernels(
 
 
 def _of_posterior(
-    solution: Solution, deconvolution: Deconvolution, axes: tuple[FloatArray, FloatArray],
-    g: FloatArray, inputs: FloatArray,
-) -> FloatArray:  # fmt: skip
+    solution: Solution,
+    deconvolution: Deconvolution,
+    axes: tuple[FloatArray, FloatArray],
+    g: FloatArray,
+    inputs: FloatArray,
+) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by the rest of the posterior and inputs (n, q)."""
-    estimate, a = solution.estimate, deconvolution.conversion_constant
+    estimate = solution.estimate
+    a = deconvolution.conversion_constant
     kernels = _kernels(estimate, *axes)
-    gain, integrals = estimate.weighed.gain, estimate.basis.integrals
+    gain = estimate.weighed.gain
+    integrals = estimate.basis.integrals
     variances = []
     for columns in (estimate.scattered(gain), np.hstack([estimate.fixed_root, gain @ inputs])):
         changes = kernels(columns) - np.outer(g.ravel(), integrals @ columns)
@@ -143,9 +151,11 @@ class _Band:
         dy, dx = fields.central.spacing
         m, n = fields.confinement.shape
         angles = 2 * np.pi * fftfreq(m)[rows], 2 * np.pi * rfftfreq(n)[columns]
-        (x, y), index = axes, fields.index
+        (x, y) = axes
+        index = fields.index
         at = [np.rint(axis / step).astype(np.intp) for axis, step in ((y, dy), (x, dx))]
-        nodes, points = [], []
+        nodes = []
+        points = []
         for angle, offset, places in zip(angles, at, index, strict=True):
             between = np.arange(places.min(), places.max() + 1)
             nodes.append(np.exp(-1j * np.multiply.outer(angle, offset)))
@@ -209,44 +219,57 @@ class _OfParameters:
         """Divide the voltages of each kernel, and hold it against the kernel."""
         # An error of the parameters moves what was fitted around the raster and the frame that G is
         # seen in.  Where nothing was measured these cancel.
-        kernels, radius = _kernels(estimate, *axes), np.hypot.outer(*axes[::-1]).ravel()
+        kernels = _kernels(estimate, *axes)
+        radius = np.hypot.outer(*axes[::-1]).ravel()
         count = estimate.basis.integrals.size
-        lost, beside = np.empty((inside.size, count + 1)), np.empty((inside.size, count))
-        sums, of_frame = np.empty(count + 1), np.empty(count)
+        lost = np.empty((inside.size, count + 1))
+        beside = np.empty((inside.size, count))
+        sums = np.empty(count + 1)
+        of_frame = np.empty(count)
         for some in counted(_chunks(count), "kernels", count, lambda some: some.stop - some.start):
             columns = kernels(unit := np.eye(count)[:, some])
             passed = band.passed(columns)
             voltages = estimate.basis.voltages(estimate.model, estimate.gaussian, unit)
             moved = passed - divided(voltages)
-            beside[:, some], of_frame[some] = moved, taper @ moved
+            beside[:, some] = moved
+            of_frame[some] = taper @ moved
             taken = taper[:, None] * passed
             lost[:, some] = columns[inside] - taken
             sums[some] = columns.sum(axis=0) - taken.sum(axis=0)
         # The mean is the Gaussian fit and its corrections.
         mean = estimate.radial(radius) + estimate.oval_kernel(*axes).ravel()
         taken = taper * band.passed(mean[:, None])[:, 0]
-        lost[:, -1], sums[-1] = mean[inside] - taken, mean.sum() - taken.sum()
+        lost[:, -1] = mean[inside] - taken
+        sums[-1] = mean.sum() - taken.sum()
         return cls(beside, lost, of_frame, sums)
 
 
 def _divided(
-    solution: Solution, deconvolution: Deconvolution, axes: tuple[FloatArray, FloatArray],
-    g: FloatArray, inputs: FloatArray,
-) -> FloatArray:  # fmt: skip
+    solution: Solution,
+    deconvolution: Deconvolution,
+    axes: tuple[FloatArray, FloatArray],
+    g: FloatArray,
+    inputs: FloatArray,
+) -> FloatArray:
     """Variances of G (2, nodes) by noise, and by inputs (n, q) and what a division takes away."""
     fields: Any = solution.fields
-    estimate, smoothed = solution.estimate, solution.smoothed
-    grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
+    estimate = solution.estimate
+    smoothed = solution.smoothed
+    grid = fields.central
+    gain = estimate.weighed.gain
+    a = deconvolution.conversion_constant
     radius = np.hypot.outer(*axes[::-1]).ravel()
     # Nodes where G is stated.
     x, y = (np.abs(axis) <= fields.support + 3 * fields.step for axis in axes)
     inside = np.flatnonzero(np.logical_and.outer(y, x))
-    window, stress = deconvolution.quotient.window, grid.forward(fields.stress.values)
+    window = deconvolution.quotient.window
+    stress = grid.forward(fields.stress.values)
     ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
     band = _Band.of(fields, ratio, window, axes, (x, y))
     share = fields.share(smoothed)
     noise = estimate.noise**2 / estimate.outlier_weight
-    taper, g = fields.taper(radius[inside]), g.ravel()[inside]
+    taper = fields.taper(radius[inside])
+    g = g.ravel()[inside]
     index = [places - places.min() for places in fields.index]
     box = [int(places.max()) + 1 for places in index]
     node = index[0] * box[1] + index[1]
@@ -257,8 +280,10 @@ def _divided(
         return band.divided(np.reshape(planes, (-1, *box)))
 
     by = _OfParameters.of(estimate, axes, inside, taper, band, divided)
-    beside, count = by.beside, by.of_frame.size
-    own, shape = np.zeros(fields.confinement.shape), fields.confinement.shape
+    beside = by.beside
+    count = by.of_frame.size
+    own = np.zeros(fields.confinement.shape)
+    shape = fields.confinement.shape
     np.add.at(own, fields.index, share**2 * noise)
     squared = fftshift(irfft2(rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own), s=shape))
     variance = squared[np.ix_(*band.nodes)].ravel()
@@ -283,7 +308,8 @@ def _divided(
     variance = taper**2 * variance - 2 * g * with_a + g**2 * float(of_a**2 @ noise)
     rest = np.sum((changed(inputs) - np.outer(g, of_a @ inputs)) ** 2, axis=1)
     root = np.zeros((count + 1, count + 1))
-    root[:-1, :-1], root[-1, -1] = square_root(estimate.covariance), 1.0
+    root[:-1, :-1] = square_root(estimate.covariance)
+    root[-1, -1] = 1.0
     sums = grid.cell_area * band.every * (by.sums @ root)
     for some in _chunks(count + 1):
         rest += np.sum((by.lost @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)

@@ -187,7 +187,8 @@ class RasterFields:
         y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
-        reference, central = estimate.model.reference, _about_zero(grid)
+        reference = estimate.model.reference
+        central = _about_zero(grid)
         round_ = on_grid(reference.at, grid, step)
         # The lattice does not sample the edge of a source.
         stress = grid.sampled(reference.plane) if reference.source else round_
@@ -199,11 +200,13 @@ class RasterFields:
         if rows.size:
             # A point that is missing keeps what was fitted; an outlier keeps most of it.
             departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight
-            total, number = np.zeros(voltage.shape), np.zeros(voltage.shape)
+            total = np.zeros(voltage.shape)
+            number = np.zeros(voltage.shape)
             np.add.at(total, (rows, columns), departure / points.load)
             np.add.at(number, (rows, columns), 1.0)
             voltage += total / np.maximum(number, 1.0)
-        both, index = (Field(grid, voltage), Field(grid, stress)), (rows, columns)
+        both = (Field(grid, voltage), Field(grid, stress))
+        index = (rows, columns)
         return cls(grid, *both, choice.support, step, estimate.oval_kernel, index, even)
 
     @property
@@ -241,7 +244,8 @@ class RasterFields:
     def gain(self, smoothed: SmoothedProfile) -> VoltageMap:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
         # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
-        points, k = smoothed.estimate.points, smoothed.estimate.model.k
+        points = smoothed.estimate.points
+        k = smoothed.estimate.model.k
         weights = smoothed.spectrum.wavenumbers.weights
         share = self.share(smoothed)
         profiled = np.ones_like(self.voltage.values)
@@ -268,7 +272,8 @@ class RasterFields:
         fine, values = self.grid.refined(kernel, refinement)
         if profile is not None:
             values = self._lifted(profile.radial, fine)
-        inside_x, inside_y = np.abs(fine.x) <= self.support, np.abs(fine.y) <= self.support
+        inside_x = np.abs(fine.x) <= self.support
+        inside_y = np.abs(fine.y) <= self.support
         plane = values[np.ix_(inside_y, inside_x)]
         return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), plane)
 

@@ -81,7 +81,8 @@ class FilmLawComparison:
     @property
     def message(self) -> Message:
         """The Bayes factor, and what to do where it favours another law than the reference's."""
-        best, factor = self.laws[0], self.factor(self.laws[1])
+        best = self.laws[0]
+        factor = self.factor(self.laws[1])
         value = f"{factor.value:.3g}" if factor.value < 1e6 else f"{factor.value:.1e}"
         names = [law_in_words(law.law) for law in self.laws]
         text = (
@@ -133,7 +134,8 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     for law, by_law in solved.items():
         estimate = replace(by_law.estimate, weights=weights, outlier_weight=outlier)
         evidence = float(log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0])
-        a, sigma = by_law.deconvolution.conversion_constant, estimate.gaussian.sigma
+        a = by_law.deconvolution.conversion_constant
+        sigma = estimate.gaussian.sigma
         laws.append(WeighedLaw(law, evidence, a, sigma))
     ranked = sorted(laws, key=lambda law: -law.log_evidence)
     return FilmLawComparison(tuple(ranked), reference, loads, solution.scan.reading)
@@ -146,7 +148,8 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     names = [name for name in effects if name != "load" and name.rstrip("0123456789") != without]
     columns = [effects[name].voltage for name in names]
     # A balance's error may differ from load to load; repeats at one load share it.
-    signal, scan_of_points = estimate.predicted - estimate.background, estimate.points.scan
+    signal = estimate.predicted - estimate.background
+    scan_of_points = estimate.points.scan
     pairs = zip(solution.owners, solution.scans, strict=True)
     keys = [(o, s.stated_load, s.load_uncertainty) for o, s in pairs]
     for key in dict.fromkeys(keys):
@@ -180,7 +183,8 @@ class FreeThickness:
         """Prior and posterior in words, and how much the data moved the one to the other."""
         messages = []
         for prior, posterior in self.films.items():
-            u, left = prior.thickness_uncertainty or 1.0, posterior.thickness_uncertainty or 0.0
+            u = prior.thickness_uncertainty or 1.0
+            left = posterior.thickness_uncertainty or 0.0
             moved = (posterior.thickness - prior.thickness) / u
             text = (
                 f"The thickness of the film {prior.name}".rstrip() + f" is {_written(posterior)} "
@@ -204,10 +208,14 @@ def _written(film: ElasticFilm) -> str:
 
 #: A posterior this many standard uncertainties of its prior away contradicts it, and one that is
 #: as wide as this share of the prior is hardly of the scans.
-_FAR_OFF, _HARDLY = 2.0, 0.9
+_FAR_OFF = 2.0
+_HARDLY = 0.9
 #: Nodes along each thickness, of one film or two, and how far from the prior's middle they reach,
 #: in its standard uncertainties; when they are set finer, in the posterior's.
-_NODES, _REACH, _WIDTHS, _ROUNDS = (9, 7), 3.0, 4.0, 3
+_NODES = (9, 7)
+_REACH = 3.0
+_WIDTHS = 4.0
+_ROUNDS = 3
 
 
 def require_free(
@@ -217,7 +225,8 @@ def require_free(
     names = [free] if isinstance(free, str) else free
     if unknown := [name for name in names if name != THICKNESS]:
         raise InputError(f"There is no free input {unknown[0]!r}.", cure=f"Give {THICKNESS!r}.")
-    rods, laws = {scan.set_up.indenter for scan in scans}, {scan.set_up.film.law for scan in scans}
+    rods = {scan.set_up.indenter for scan in scans}
+    laws = {scan.set_up.film.law for scan in scans}
     if len(rods) < 2 and not (
         loads_differ([s.stated_load for s in scans]) and laws.isdisjoint(("", LINEAR))
     ):
@@ -246,12 +255,14 @@ def require_free(
 
 def free_thickness(solution: Solution) -> FreeThickness:
     """Estimate the thickness of each film, from its stated one as a Gaussian prior."""
-    scans, estimate = solution.scans, solution.estimate
+    scans = solution.scans
+    estimate = solution.estimate
     films = list(dict.fromkeys(scan.set_up.film for scan in scans))
     stated = np.array([film.thickness for film in films])
     u = np.array([film.thickness_uncertainty or 0.0 for film in films])
     points = [estimate.points.only(i) for i in range(len(scans))]
-    inputs, noise = _input_columns(solution, THICKNESS), estimate.noise_scale
+    inputs = _input_columns(solution, THICKNESS)
+    noise = estimate.noise_scale
     nodes = estimate.model.reference.wavenumbers
 
     def log_posterior(z: FloatArray) -> FloatArray:
@@ -264,7 +275,8 @@ def free_thickness(solution: Solution) -> FreeThickness:
 
     # Sums over a grid, which are good to 1e-2 while its step is at most twice the width of a normal
     # density; where the posterior is narrower it is made finer.
-    middle, reach = np.zeros(u.size), np.full(u.size, _REACH)
+    middle = np.zeros(u.size)
+    reach = np.full(u.size, _REACH)
     for _ in range(_ROUNDS):
         lines = np.linspace(middle - reach, middle + reach, _NODES[u.size - 1], axis=1)
         grid = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, u.size)
@@ -278,7 +290,9 @@ def free_thickness(solution: Solution) -> FreeThickness:
             break
         reach = np.minimum(reach, _WIDTHS * np.maximum(spread, half_step))
     pairs = zip(films, stated + middle * u, np.minimum(spread, 1.0) * u, strict=True)
-    return FreeThickness({
-        film: replace(film, thickness=float(h), thickness_uncertainty=float(left))
-        for film, h, left in pairs
-    })  # fmt: skip
+    return FreeThickness(
+        {
+            film: replace(film, thickness=float(h), thickness_uncertainty=float(left))
+            for film, h, left in pairs
+        }
+    )

@@ -126,11 +126,13 @@ def calibrate_many(
     if not (executor is None or callable(getattr(executor, "submit", None))):
         problem = f"The executor is a {type(executor).__name__}, which takes no tasks."
         raise InputError(problem, cure="Give a concurrent.futures.Executor, or leave it out.")
-    method, seed = options.get("method", "white-noise"), options.get("seed", 0)
+    method = options.get("method", "white-noise")
+    seed = options.get("seed", 0)
     of_calibrate = signature(calibrate).parameters
     of_method = {name: value for name, value in options.items() if name not in of_calibrate}
     chosen_method(method, of_method, seed=seed)
-    task, items = partial(_calibrated, options=options), enumerate(scans)
+    task = partial(_calibrated, options=options)
+    items = enumerate(scans)
     sized = list(items) if isinstance(scans, Sized) else items
     results = shared(task, sized, workers=cores(), executor=executor)
     return counted(results, "scans", len(sized)) if isinstance(sized, list) else results

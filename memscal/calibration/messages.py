@@ -31,7 +31,8 @@ def calibration_messages(
     solution: Solution, results: Results, checks: tuple[QualityCheck, ...]
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
-    scan, channel = solution.scan, solution.estimate.points.channel
+    scan = solution.scan
+    channel = solution.estimate.points.channel
     messages = quality.failed_check_messages(checks)
     if solution.estimate.model.order:
         text = (
@@ -62,9 +63,11 @@ def calibration_messages(
 def _centres(solution: Solution) -> list[Message]:
     if not solution.per_repeat:
         return []
-    owners, centres = np.array(solution.owners), solution.estimate.centres
+    owners = np.array(solution.owners)
+    centres = solution.estimate.centres
     apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
-    test, way = solution.apart, "as asked for (--centre per-repeat)"
+    test = solution.apart
+    way = "as asked for (--centre per-repeat)"
     if loads_differ([scan.stated_load for scan in solution.scans]):
         way = "as their loads differ, and with them the shape of the stress"
     elif test is not None:
@@ -137,7 +140,8 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     if any(scan.film is None for scan in solution.scans):
         return []
     film = solution.scan.set_up.film
-    law, changes = film.law, results.changes
+    law = film.law
+    changes = results.changes
     if law == LINEAR:
         rubbers = [scan.set_up.under(NEO_HOOKEAN) for scan in solution.scans]
         if not all(is_tabulated(*rubber) for rubber in rubbers):
@@ -206,7 +210,9 @@ _VARIED = 0.01
 
 def _unstated(solution: Solution, results: Results) -> list[Message]:
     """Return which inputs state no uncertainty, and how much hangs on those of the film."""
-    scan, film, missing = solution.scan, solution.scan.film, {}
+    film = solution.scan.film
+    scan = solution.scan
+    missing = {}
     if film is not None:
         # At a given load the stress in a linear film does not depend on its modulus.
         names = [n for n in _OF_FILM if n != "Young's modulus" or film.law not in ("", LINEAR)]

@@ -112,7 +112,8 @@ class DrawnScans:
 
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
         """Voltages without noise (n,), in V: A G convolved with the stress of the true inputs."""
-        estimate, voltages = self.solution.estimate, uncertainty.drawn_about(self.solution)
+        estimate = self.solution.estimate
+        voltages = uncertainty.drawn_about(self.solution)
         signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
         calibrated = {source for source, effect in self.effects.items() if effect.exact}
@@ -128,7 +129,8 @@ class DrawnScans:
     @cached_property
     def solved(self) -> tuple[SolvedInput, ...]:
         """Stated properties of each distinct film and rod, named as their effects are."""
-        scans, inputs = self.solution.scans, []
+        scans = self.solution.scans
+        inputs = []
         for name, component, attribute in (
             ("thickness", "film", "thickness"),
             ("poisson_ratio", "film", "poisson_ratio"),
@@ -162,7 +164,8 @@ class DrawnScans:
             for i in item.scans:
                 owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
                 true[i] = replace(true[i], **{item.component: owner})
-        references, stated = self.solution.estimate.model.references, self.solution.scans
+        references = self.solution.estimate.model.references
+        stated = self.solution.scans
         return tuple(
             replace(ref, values=(_rod(scan, ref, own) - nominal) * relative(ref.values, nominal))
             for scan, ref, own, nominal in zip(true, references, stated, self._nominal, strict=True)
@@ -170,7 +173,8 @@ class DrawnScans:
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
-        first, channel = self.solution, self.solution.estimate.points.channel
+        first = self.solution
+        channel = self.solution.estimate.points.channel
         return self._results_of(solve(scans, first.stresses, first.method, channel))
 
     def _results_of(self, solution: Solution) -> FloatArray:
@@ -198,7 +202,8 @@ def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
 _COVERAGE = 0.95
 _TAILS = ((1 - _COVERAGE) / 2, (1 + _COVERAGE) / 2)
 #: Shares of u by which the standard uncertainties may differ, and by which the mean may be off.
-_TOLERANCE, _LARGEST_SHIFT = 0.1, 0.25
+_TOLERANCE = 0.1
+_LARGEST_SHIFT = 0.25
 _NOT_LINEAR = (
     "The draws scatter by {:.2f} u, and their mean is {:+.2f} u off. The calibration is not linear "
     "in the noise or an input over its uncertainty."
@@ -346,7 +351,8 @@ def monte_carlo(
     require_count("monte_carlo", "draws", draws, 2)
     require_count("monte_carlo", "seed", seed, 0)
     require_workers(workers)
-    solution, effects = calibration.solution, calibration.effects
+    solution = calibration.solution
+    effects = calibration.effects
     model = DrawnScans(solution, effects, calibration.correlations, seed)
     rows: list[FloatArray] = []
     failures: list[str] = []
@@ -357,7 +363,8 @@ def monte_carlo(
         cure = "The scan is close to failing, too; measure with less noise."
         raise FitError(problem, why=f"The first one: {failures[0]}", cure=cure)
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
-    expected, deconvolution = uncertainty.expected_values(solution), solution.deconvolution
+    expected = uncertainty.expected_values(solution)
+    deconvolution = solution.deconvolution
     comparisons = tuple(
         _compared(calibration, name, expected[name], column)
         for name, column in zip(BUDGETED, samples.T, strict=True)
@@ -387,8 +394,10 @@ def _compared(
     column: FloatArray,
 ) -> BudgetComparison:
     """Compare the draws of a parameter, shape (m,), with its budget."""
-    parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
-    mean, spread = float(column.mean()), float(column.std(ddof=1))
+    parameters = calibration.apparatus.parameters
+    budget = calibration.apparatus.budget[name]
+    mean = float(column.mean())
+    spread = float(column.std(ddof=1))
     # Of the inputs and noise; a correlation's contribution has a sign.
     parts = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
     u = float(np.sqrt(max(parts @ np.abs(parts), 0.0)))

@@ -33,7 +33,8 @@ from memscal.model.scan import Scan
 from memscal.progress import done_with
 
 #: Whose centre is fitted: a scan's, or each repeat's.
-COMMON, PER_REPEAT = "common", "per-repeat"
+COMMON = "common"
+PER_REPEAT = "per-repeat"
 #: A shear's integral is summed out to this multiple of the scan's reach, at this many radii.
 _FAR = 2.0
 _RADII = 2001
@@ -52,7 +53,8 @@ def solve(
     # ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test. ``owners``:
     # the number of the scan that each is a part of.
     require_channel_method(channel, method)
-    owners, apart = tuple(owners or range(len(scans))), None
+    owners = tuple(owners or range(len(scans)))
+    apart = None
     if centre != PER_REPEAT:
         estimate = require_profile(scans, stresses, channel)
         apart = repeat_centres_test(estimate)
@@ -61,7 +63,9 @@ def solve(
             separate, numbers = points.scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
             estimate = require_profile(separate, of_repeats, channel)
-            scans, stresses, owners = separate, of_repeats, tuple(owners[i] for i in numbers)
+            scans = separate
+            stresses = of_repeats
+            owners = tuple(owners[i] for i in numbers)
         except MemscalError:
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:
@@ -247,7 +251,8 @@ class Solution:
     @property
     def tail_share(self) -> float:
         """Share of the voltage's integral beyond the scan's reach R; of a shear, of its modulus."""
-        spectrum, reach = self.estimate.spectrum, self.choice.support
+        spectrum = self.estimate.spectrum
+        reach = self.choice.support
         if spectrum.order:
             r = np.linspace(0.0, _FAR * reach, _RADII)
             flux = np.abs(spectrum.at(r)) * (r if spectrum.order > 0 else 1.0)
@@ -270,7 +275,8 @@ def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) 
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     """Compare a prediction with the scan, outliers at their reduced weight."""
-    residual, weight = estimate.points.u - predicted, estimate.outlier_weight
+    residual = estimate.points.u - predicted
+    weight = estimate.outlier_weight
     degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.

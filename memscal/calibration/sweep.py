@@ -47,7 +47,8 @@ class Sweep(Result):
     def __repr__(self) -> str:
         """Return the amplitudes in place of the arrays."""
         amplitudes, draws = self.seed_relative_rms.shape
-        low, high = self.amplitude.min(), self.amplitude.max()
+        low = self.amplitude.min()
+        high = self.amplitude.max()
         return f"<Sweep: {amplitudes} amplitudes from {low:g} to {high:g}, {draws} draws at each>"
 
 
@@ -57,7 +58,8 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
     require_count("sweep", "draws", draws, 1)
     # The method's own fields may be those of points that lie on no lattice: they cannot be divided.
     fields = prepare_fields(solution.estimate, solution.smoothed, solution.choice)
-    solution, seeds = replace(solution, fields=fields), range(seed, seed + draws)
+    solution = replace(solution, fields=fields)
+    seeds = range(seed, seed + draws)
     amplitude = np.logspace(-1, 1, amplitudes)
     methods: list[Regulariser] = [WhiteNoise(amplitude=a) for a in amplitude]
     methods += [WhiteNoiseDraw(amplitude=a, seed=s) for a in amplitude for s in seeds]

@@ -220,7 +220,8 @@ def propagate(
     drawn: DrawnScatter | None = None,
 ) -> Results:
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
-    estimate, radii = solution.estimate, deconvolution.g.r.size
+    estimate = solution.estimate
+    radii = deconvolution.g.r.size
     kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
     numbers = _numbers(estimate, deconvolution, kernel)
     names = tuple(numbers)
@@ -248,7 +249,8 @@ def propagate(
         together = np.hstack([columns[name] for name in effects])
         independent.append(together @ square_root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
-    count, stop = len(names), len(names) + radii
+    count = len(names)
+    stop = len(names) + radii
     stored = everything[:stop] @ everything[:stop].T
     scatter = [columns["noise"], *(independent[-1:] if effects else [])]
     return Results(
@@ -269,7 +271,8 @@ def propagate(
 
 def _of_kernel(change: FloatArray, deconvolution: Deconvolution) -> FloatArray:
     """Change of A G(r) over A, from those of the parameters, A the first, and of G."""
-    g, a = deconvolution.g.radial, deconvolution.conversion_constant
+    g = deconvolution.g.radial
+    a = deconvolution.conversion_constant
     return np.asarray(change[-g.size :] + g * (change[0] / a))
 
 
@@ -303,7 +306,9 @@ def _replace_exactly(
     same = exact.deconvolution.divided == deconvolution.divided
     other = exact.deconvolution if same else exact.other
     assert other is not None
-    r, fit, count = deconvolution.g.r, exact.estimate.gaussian, len(names)
+    r = deconvolution.g.r
+    fit = exact.estimate.gaussian
+    count = len(names)
     numbers, g = read_off(other, r)
     of_fit = {"gaussian_sigma": fit.sigma, "conversion_constant_gaussian": fit.conversion_constant}
     for name, value in (numbers | of_fit).items():
@@ -325,7 +330,8 @@ def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float]
 def expected_values(solution: Solution) -> dict[str, float]:
     """Parameters that scans about the posterior mean give on average, to first order."""
     # A division follows the noise of its scan, of which scans drawn about the mean know nothing.
-    estimate, deconvolution = solution.estimate, solution.deconvolution
+    estimate = solution.estimate
+    deconvolution = solution.deconvolution
     kernel, _ = _kernel_derivatives(solution, deconvolution, np.zeros(0))
     residual = estimate.points.u - drawn_about(solution)
     return {
@@ -364,9 +370,11 @@ def _numbers(
         value, derivatives = of_functionals["noise_equivalent_area"]
         whole = noise_area(deconvolution.g.r, deconvolution.g.radial + of_g.hidden[:, 0])
         derivatives.hidden[0, 0] = whole - value
-    hidden, gaussian = kernel.hidden.shape[1], estimate.gaussian
+    hidden = kernel.hidden.shape[1]
+    gaussian = estimate.gaussian
     # A round departure beside an ellipse would be read as less of width and ellipticity.
-    gain, count = estimate.gaussian_gain, estimate.points.ellipse
+    gain = estimate.gaussian_gain
+    count = estimate.points.ellipse
     numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1:2], hidden))}
     first = len(gain) - count
     for i, name in enumerate(_OF_GAUSSIAN[2 : 2 + count]):
@@ -390,7 +398,8 @@ def _fitted(estimate: ProfileEstimate, row: VoltageMap, hidden: int) -> _Derivat
 
 def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float, _Derivatives]]:
     """Centre, baseline and drift of each scan (of the second ``_2``), and the Gaussian's A."""
-    free, gain = estimate.points.free, estimate.weighed.gain
+    free = estimate.points.free
+    gain = estimate.weighed.gain
     entries = [(("centre", "centre_y")[axis] + _number(i), 1.0) for i, axis in np.argwhere(free)]
     for i, directions in enumerate(free):
         # The drift is stated across the whole range; its coefficient spans half of it.
@@ -416,7 +425,8 @@ def _kernel_derivatives(
     solution: Solution, deconvolution: Deconvolution, wavenumbers: FloatArray
 ) -> tuple[_Derivatives, DivisionMap | None]:
     """Derivatives of A, G at its radii and its transfer function by either route."""
-    estimate, smoothed = solution.estimate, solution.smoothed
+    estimate = solution.estimate
+    smoothed = solution.smoothed
     if not deconvolution.divided or smoothed is None:
         return _posterior_kernel(estimate, deconvolution, wavenumbers), None
     division = _division_map(solution, smoothed, deconvolution, wavenumbers)
@@ -437,8 +447,10 @@ def _posterior_kernel(
     estimate: ProfileEstimate, deconvolution: Deconvolution, wavenumbers: FloatArray
 ) -> _Derivatives:
     """Derivatives of A, G and its transfer function, by the posterior's parameters."""
-    basis, k = estimate.basis, estimate.model.k
-    a, r = deconvolution.conversion_constant, deconvolution.g.r
+    basis = estimate.basis
+    k = estimate.model.k
+    a = deconvolution.conversion_constant
+    r = deconvolution.g.r
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
@@ -471,9 +483,13 @@ def _division_map(
     deconvolution: Deconvolution,
     wavenumbers: FloatArray,
 ) -> DivisionMap:
-    estimate, fields = solution.estimate, solution.fields
-    basis, model = estimate.basis, estimate.model
-    a, r, g = deconvolution.conversion_constant, deconvolution.g.r, deconvolution.g.radial
+    estimate = solution.estimate
+    fields = solution.fields
+    basis = estimate.basis
+    model = estimate.model
+    a = deconvolution.conversion_constant
+    r = deconvolution.g.r
+    g = deconvolution.g.radial
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     reference = model.reference
     axis, window = fields.along_axis(deconvolution.quotient.window)
@@ -511,7 +527,8 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     assert divided is not None
     rings = ring_areas(divided.g.r)
     # A and G, without the transfer function.
-    direct, moved = division.direct[: 1 + rings.size], division.kept[: 1 + rings.size, 1:].copy()
+    direct = division.direct[: 1 + rings.size]
+    moved = division.kept[: 1 + rings.size, 1:].copy()
     moved[:, division.places] += direct @ division.nuisance
     noise = estimate.scattered(direct - moved @ estimate.weighed.gain)
     difference = direct @ (estimate.points.u - estimate.predicted)
@@ -538,7 +555,8 @@ def _misfit_columns(estimate: ProfileEstimate, gain: VoltageMap) -> FloatArray:
     """Changes of numbers of the Gaussian fit with the reach of its scans; mean square: sum."""
     # The sandwich of a misspecified model: White, Econometrica 50 (1982) 1; Conley, J. Econometrics
     # 92 (1999) 1.
-    points, distance = estimate.points, estimate.distance
+    points = estimate.points
+    distance = estimate.distance
     reach = np.array([distance[points.scan == i].max() for i in range(points.scans)])
     share = distance / reach[points.scan]
     inwards = np.argsort(-share)

@@ -21,7 +21,8 @@ from memscal.model.checks import OVERRIDE
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, Quantity, parameter_quantity
 
-COVERAGE_FACTOR, COVERAGE_PROBABILITY = 2.0, 0.95
+COVERAGE_FACTOR = 2.0
+COVERAGE_PROBABILITY = 0.95
 """k of every expanded uncertainty U = k u, and about what a normal distribution has within."""
 
 #: Parameters of the sensor; the others are those of one scan.
@@ -31,10 +32,12 @@ _OF_SENSOR = (
     *("ellipticity", "ellipticity_diagonal"),
 )
 SYNTHETIC = "SYNTHETIC DATA: NOTHING WAS MEASURED"
-_LEAST_OF_G, _MOST_RADII = 0.01, 12
+_LEAST_OF_G = 0.01
+_MOST_RADII = 12
 #: A value that conforms with less probability rather does not.
 _EVEN = 0.5
-_DIGITS_OF_NUMBER, _MOST_EMBEDDED = 10, 4_000_000
+_DIGITS_OF_NUMBER = 10
+_MOST_EMBEDDED = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -187,7 +190,8 @@ def _completed(
     """Return sections and equipment of the laboratory's file, with what the artifact states."""
     held = laboratory.additions(apparatus)
     sections = {name: dict(section) for name, section in laboratory.sections.items()}
-    sensor, conditions = held["sensor"], sections.setdefault("conditions", {})
+    sensor = held["sensor"]
+    conditions = sections.setdefault("conditions", {})
     names = ("name", "model", "manufacturer", "channel")
     sections["sensor"] = {name: getattr(sensor, name) for name in names}
     sections["sensor"]["serial"] = sensor.serial_number
@@ -212,8 +216,10 @@ def _completed(
 def _conformity(
     values: tuple[CertifiedValue, ...], decision: Mapping[str, Any], name: str
 ) -> list[Conformity]:
-    statements, known = [], {value.quantity.name: value for value in values}
-    factor, rule = decision.get("guard_band", 1.0), decision.get("rule")
+    statements = []
+    known = {value.quantity.name: value for value in values}
+    factor = decision.get("guard_band", 1.0)
+    rule = decision.get("rule")
     if decision and (rule is None or factor < 0):
         cure = f'Write rule = "{RULES[0]}" or "{RULES[1]}", and a guard_band that is not negative.'
         raise InputError(f"{name}: [decision] gives no decision rule.", cure=cure)

@@ -29,7 +29,8 @@ def certificate_xml(of: Certificate) -> bytes:
     for prefix, space in {**_SPACES, "xsi": "http://www.w3.org/2001/XMLSchema-instance"}.items():
         ET.register_namespace(prefix, space)
     root = ET.fromstring(_CONSTANT.read_bytes())
-    sections, process = of.sections, of.apparatus.process
+    sections = of.sections
+    process = of.apparatus.process
     begin, end = (sections["conditions"][key][:10] for key in ("start_time", "end_time"))
     t, humidity = (sections["conditions"][key] for key in ("temperature", "humidity"))
     stated = {
@@ -37,15 +38,20 @@ def certificate_xml(of: Certificate) -> bytes:
         for section in ("laboratory", "customer", "person", "sensor")
         for key in SECTIONS[section]
     } | {
-        "release": _release(__version__), "release_of_artifact": _release(process.version),
-        "number": of.number, "begin": begin, "end": end or begin, "issued": of.issued,
-        "accreditation": of.accreditation, "quality": " ".join(of.warnings) or "No check failed.",
+        "release": _release(__version__),
+        "release_of_artifact": _release(process.version),
+        "number": of.number,
+        "begin": begin,
+        "end": end or begin,
+        "issued": of.issued,
+        "accreditation": of.accreditation,
+        "quality": " ".join(of.warnings) or "No check failed.",
         "method": str(process.configuration.get("method", "not stated")),
         "temperature": _numbers(t.value - ZERO_CELSIUS),
         "temperature_expanded": _numbers(COVERAGE_FACTOR * t.uncertainty),
         "humidity": _numbers(100 * humidity.value),
         "humidity_expanded": _numbers(100 * COVERAGE_FACTOR * humidity.uncertainty),
-    }  # fmt: skip
+    }
     for element in root.iter():
         element.text = Template((element.text or "").strip()).substitute(stated)
     variable = {
@@ -191,7 +197,8 @@ def _artifact(of: Certificate) -> Tree:
 def _conformity(of: Certificate) -> list[Tree]:
     statements: list[Tree] = []
     for item in of.conformity:
-        unit, scale = item.of.quantity.unit, item.of.quantity.scale
+        unit = item.of.quantity.unit
+        scale = item.of.quantity.scale
         limits = {"Lower": item.lower, "Upper": item.upper}
         sizes = {f"{k} tolerance limit": v for k, v in limits.items() if np.isfinite(v)}
         sizes |= {"Guard band": item.guard_band}

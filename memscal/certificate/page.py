@@ -30,7 +30,8 @@ _FONTS = "'Liberation Sans', Arial, Helvetica, 'DejaVu Sans', sans-serif"
 
 def certificate_page(of: Certificate) -> str:
     """Return a certificate as a self-contained HTML page; what came from files is escaped."""
-    laboratory, person = of.sections["laboratory"], of.sections["person"]
+    laboratory = of.sections["laboratory"]
+    person = of.sections["person"]
     t, h = (of.sections["conditions"][key] for key in ("temperature", "humidity"))
     keys = ("name", "serial", "certificate", "date")
     heads = ("Instrument", "Serial number", "Certificate", "Date of certificate")
@@ -105,7 +106,9 @@ def _facts(of: Certificate) -> str:
 
 def _setting(of: Certificate) -> str:
     data = of.apparatus
-    rod, film, each = data.indenter, data.film, data.reconvolution.load
+    rod = data.indenter
+    film = data.film
+    each = data.reconvolution.load
     facts = [f"{data.reconvolution.x.size} readings ({data.reading.unit})"]
     if (loads := data.load if each is None else each) is not None:
         low, high = (f"{extreme(loads):.4g}" for extreme in (np.min, np.max))
@@ -145,7 +148,8 @@ def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> 
 
 
 def _origin(of: Certificate) -> str:
-    data, source = of.apparatus, of.apparatus.process.input_scan
+    data = of.apparatus
+    source = of.apparatus.process.input_scan
     scan = f" Scan {source.file_name}, SHA-256 {source.sha256}." if source else ""
     checks = f"Quality checks of the calibration: {state_of_checks(data.checks)}."
     return f"{checks} Artifact: content digest {data.content_digest}.{scan}"
@@ -207,7 +211,9 @@ def _conformity(of: Certificate) -> str:
         return "<p>No statement of conformity was agreed.</p>"
     rows = []
     for item in of.conformity:
-        quantity, w, p = item.of.quantity, item.guard_band, 100 * item.probability
+        quantity = item.of.quantity
+        w = item.guard_band
+        p = 100 * item.probability
         numbers = (item.of.value, item.lower, item.upper, item.lower + w, item.upper - w)
         y, *ends = _alike([number / quantity.scale for number in numbers])
         rows.append(

@@ -49,7 +49,8 @@ def command(
     accepted = {name: options[name] for name in ("override", "accept_altered")}
     data = opened_scans(scans, accept_altered=accepted["accept_altered"])
     written = options["output"] or out.beside(scans[0], ".stress.h5")
-    figures, report = options["figures"], options["report"]
+    figures = options["figures"]
+    report = options["report"]
     out.prove_writable([written, *figures, report], force=force, inputs=[artifact, *scans])
 
     from memscal.measurement.measure_stress import measure_stress

@@ -96,7 +96,8 @@ def command(
         scans = manifest_scans(source) if report.exists() else ()
         inputs = [source, *(batch.folder / scan.path for scan in scans)]
         out.prove_writable([report], force=force, inputs=inputs)
-    batch, start = batch.prepare(resume=resume), monotonic()
+    batch = batch.prepare(resume=resume)
+    start = monotonic()
     out.prove_writable([report], force=force)  # in the folder of results, too, which is there now
     total = batch.count
     try:
@@ -106,10 +107,12 @@ def command(
             out.note("The shards that are done stay: --resume does the rest.")
         raise
     errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
-    kept, seconds = sum(outcome.kept for outcome in outcomes), round(monotonic() - start, 1)
+    kept = sum(outcome.kept for outcome in outcomes)
+    seconds = round(monotonic() - start, 1)
     counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
     counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
-    page, problem = dict[Path, bytes](), None
+    page = dict[Path, bytes]()
+    problem = None
     try:
         page = {} if report is None else out.reported(read_fleet(results), report)
     except MemscalError as failure:  # is told after what the batch has done
@@ -144,7 +147,12 @@ def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Itera
             executor, most = stack.enter_context(cluster(scheduler))
         else:
             count = workers or cores()
-            executor, most = stack.enter_context(worker_pool(count)), lambda: 2 * count
+            executor = stack.enter_context(worker_pool(count))
+
+            def most() -> int:
+                return 2 * count
+
         stack.enter_context(out.working("Calibrating", rate=True))
-        size, kept = attrgetter("scans"), attrgetter("kept")
+        size = attrgetter("scans")
+        kept = attrgetter("kept")
         yield from counted(batch.run(executor, most), "scans", batch.count, size, kept)

@@ -273,7 +273,8 @@ def command(
     output = output or out.beside(scans[0], ending)
     outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
-    data, seed = _read(scans, reference, settings), settings["seed"]
+    data = _read(scans, reference, settings)
+    seed = settings["seed"]
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs, force=force, inputs=inputs)
     if dry_run:
@@ -318,7 +319,8 @@ def _read(
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
 
-    profile, accepted = settings["reference"], settings["accept_altered"]
+    profile = settings["reference"]
+    accepted = settings["accept_altered"]
     scans = list(opened_scans(paths, MOST_OF_LINES, accept_altered=accepted))
     for scan, path in zip(scans, paths, strict=True):
         require_calibration_rod(scan, profile)
@@ -357,19 +359,22 @@ def _rehearse(
     from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
-    channel, plan = settings["channel"], (settings["method"].name, outputs)
+    channel = settings["channel"]
+    plan = (settings["method"].name, outputs)
     require_channel_method(channel, settings["method"])
     law = settings["film_law"], settings["mooney_rivlin_ratio"], settings["rod_friction"]
     flags = {name: settings[name] for name in ("override", "relative")}
     references = settings["reference"], settings["alternative"]
     prepared = prepare(scans, *references, law, pixel_size=None, **flags)
     out.show_messages(override_messages(prepared.overridden))
-    separate, owners = list(prepared.scans), tuple(range(len(prepared.scans)))
+    separate = list(prepared.scans)
+    owners = tuple(range(len(prepared.scans)))
     if settings["centre"] == "per-repeat":
         separate, owners = scans_of_repeats(separate, channel)
     readings = [measured_points(scan, channel) for scan in separate]
     reference_spectra([prepared.stresses[i] for i in owners], readings)
-    stress, taken = prepared.stresses[0], prepared.scans[0]
+    stress = prepared.stresses[0]
+    taken = prepared.scans[0]
     if as_json:
         out.emit_json(rehearsal_json(stress, *plan))
     else:

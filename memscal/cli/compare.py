@@ -141,16 +141,20 @@ def command(
     from memscal.summaries.comparison import file_json, notes
 
     accepted = {"accept_altered": options["accept_altered"]}
-    apparatus, data = load_apparatus(artifact, **accepted), opened_contacts(scans, **accepted)
+    apparatus = load_apparatus(artifact, **accepted)
+    data = opened_contacts(scans, **accepted)
     references = [read_reference(path, **accepted) for path in options["references"]]
-    single, folder, interface = options["single"], options["folder"], options["interface"]
+    single = options["single"]
+    folder = options["folder"]
+    interface = options["interface"]
     named = {}
     if folder is not None:
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
     shear = options["shear"] and load_apparatus(options["shear"], **accepted)
     inputs = [artifact, *scans, *options["references"], *filter(None, [options["shear"]])]
-    figures, report = [*single, *named.values()], options["report"]
+    figures = [*single, *named.values()]
+    report = options["report"]
     outputs = [*figures, report]
     if folder is not None and not folder.is_dir():
         if folder.exists():
@@ -213,7 +217,8 @@ def _of_shear(
     from memscal.friction.compare import compare_shear
     from memscal.summaries.comparison import file_json
 
-    accepted, channel = {"accept_altered": options["accept_altered"]}, options["channel"]
+    accepted = {"accept_altered": options["accept_altered"]}
+    channel = options["channel"]
     apparatus = load_apparatus(artifact, **accepted)
     if (of_artifact := apparatus.sensor.channel) != channel:
         problem = f"The artifact {artifact} is of channel {of_artifact}, not of {channel}."

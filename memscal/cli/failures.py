@@ -17,7 +17,12 @@ from memscal.cli.output import error, message, unprinted, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
 
-DONE, CHECK_FAILED, USAGE, REFUSED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+DONE = 0
+CHECK_FAILED = 1
+USAGE = 2
+REFUSED = 3
+INTERNAL = 70
+INTERRUPTED = 130
 
 #: What standard output may answer.
 _UNPRINTED = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
@@ -77,7 +82,8 @@ def _interruptible() -> Iterator[list[int]]:
         else:
             usual(unraisable)
 
-    usual, sys.unraisablehook = sys.unraisablehook, again
+    usual = sys.unraisablehook
+    sys.unraisablehook = again
     before = _handle_ending(interrupt) if current_thread() is main_thread() else {}
     try:
         yield came

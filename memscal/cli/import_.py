@@ -235,7 +235,8 @@ def command(
     options |= {name: options[name] or None for name in ("repeat", "missing", "figures", "holds")}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
-    figures, laboratory = options["figures"] or (), options["laboratory"]
+    figures = options["figures"] or ()
+    laboratory = options["laboratory"]
     inputs = [*with_drawn_in(table), *([laboratory] if laboratory else [])]
     out.prove_writable([output, *figures], force=force, inputs=inputs)
     with together():

@@ -65,9 +65,12 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     head = ("path", "shape", "from", "to", "unit", "missing")
     shown = len(head) - all(row[-1] == "-" for row in arrays)
     yield Table("Arrays", head[:shown], [row[:shown] for row in arrays])
-    checks, failed, meanings = [], set(), []
+    checks = []
+    failed = set()
+    meanings = []
     for i, check in enumerate(contents["checks"]):
-        name, numbers = check["name"].replace("_", " "), (check["value"], check["limit"])
+        name = check["name"].replace("_", " ")
+        numbers = (check["value"], check["limit"])
         result = "passed" if check["passed"] else "FAILED"
         checks.append((name, *(_number(number, ".3g") for number in numbers), result))
         if not check["passed"]:
@@ -110,7 +113,8 @@ def _number(value: float | None, form: str) -> str:
 
 def _provenance(provenance: Mapping[str, Any]) -> Iterator[Table]:
     """Yield a table of what stands alone, then one for each group of options or versions."""
-    rows, groups = [], []
+    rows = []
+    groups = []
     for name, value in provenance.items():
         words = name.replace("_", " ")
         if isinstance(value, Mapping):

@@ -55,7 +55,10 @@ class Quantity(_Number):
         infinite: bool = False,
     ) -> None:
         self.name = self.unit = unit
-        self.low, self.high, self.open_low, self.infinite = low, high, open_low, infinite
+        self.low = low
+        self.high = high
+        self.open_low = open_low
+        self.infinite = infinite
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -241,7 +244,8 @@ def si(value: float | None, power: int) -> float | None:
 def film_from(options: Mapping[str, Any]) -> ElasticFilm:
     """Return the film that the options describe."""
     _require("The film", options, FILM)
-    law, ratio = options["film_law"] or "", options["mooney_rivlin_ratio"]
+    law = options["film_law"] or ""
+    ratio = options["mooney_rivlin_ratio"]
     if (law == FILM_LAWS[-1]) != (ratio is not None):
         raise click.UsageError(
             "--film-law mooney-rivlin and --mooney-rivlin-ratio go together: give both or neither."
@@ -294,7 +298,8 @@ kernel_options = options_of(
 
 def require_one_kernel(options: Mapping[str, Any]) -> None:
     """Refuse options that describe no kernel, or two."""
-    sigmas, weights = options["sigmas"], options["weights"]
+    sigmas = options["sigmas"]
+    weights = options["weights"]
     if options["disc_radius"] is not None:
         if weights or len(sigmas) > 1:
             raise click.UsageError(

@@ -119,7 +119,8 @@ def _to_stderr(lines: Sequence[str]) -> None:
 
 
 #: Seconds until something is shown, and between two times: on a terminal, and elsewhere in lines.
-_ON_TERMINAL, _IN_LINES = (0.7, 0.2), (10.0, 60.0)
+_ON_TERMINAL = (0.7, 0.2)
+_IN_LINES = (10.0, 60.0)
 _CLEAR = "\r\x1b[K"
 
 
@@ -134,7 +135,10 @@ def working(task: str, *, rate: bool = False) -> Iterator[None]:
 
     from memscal.progress import Progress, reporting, span
 
-    done, stream, start, counts = Event(), sys.stderr, monotonic(), [""]
+    done = Event()
+    stream = sys.stderr
+    start = monotonic()
+    counts = [""]
     terminal = stream.isatty()
     (wait, every), begin, end = (_ON_TERMINAL, _CLEAR, "") if terminal else (_IN_LINES, "", "\n")
 

@@ -71,7 +71,8 @@ def interface_of(options: Mapping[str, Any]) -> Interface:
     """Return the interface that the options describe."""
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
-    rough, exponential = options["greenwood_tripp"], options["exponential"]
+    rough = options["greenwood_tripp"]
+    exponential = options["exponential"]
     if rough and exponential:
         raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
     normal: GreenwoodTripp | ExponentialCompliance | None = None
@@ -171,7 +172,9 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
 
 def _check_usage(options: dict[str, Any]) -> None:
     """Refuse options that do not go together, and choose the film's law."""
-    loads, depths, mesh = options["loads"], options["depths"], options["mesh"]
+    loads = options["loads"]
+    depths = options["depths"]
+    mesh = options["mesh"]
     if loads and depths:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
     for name in ("output", "mesh"):
@@ -187,7 +190,8 @@ def _check_usage(options: dict[str, Any]) -> None:
 
 def _choose_law(options: dict[str, Any]) -> None:
     """Choose the film's law by --strain where it is not given."""
-    law, strain = options["film_law"], options["strain"]
+    law = options["film_law"]
+    strain = options["strain"]
     if strain == "linear":
         options |= {"film_law": "linear", "mooney_rivlin_ratio": None}
     elif strain == "finite" and law == "linear":
@@ -199,7 +203,8 @@ def _choose_law(options: dict[str, Any]) -> None:
 def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
     from memscal.mechanics.indent import indent
 
-    film, body = common.film_from(options), indenter_of(indenter, options)
+    film = common.film_from(options)
+    body = indenter_of(indenter, options)
 
     friction = options["friction"]
     if friction is None:
@@ -217,7 +222,9 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
 
 def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) -> None:
     """Write the files."""
-    output, mesh, figures = options["output"], options["mesh"], options["figures"]
+    output = options["output"]
+    mesh = options["mesh"]
+    figures = options["figures"]
     drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
@@ -240,7 +247,8 @@ def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool
     messages, warnings = depth_messages(contacts)
     if as_json:
         # A rod's contact does not depend on the loading that was asked for.
-        loading, output = options["loading"], options["output"]
+        loading = options["loading"]
+        output = options["output"]
         solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
         head = {"schema_version": "1", "output": None if output is None else str(output)}
         out.emit_json({**head, "solutions": solutions, "warnings": warnings})

@@ -57,7 +57,8 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
         options[name] for name in ("output", "expected", "figures", "report")
     )
     accepted = {"accept_altered": options["accept_altered"]}
-    apparatus, data = load_apparatus(artifact, **accepted), read_scan(scan, **accepted)
+    apparatus = load_apparatus(artifact, **accepted)
+    data = read_scan(scan, **accepted)
     stress = None if expected is None else read_reference(expected, **accepted)
     inputs = [path for path in (artifact, scan, expected) if path is not None]
     out.prove_writable([output, *figures, report], force=force, inputs=inputs)

@@ -105,7 +105,8 @@ def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
     """Wrap an image that an image-restoration routine made, with its effective window."""
     grid = problem.grid
     field = grid.from_image(image)
-    modulus, voltage = np.abs(problem.reference_spectrum), np.abs(problem.voltage_spectrum)
+    modulus = np.abs(problem.reference_spectrum)
+    voltage = np.abs(problem.voltage_spectrum)
     predicted = np.abs(grid.transfer(field)) * modulus
     # Where the reference has vanished, so has the voltage: their rounding has no window.
     relevant = modulus > _CLOSED * modulus.max()
@@ -167,7 +168,8 @@ class WhiteNoiseDraw(_Own):
         """Divide one draw; the window is that of its expectation."""
         grid = problem.grid
         rng = np.random.default_rng(self.seed)
-        noisy_u, noisy_s = grid.to_period(problem.voltage), grid.to_period(problem.reference)
+        noisy_u = grid.to_period(problem.voltage)
+        noisy_s = grid.to_period(problem.reference)
         # Noise of spectral amplitude s has, per pixel, s / (cell area * sqrt(pixels)).
         per_pixel = self.amplitude * NOISE_RATIO / (grid.cell_area * np.sqrt(noisy_u.size))
         noisy_u = noisy_u + rng.normal(0, per_pixel * problem.weakest_voltage, noisy_u.shape)
@@ -199,8 +201,10 @@ class Tikhonov(_Own):
 def _images(problem: DivisionProblem) -> tuple[FloatArray, FloatArray, float]:
     """Image of order one, point spread function of sum one, and the scale of their quotient."""
     grid = problem.grid
-    image, spread = grid.to_image(problem.voltage), grid.to_image(problem.reference)
-    peak, total = float(np.abs(image).max()), float(spread.sum())
+    image = grid.to_image(problem.voltage)
+    spread = grid.to_image(problem.reference)
+    peak = float(np.abs(image).max())
+    total = float(spread.sum())
     # u = sum(g * spread) * cell area, with image / peak and spread / total.
     return image / peak, spread / total, peak / (total * grid.cell_area)
 
@@ -267,7 +271,8 @@ class RichardsonLucy(_Own):
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by steps on the grid's own transforms: 20 times faster than scikit-image's."""
         # Periodic, where scikit-image pads with zeros: G differs by 0.5 % of its maximum.
-        grid, reference = problem.grid, problem.reference
+        grid = problem.grid
+        reference = problem.reference
         voltage = np.maximum(problem.voltage, 0.0)
         backward = np.conj(problem.reference_spectrum) / grid.integrate(reference)
         field = np.full_like(voltage, voltage.max())

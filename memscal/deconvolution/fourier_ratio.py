@@ -141,7 +141,8 @@ def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> F
     >>> float(stress.integral / (np.pi * 1e-6)).__round__(6)
     1.0
     """
-    r, profile = finite_vector("r", r), finite_vector("profile", profile)
+    r = finite_vector("r", r)
+    profile = finite_vector("profile", profile)
     if r.shape != profile.shape:
         raise InputError(f"There are {profile.size} values of the profile for {r.size} radii.")
     require_increasing("r", r)
@@ -226,7 +227,8 @@ def divide(
         weakest = (weakest, float(voltage.spectrum()[1][last]))
     for modulus in weakest:
         require_positive("weakest relevant component", modulus)
-    fields, weakest = (voltage.values, stress.values), weakest[::-1]
+    fields = (voltage.values, stress.values)
+    weakest = weakest[::-1]
     problem = DivisionProblem(voltage.grid, *fields, *weakest, transform=stress.transform)
     division = regulariser.divide(problem)
     return Quotient(voltage.grid, division.field, division.window)
@@ -293,8 +295,10 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     >>> round(1e3 * fit_gaussian(g), 4)  # mm
     0.6
     """
-    r, radial = g.r, g.radial
-    root, narrowest = np.sqrt(r), 0.5 * float(r[1] - r[0])
+    r = g.r
+    radial = g.radial
+    root = np.sqrt(r)
+    narrowest = 0.5 * float(r[1] - r[0])
     if start is None:
         start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
 
@@ -331,7 +335,8 @@ class Functional:
 
 def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     """Return the Gaussian width nearest to G, its half width and noise-equivalent area."""
-    r, g = field.r, field.radial
+    r = field.r
+    g = field.radial
     area = noise_area(r, g)
     of_noise = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
     return (_gaussian_width(r, g, sigma), _half_width(r, g), of_noise)
@@ -345,7 +350,8 @@ def noise_area(r: FloatArray, g: FloatArray) -> float:
 def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
     """Width of the Gaussian u nearest to G over the plane."""
     # Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
-    slope, step = unit_gaussian_slope(r, sigma), 1e-4 * sigma
+    slope = unit_gaussian_slope(r, sigma)
+    step = 1e-4 * sigma
     bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
     left = unit_gaussian(r, sigma) - g
     row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
@@ -371,7 +377,8 @@ def _at(r: FloatArray, place: float) -> FloatArray:
     row = np.zeros_like(r)
     i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
     share = (place - r[i]) / (r[i + 1] - r[i])
-    row[i], row[i + 1] = 1 - share, share
+    row[i] = 1 - share
+    row[i + 1] = share
     return row
 
 

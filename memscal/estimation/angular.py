@@ -34,14 +34,19 @@ from memscal.model.arrays import FloatArray
 ORDERS = (1, 2, 3, 4)
 #: In units of the Gaussian's width: blur of the rings, their distance, and where the envelope of
 #: their amplitudes falls; it is cut where it has fallen to 1e-5.
-_BLUR, _SPACING, _EXTENT, _CUT = 0.45, 0.3, 2.5, 2.2
+_BLUR = 0.45
+_SPACING = 0.3
+_EXTENT = 2.5
+_CUT = 2.2
 #: Radii of the tables, over the blur; a ring has ended so many of them farther out.
-_PER_BLUR, _BLURS = 10, 7.0
+_PER_BLUR = 10
+_BLURS = 7.0
 #: Radial departures that move no voltage by this share of its noise are not told from angular ones.
 _RESOLVED = 0.1
 #: Expected sizes of an order, over the Gaussian's L2 norm.
 _STRENGTHS = np.geomspace(0.003, 2.0, 16)
-_FIRST, _SWEEPS = 0.1, 2
+_FIRST = 0.1
+_SWEEPS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +90,16 @@ class AngularDepartures:
         """Combinations (count, c) at positions from the centre, (n,) in m: (n, c), V/Pa/m^2."""
         from scipy.interpolate import CubicSpline
 
-        rings, total = self.rings, np.zeros((x.size, coefficients.shape[1]))
+        rings = self.rings
+        total = np.zeros((x.size, coefficients.shape[1]))
         step = rings.blur / _PER_BLUR
         near = np.hypot(x, y) < rings.radius[-1] + _BLURS * rings.blur
-        r, angle = np.hypot(x[near], y[near]), np.arctan2(y[near], x[near])
+        r = np.hypot(x[near], y[near])
+        angle = np.arctan2(y[near], x[near])
         table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
         for i, of_rings in enumerate(self._by_rings(coefficients)):
-            m, turn = ORDERS[i // 2], (np.cos, np.sin)[i % 2]
+            m = ORDERS[i // 2]
+            turn = (np.cos, np.sin)[i % 2]
             profiles = rings_of_order(m, table, rings.radius, rings.blur) @ of_rings
             total[near] += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
         return np.asarray(total)
@@ -100,7 +108,8 @@ class AngularDepartures:
         self, model: ForwardModel, centres: FloatArray, coefficients: FloatArray
     ) -> FloatArray:
         """Voltages of combinations (count, c) at the points, for centres in m: (n, c), in V."""
-        count, parts = coefficients.shape[1], self._by_rings(coefficients)
+        count = coefficients.shape[1]
+        parts = self._by_rings(coefficients)
         total: FloatArray = np.zeros((model.points.u.size, count))
         for i, m in enumerate(ORDERS):
             rings = self.rings.transform(m, model.k)
@@ -135,7 +144,8 @@ def angular_departures(
     # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
     # of the rings, (n, p).
     data, flat, radial, of_rings = (values / noise for values in columns)
-    radius, width = rings.radius, rings.blur / _BLUR
+    radius = rings.radius
+    width = rings.blur / _BLUR
     size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
     plain = np.repeat([np.diag(size * a) for a in _unit_amplitudes(radius, width)], 2, axis=0)
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
@@ -167,7 +177,8 @@ def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
 def _expected_strengths(columns: FloatArray, data: FloatArray, counts: list[int]) -> FloatArray:
     """Root mean square of each order's strength over its posterior, given the others'."""
     # Beside an ellipse orders mix: its shift has one of 1 and one of 3.
-    square, along = columns.T @ columns, columns.T @ data
+    square = columns.T @ columns
+    along = columns.T @ data
     order = np.repeat(np.arange(len(counts)) // 2, counts)
     strengths = np.full(len(ORDERS), _FIRST)
 
@@ -202,7 +213,8 @@ def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
         return None
     groups = np.stack([points.scan, points.of_places("index"), points.load])
     group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
-    readings, degrees = np.bincount(group), group.size - int(group.max()) - 1
+    readings = np.bincount(group)
+    degrees = group.size - int(group.max()) - 1
     if degrees < _FEWEST_DIFFERENCES:
         return _third_difference_noise(points, residual)
     left = (residual - (np.bincount(group, residual) / readings)[group])[readings[group] > 1]

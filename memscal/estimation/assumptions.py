@@ -73,7 +73,8 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     worst = min(outcomes, key=lambda i: outcomes[i][0])
     p_value, value, degrees, rest = outcomes[worst]
     # The worst of several is worse than one: Bonferroni's correction, for any dependence.
-    p_value, share = min(folds * p_value, 1.0), FALSE_ALARM / folds
+    p_value = min(folds * p_value, 1.0)
+    share = FALSE_ALARM / folds
     limit = chdtri(degrees, share) / degrees if rest is None else fdtri(degrees, rest, 1 - share)
     return HeldOut(value, float(limit), p_value, worst, folds, alone=count <= _MOST_FOLDS)
 
@@ -83,7 +84,8 @@ def _predict(
 ) -> tuple[float, float, int, int | None] | None:
     """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
     rest = [root for i, root in roots.items() if i != out]
-    (own, own_count), joined = roots[out], np.vstack([root for root, _ in rest])
+    (own, own_count) = roots[out]
+    joined = np.vstack([root for root, _ in rest])
     count = sum(number for _, number in rest)
     # What a fold alone determines is zero in the others but for rounding.
     size = np.linalg.norm(np.vstack([joined, own])[:, :-1], axis=0)
@@ -158,10 +160,14 @@ def _without_repeats(
 
     From triangular factors: of repeats one by one, unless their noise is correlated.
     """
-    points, weights = estimate.points, estimate.weights / estimate.outlier_weight
-    repeats, alone = np.unique(points.repeat), points.decorrelation is None
+    points = estimate.points
+    weights = estimate.weights / estimate.outlier_weight
+    repeats = np.unique(points.repeat)
+    alone = points.decorrelation is None
     groups = [[i] for i in range(repeats.size)] if alone else [list(range(repeats.size))]
-    common, apart, links = [], [], []
+    common = []
+    apart = []
+    links = []
     for group in groups:
         rows = np.flatnonzero(points.repeat[model.point] == repeats[group[0]])
         rows = rows if alone else np.arange(model.point.size)
@@ -169,7 +175,8 @@ def _without_repeats(
         standard = [points.standardised(c, weights)[model.point[rows]] for c in columns]
         parts = [c[:, :2] for c in standard]
         parts += [c[:, 2:] for i, c in zip(group, standard, strict=True) if shifted[i]]
-        first, last = 2 * len(group), 2 * len(group) + int(shifted[group].sum())
+        first = 2 * len(group)
+        last = 2 * len(group) + int(shifted[group].sum())
         root = triangular(np.hstack([*parts, model.design[rows], model.data[rows, None]]))
         common.append(root[first:, last:])
         apart.append(root[last:, last:])
@@ -199,7 +206,8 @@ def departure_test(estimate: ProfileEstimate) -> tuple[float, str, float]:
     """Compare departures of any kind with the Gaussian, by their marginal likelihoods."""
     # ln of the Bayes factor, within -8.5 and 8.5, the most probable kind of departure, and its
     # share of all departures' probability.
-    prior, averaged = HYPOTHESES[0].estimate, estimate.weighed
+    prior = HYPOTHESES[0].estimate
+    averaged = estimate.weighed
     posterior = np.clip(averaged.gaussian_probability, 1e-4, 1 - 1e-4)
     factor = (1 - posterior) / posterior * prior / (1 - prior)
     kinds: dict[str, float] = {}
@@ -243,7 +251,8 @@ def hysteresis_test(
     # Columns, each approach minus retreat: of A, relative; of the centre along the scan, in m; of
     # the baseline, in V, whose step would else count as a difference of A.  It is A alone where
     # repeats have centres and baselines of their own.  ``owner`` (n,): the scan, repeats included.
-    points, model = estimate.points, estimate.model
+    points = estimate.points
+    model = estimate.model
     owner = points.scan if owner is None else owner
     sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
     for scan in np.unique(owner):
@@ -261,7 +270,8 @@ def hysteresis_test(
 
 def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
-    model, fit = estimate.model, estimate.gaussian
+    model = estimate.model
+    fit = estimate.gaussian
     width = max(fit.sigma, 0.5 * estimate.points.step)
     kernels = [gaussian_transfer(model.k, factor * width) for factor in factors]
     return model.signal(fit.geometry, np.stack(kernels, axis=1))
@@ -279,7 +289,8 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     parts.append((estimate.weighed.residual + estimate.oval)[:, None])
     # What the triangular factor has below the rows of the round columns is free of them.
     root = triangular(standardised(np.hstack(parts), weights))[round_.shape[1] :]
-    free, residual = root[:, round_.shape[1] : -1], root[:, -1]
+    free = root[:, round_.shape[1] : -1]
+    residual = root[:, -1]
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
     fall = float(residual @ free @ coefficients)
@@ -292,12 +303,15 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
 
 
 #: So many voltages at the top, equal within a share of their range, are clipped ...
-_FEWEST, _EQUAL = 3, 1e-9
+_FEWEST = 3
+_EQUAL = 1e-9
 #: ... if voltages are read this many times more finely than their noise, or if the fitted profile
 #: changes by this many times the noise among them: else they may be equal by chance or rounding.
-_FINE, _CURVED = 30.0, 3.0
+_FINE = 30.0
+_CURVED = 3.0
 #: Points are a plateau while their scatter has at least this p-value; this weight leaves them out.
-_ALIKE, _LITTLE = 1e-3, 1e-9
+_ALIKE = 1e-3
+_LITTLE = 1e-9
 #: So many points of it, and of the others, are enough.
 _ENOUGH = 10_000
 
@@ -314,7 +328,8 @@ def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
 
 def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Points of a scan that share its largest voltage to the last digit."""
-    u, noise = estimate.points.u, float(np.median(_ordinary_noise(estimate)[inside]))
+    u = estimate.points.u
+    noise = float(np.median(_ordinary_noise(estimate)[inside]))
     top: NDArray[np.bool_] = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
     finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
     curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
@@ -324,10 +339,12 @@ def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArr
 
 def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Plateau of a scan that the profile through all other points rises above."""
-    plateau, none = _plateau(estimate, inside), np.zeros_like(inside)
+    plateau = _plateau(estimate, inside)
+    none = np.zeros_like(inside)
     if plateau.sum() < _FEWEST:
         return none
-    model, points = estimate.model, estimate.points
+    model = estimate.model
+    points = estimate.points
     weights = np.where(plateau, _LITTLE, 1.0) * estimate.weights
     chosen = np.arange(plateau.size)
     if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
@@ -363,11 +380,13 @@ def _ordinary_noise(estimate: ProfileEstimate) -> FloatArray:
 def _plateau(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Points of a scan about its centre that are equal within the noise."""
     order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
-    u, noise = estimate.points.u[order], _ordinary_noise(estimate)[order]
+    u = estimate.points.u[order]
+    noise = _ordinary_noise(estimate)[order]
     plateau = np.zeros_like(inside)
     # Scatter about the mean of the first points, for every number of them.
     half = int(inside.sum()) // 2
-    weight, offset = noise[:half] ** -2, u[:half] - u[:1]
+    weight = noise[:half] ** -2
+    offset = u[:half] - u[:1]
     sums = (np.cumsum(weight * offset**power) for power in range(3))
     total, first, second = sums
     scatter = second - first**2 / total

@@ -72,19 +72,24 @@ class _Sensors:
     def of(cls, bases: Sequence[DepartureBasis], columns: FloatArray, data: FloatArray) -> _Sensors:
         """Project the weighted flat columns out of the weighted data, less a family's sensor."""
         # ``columns`` (b, n, p) and ``data`` (b, n) of b fits, whose bases have the same columns.
-        basis, fits = bases[0], len(bases)
+        basis = bases[0]
+        fits = len(bases)
         starts = np.array([block.start for block in basis.blocks[len(basis.rings) :]], np.intp)
-        flat, shape = basis.flat, (fits, 1 + starts.size, columns.shape[2])
-        start, places = np.zeros(shape), np.zeros((*shape, flat))
+        flat = basis.flat
+        shape = (fits, 1 + starts.size, columns.shape[2])
+        start = np.zeros(shape)
+        places = np.zeros((*shape, flat))
         # The first two parameters are ln A and ln(width).
         flat_ones = np.ones((fits, flat))
         flat_ones[:, :2] = [[basis.conversion_constant, basis.sigma] for basis in bases]
         places[..., range(flat), range(flat)] = flat_ones[:, None]
         each = np.arange(1, shape[1])
         start[:, each, starts] = 1.0
-        places[:, each, 1, 1], places[:, each, starts, 0] = 0.0, 1.0
+        places[:, each, 1, 1] = 0.0
+        places[:, each, starts, 0] = 1.0
         places[:, each, starts + 1, 1] = 1.0
-        values, data = columns[:, None] @ places, data[:, None] - start @ columns.swapaxes(1, 2)
+        values = columns[:, None] @ places
+        data = data[:, None] - start @ columns.swapaxes(1, 2)
         arrays = start, places, values, data
         start, places, values, data = (array.reshape(-1, *array.shape[2:]) for array in arrays)
         scale = np.linalg.norm(values, axis=1, keepdims=True)
@@ -153,7 +158,8 @@ class _Conditionals:
             np.concatenate([chosen] * len(columns)) for chosen in choice
         )
         family = family + fits * (len(sensors.start) // len(columns))
-        q, prior = sensors.q[family], strength**2
+        q = sensors.q[family]
+        prior = strength**2
         chosen = columns[fits[:, None], :, places].swapaxes(1, 2) * factors[:, None, :]
         beside = q.swapaxes(1, 2) @ chosen
         changes = -(sensors.root[family] @ beside)
@@ -177,7 +183,8 @@ class _Conditionals:
     @cached_property
     def filter(self) -> FloatArray:
         """From data to amplitudes, along the singular vectors, (h, s)."""
-        prior, variance = self.prior[:, None], self.variance[:, None]
+        prior = self.prior[:, None]
+        variance = self.variance[:, None]
         return prior * self.singular / (variance + prior * self.singular**2)
 
     @cached_property
@@ -201,7 +208,9 @@ class _Conditionals:
     def gain(self, shares: FloatArray) -> FloatArray:
         """Derivatives of the means by the weighted data, summed by shares (h,): (p, n)."""
         each = np.bincount(self.family, shares, len(self.sensors.q))
-        some, kept, factor = shares > 0, each > 0, shares[:, None] * self.filter
+        some = shares > 0
+        kept = each > 0
+        factor = shares[:, None] * self.filter
         left = self.turned[some] * factor[some, None, :], self.sensors.root[kept]
         right = self.left[some], each[kept, None, None] * self.sensors.q[kept]
         both = [np.hstack([*map(_beside, side)]) for side in (left, right)]
@@ -210,9 +219,11 @@ class _Conditionals:
     def covariance_root(self, shares: FloatArray) -> FloatArray:
         """Square root (p, c) of the sum of covariances by shares (h,)."""
         each = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
-        some, kept = shares > 0, each > 0
+        some = shares > 0
+        kept = each > 0
         # Posterior variances along the singular vectors; in all other directions the prior's.
-        prior, variance = self.prior[:, None], self.variance[:, None]
+        prior = self.prior[:, None]
+        variance = self.variance[:, None]
         left = shares[:, None] * prior * variance / (variance + prior * self.singular**2)
         parts = [
             self.sensors.root[kept] * (each[kept] ** 0.5)[:, None, None],
@@ -315,7 +326,8 @@ class WeighedFit:
         """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
         # ``integrals`` of all columns that were weighed, before any was left out.
         shares = [p * (h.kind == name) for p, h in zip(self.probability, HYPOTHESES, strict=True)]
-        total, change = float(np.sum(shares)), self.means @ integrals
+        total = float(np.sum(shares))
+        change = self.means @ integrals
         others = float((self.probability - shares) @ change) / max(1 - total, 1e-300)
         return total, float(shares @ change) / total - others if total > 0 else 0.0
 
@@ -351,7 +363,8 @@ def weighings(
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
         prior = least_noise * np.eye(size, columns.shape[2], flat - size)
         prior = np.broadcast_to(prior, (len(pairs), *prior.shape))
-        columns, data = np.hstack([columns, prior]), np.pad(data, ((0, 0), (0, size)))
+        columns = np.hstack([columns, prior])
+        data = np.pad(data, ((0, 0), (0, size)))
     noise = _Noise(effective_count + size - flat, expected_noise**2, least_noise**2)
     families = tuple(fitted.family for fitted in basis.families)
     choice = _choice(flat, tuple(ring.radius.size for ring in basis.rings), families)
@@ -385,16 +398,22 @@ class Weighing:
 
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""
-        given, added, reduced, basis = self.given, self.added, self.reduced, self.basis
+        given = self.given
+        added = self.added
+        reduced = self.reduced
+        basis = self.basis
         scatter = np.zeros(len(HYPOTHESES))
         scatter[given.number] = given.scatter
         estimate, uncertainty = (_posterior(self.log_marginals, prior) for prior in _PRIORS)
         used = given[((estimate > 0) | (uncertainty > 0))[given.number]]
-        p, q, means = estimate[used.number], uncertainty[used.number], used.means
+        p = estimate[used.number]
+        q = uncertainty[used.number]
+        means = used.means
         of_each = np.zeros((estimate.size, means.shape[1]))
         of_each[used.number] = means
         mean = p @ means
-        apart, gain = means - mean, used.gain(p)
+        apart = means - mean
+        gain = used.gain(p)
         parts = [q**0.5 * apart.T, used.covariance_root(q)]
         if added:
             pairs = zip(q, np.eye(q.size), strict=True)
@@ -402,7 +421,8 @@ class Weighing:
         root = np.hstack(parts)
         # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal).
         gain = gain + (p[:, None] * apart).T @ used.slopes
-        model, fit = reduced.model, reduced.fit
+        model = reduced.model
+        fit = reduced.fit
         return WeighedFit(
             mean=mean,
             covariance=root @ root.T,
@@ -456,7 +476,8 @@ def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasi
     used = [bool(np.diag(weighed.covariance)[block].any()) for block in blocks]
     columns = [np.arange(basis.flat)]
     columns += [np.arange(b.start, b.stop) for b, use in zip(blocks, used, strict=True) if use]
-    chosen, families = np.concatenate(columns), compress(basis.families, used[len(basis.rings) :])
+    chosen = np.concatenate(columns)
+    families = compress(basis.families, used[len(basis.rings) :])
     kept = replace(basis, rings=tuple(compress(basis.rings, used)), families=tuple(families))
     kept._tables.update({key: table[:, chosen] for key, table in basis._tables.items()})
     return kept, replace(

@@ -75,9 +75,11 @@ def _product(root: FloatArray, values: FloatArray, *, transposed: bool = False) 
     """L times columns, or L' times them."""
     if not is_banded(root):
         return np.asarray((root.T if transposed else root) @ values)
-    total, count = np.zeros_like(values), len(values)
+    total = np.zeros_like(values)
+    count = len(values)
     for i, diagonal in enumerate(root):
-        above, below = slice(0, count - i), slice(i, count)
+        above = slice(0, count - i)
+        below = slice(i, count)
         to, of = (above, below) if transposed else (below, above)
         total[to] += (diagonal[above] * values[of].T).T
     return total

@@ -114,25 +114,35 @@ class Side(NamedTuple):
 
 
 _TRANSFORMS = Side(
-    kernels.gaussian_transfer, kernels.gaussian_transfer_slope, kernels.disc_transfer,
+    kernels.gaussian_transfer,
+    kernels.gaussian_transfer_slope,
+    kernels.disc_transfer,
     Rings.transform,
-)  # fmt: skip
+)
 _PROFILES = Side(
     kernels.unit_gaussian, kernels.unit_gaussian_slope, kernels.blurred_disc, Rings.radial
 )
 
 
 def _sensors(
-    families: Sequence[Family], width: FloatArray, place: FloatArray, side: Side,
+    families: Sequence[Family],
+    width: FloatArray,
+    place: FloatArray,
+    side: Side,
     offset: FloatArray | float = 0.0,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """G of families for widths (m,), the shares off by some of their spreads: (place, m)."""
     share, spread, ratio = np.array([[f.share, f.spread, f.ratio] for f in families]).T
-    share, disc, x = share + offset * spread, ratio == 0, place[:, None]
+    share = share + offset * spread
+    disc = ratio == 0
+    x = place[:, None]
     columns = np.empty((place.size, width.size))
-    w, f = width[disc], share[disc]
+    w = width[disc]
+    f = share[disc]
     columns[:, disc] = side.disc(x, 2 * w * np.sqrt(f), w * np.sqrt(1 - f))
-    w, f, second = width[~disc], share[~disc], (ratio * width)[~disc]
+    w = width[~disc]
+    f = share[~disc]
+    second = (ratio * width)[~disc]
     columns[:, ~disc] = (1 - f) * side.gaussian(x, w) + f * side.gaussian(x, second)
     return columns
 
@@ -170,16 +180,20 @@ class ReducedScan:
         rings: AngularRings | None = None,
     ) -> ReducedScan:
         """Reduce a scan with weights (n,), with angular rings or without."""
-        points, count = model.points, fit.jacobian.shape[1]
+        points = model.points
+        count = fit.jacobian.shape[1]
         beside = [(points.u - fit.predicted)[:, None], fit.jacobian]
         beside += [rings.signal(model, fit.centre)] if rings else []
         columns, mix = model.framed(fit.geometry, beside)
-        columns, right = points.standardise(columns, weights), None
-        last, synthesis = columns.shape[1], None
+        columns = points.standardise(columns, weights)
+        right = None
+        last = columns.shape[1]
+        synthesis = None
         if mix is not None:
             columns, reduced = orthonormalised(columns)
             last -= len(mix)
-            synthesis, right = reduced[:, last:] @ mix, points.unstandardise(columns, weights)
+            synthesis = reduced[:, last:] @ mix
+            right = points.unstandardise(columns, weights)
             right = right.astype(np.float32) if len(right) > SINGLE else right
             columns = reduced
         parts = columns[:, 0], columns[:, 1 : 1 + count], columns[:, 1 + count : last]
@@ -194,7 +208,8 @@ class ReducedScan:
 
     def summed(self, share: FloatArray) -> FloatArray:
         """Factors (r,) whose products with reduced columns are sums of shares (n,) of columns."""
-        root, factor = np.sqrt(self.weights), self.model.points.decorrelation
+        root = np.sqrt(self.weights)
+        factor = self.model.points.decorrelation
         shares = share / root if factor is None else factor.correlate_adjoint(share / root)
         if self.right is None:
             return np.asarray(shares)
@@ -325,12 +340,16 @@ def departure_basis(
 #: Steps in ln(width) end below the first, are cut at the second; beyond the third factor from the
 #: Gaussian's width a family does not fit the scan.
 _FAMILY_ROUNDS = 8
-_SETTLED, _LONGEST, _FARTHEST = 1e-3, 0.3, 2.5
+_SETTLED = 1e-3
+_LONGEST = 0.3
+_FARTHEST = 2.5
 
 
 def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
     """Fit A and width of every family, centre, baseline and drift by the way."""
-    fit, k, step = reduced.fit, reduced.model.k, _RELATIVE_STEP
+    fit = reduced.fit
+    k = reduced.model.k
+    step = _RELATIVE_STEP
     others = np.linalg.qr(reduced.flat[:, 2:])[0]
 
     def free(values: FloatArray) -> FloatArray:

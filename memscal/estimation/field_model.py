@@ -21,7 +21,8 @@ from memscal.model.arrays import FloatArray
 from memscal.model.stress import StressField
 
 #: Points of the grid for each half wave of the last wavenumber, and at most for each step.
-_OVERSAMPLING, _PER_STEP = 2.0, 4.0
+_OVERSAMPLING = 2.0
+_PER_STEP = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,8 @@ class FieldModel(ForwardModel):
 
     @cached_property
     def _plane(self) -> _Plane:
-        points, last = self.points, float(self.k[-1])
+        points = self.points
+        last = float(self.k[-1])
         span = max(float(np.ptp(points.x)), float(np.ptp(points.y)))
         fields = [r.field for r in self.references if isinstance(r, FieldSpectrum)]
         wide = max((np.ptp(axis) for f in fields for axis in (f.x, f.y)), default=0.0)
@@ -84,7 +86,8 @@ class FieldModel(ForwardModel):
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
-        (spectrum,), plane = self._on_cells(kernel[None]), self._plane
+        (spectrum,) = self._on_cells(kernel[None])
+        plane = self._plane
         return np.stack([self._read(geometry, -1j * k * spectrum) for k in (plane.kx, plane.ky)])
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
@@ -96,7 +99,9 @@ class FieldModel(ForwardModel):
         self, geometry: Geometry, places: list[FloatArray]
     ) -> tuple[list[FloatArray], FloatArray]:
         """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
-        kx, ky, kernels = self._plane.kx, self._plane.ky, []
+        kx = self._plane.kx
+        ky = self._plane.ky
+        kernels = []
         for sigma, *e in places:
             e1, e2 = bounded(np.array(e))
             square = (1 + e1) * kx**2 + 2 * e2 * kx * ky + (1 - e1) * ky**2
@@ -108,7 +113,8 @@ class FieldModel(ForwardModel):
         self, m: int, cosines: FloatArray, sines: FloatArray, centres: FloatArray
     ) -> FloatArray:
         """Voltages of kernels with cos or sin of m times the angle: (n, both), in V."""
-        geometry, angle = self.geometry(centres), m * np.arctan2(self._plane.ky, self._plane.kx)
+        geometry = self.geometry(centres)
+        angle = m * np.arctan2(self._plane.ky, self._plane.kx)
         columns = [
             self._read(geometry, (-1j) ** m * turn(angle) * spectrum)
             for turn, kernels in ((np.cos, cosines), (np.sin, sines))
@@ -127,8 +133,10 @@ class FieldModel(ForwardModel):
         """Read voltages (n,) at the points for a kernel's transform on the cells."""
         from scipy.ndimage import map_coordinates
 
-        plane, places = self._plane, cast(PlaneGeometry, geometry).places
-        values, shape = np.zeros(self.points.u.size), (plane.count, plane.count)
+        plane = self._plane
+        places = cast(PlaneGeometry, geometry).places
+        values = np.zeros(self.points.u.size)
+        shape = (plane.count, plane.count)
         for scan, stress in enumerate(plane.stress):
             rows = self.points.scan == scan
             whole = np.zeros((plane.count, plane.count // 2 + 1), dtype=complex)

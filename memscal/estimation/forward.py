@@ -44,7 +44,8 @@ _MOST_WAVES = 1000
 #: In place of the order of a Bessel function: J_1(x)/x.
 TURN = -1
 #: Phase (rad) of the last wavenumber from one radius of a table to the next, and its splines.
-_TABLE_PHASE, _DEGREE = 0.25, 7
+_TABLE_PHASE = 0.25
+_DEGREE = 7
 #: Few points read a table where its last phase (rad) is less.
 _LONGEST_PHASE = 500.0
 #: Combinations of waves whose voltages are below this share of the largest one's are left out.
@@ -197,7 +198,8 @@ class ForwardModel:
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
         centre = np.atleast_2d(centres)[self.points.scan].T
-        dx, dy = self.points.x - centre[0], self.points.y - centre[1]
+        dx = self.points.x - centre[0]
+        dy = self.points.y - centre[1]
         radius = np.hypot(dx, dy)
         towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
         across = self.reference.order == ACROSS
@@ -228,21 +230,26 @@ class ForwardModel:
         groups: dict[bytes, list[int]] = {}
         for scan, measure in enumerate(measures):
             groups.setdefault(measure.tobytes(), []).append(scan)
-        strongest, table = np.abs(measures).max(axis=0), geometry.table(self.order)
+        strongest = np.abs(measures).max(axis=0)
+        table = geometry.table(self.order)
         # One radius beyond the farthest point is within the reach of its interpolation.
         farthest = geometry.radius.max() + (table.radii[1] - table.radii[0])
         inside = (table.radii >= 0) & (table.radii <= farthest)
         _, size, right = np.linalg.svd(table.values[inside] * strongest, full_matrices=False)
         size = size[size > _NOTHING * size[0]]
-        right, width = right[: size.size], size.size
+        right = right[: size.size]
+        width = size.size
         splines = table.splines @ ((strongest[:, None] * right.T) / size)
-        factor, first = self.points.load, sum(columns.shape[1] for columns in beside)
+        factor = self.points.load
+        first = sum(columns.shape[1] for columns in beside)
         if self.order:
             factor = -factor * geometry.towards[self.axis]
-        columns, mixes = np.zeros((factor.size, first + width * len(groups))), []
+        columns = np.zeros((factor.size, first + width * len(groups)))
+        mixes = []
         np.concatenate(beside, axis=1, out=columns[:, :first])
         for i, scans in enumerate(groups.values()):
-            place, ours = slice(first + i * width, first + (i + 1) * width), factor
+            place = slice(first + i * width, first + (i + 1) * width)
+            ours = factor
             if len(groups) > 1:
                 ours = np.where(np.isin(self.points.scan, scans), factor, 0.0)
             for start in range(0, factor.size, BLOCK):
@@ -276,22 +283,27 @@ class ForwardModel:
 
     def by_free_centres(self, shift: FloatArray) -> FloatArray:
         """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""
-        scan, free = self.points.scan, np.argwhere(self.points.free)
+        scan = self.points.scan
+        free = np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
     def elliptic(
         self, geometry: Geometry, places: list[FloatArray]
     ) -> tuple[list[FloatArray], FloatArray]:
         """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
-        count, radius = len(places), geometry.radius
+        count = len(places)
+        radius = geometry.radius
         toward, across = geometry.towards
         angle = np.arctan2(-across, -toward)
-        totals, (slope, turn) = np.zeros((count, radius.size)), np.zeros((2, radius.size))
+        totals = np.zeros((count, radius.size))
+        (slope, turn) = np.zeros((2, radius.size))
         for m in range(_HARMONICS):
-            kernels, tilts = np.empty((self.k.size, count)), np.empty(count)
+            kernels = np.empty((self.k.size, count))
+            tilts = np.empty(count)
             for i, (sigma, *e) in enumerate(places):
                 e1, e2 = bounded(np.array(e))
-                half, size = 0.5 * (sigma * self.k) ** 2, float(np.hypot(e1, e2))
+                half = 0.5 * (sigma * self.k) ** 2
+                size = float(np.hypot(e1, e2))
                 kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
                 tilts[i] = 0.5 * np.arctan2(e2, e1)
             profiles = (1 if m == 0 else 2) * self._summed(geometry, 2 * m, kernels)
@@ -327,7 +339,8 @@ class ForwardModel:
 
     def _summed(self, geometry: Geometry, wave: int, kernel: FloatArray) -> FloatArray:
         """Voltages by kernels, each scan through its reference: a wave summed over the nodes."""
-        load, per_newton = self.points.load, np.empty((self.points.u.size, *kernel.shape[1:]))
+        load = self.points.load
+        per_newton = np.empty((self.points.u.size, *kernel.shape[1:]))
         for rows, measure in self._measures:
             spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
             per_newton[rows] = geometry.summed(wave, spread, rows)
@@ -344,7 +357,8 @@ class ForwardModel:
 
 def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> ForwardModel:
     """Return the model of scans, in two dimensions where a reference is not round."""
-    nodes, size = references[0].wavenumbers.k.size, points.u.size
+    nodes = references[0].wavenumbers.k.size
+    size = points.u.size
     if nodes > _MOST_WAVES and size > DENSE and not points.planar:
         why = f"A source with an edge takes {nodes:,} wavenumbers, where a film takes some hundred."
         cure = "Average neighbouring readings, or give a source without an edge (gaussian:S)."
@@ -392,7 +406,8 @@ def elliptic_departure(
     """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
     e1, e2 = bounded(ellipticity)
     plane_x, plane_y = np.meshgrid(x, y)
-    round_, determinant = plane_x**2 + plane_y**2, 1 - e1**2 - e2**2
+    round_ = plane_x**2 + plane_y**2
+    determinant = 1 - e1**2 - e2**2
     form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
     scale = 1 / (2 * np.pi * sigma**2)
     elliptic = np.exp(-0.5 * form / (determinant * sigma**2)) / np.sqrt(determinant)

@@ -36,7 +36,8 @@ def gauss_newton(
     # from the residual c, ``knee``, on.
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
-    cost, halvings = np.inf, 0
+    cost = np.inf
+    halvings = 0
     for _ in range(_MOST_STEPS):
         residual, slope = linearise(place)
         stretch = np.sqrt(1 + (residual / knee) ** 2)
@@ -55,7 +56,8 @@ def gauss_newton(
         whole = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
         longest = float(np.abs(whole).max())
         step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
-        place, cost = place + step, loss
+        place = place + step
+        cost = loss
         if longest < tolerance:
             return np.asarray(place)
     return None
@@ -73,7 +75,8 @@ def _require_parity(
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
-    name, along = f"u_{points.channel}", points.channel[0]
+    name = f"u_{points.channel}"
+    along = points.channel[0]
     if float(even[1].min()) < _CLEARLY * min(right, turned):
         raise InputError(
             f"{name} is the same on both sides of the sensor.",
@@ -131,8 +134,10 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     wavenumbers = model.reference.wavenumbers
     tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)
-    data, drift = root * points.u, root[:, None] * model.drift_columns
-    best, best_cost = np.zeros(0), np.inf
+    data = root * points.u
+    drift = root[:, None] * model.drift_columns
+    best = np.zeros(0)
+    best_cost = np.inf
     odd: list[FloatArray] = []
     for sigma, table in zip(widths, tables, strict=True):
         shapes = np.interp(distances, radii, table) * (points.load * root)
@@ -170,7 +175,8 @@ def _amplitudes(
 
 def _trial_centres(model: ForwardModel) -> FloatArray:
     """At most 40 candidates per axis: the positions themselves, less the outer tenth."""
-    points, along = model.points, [np.zeros(1), np.zeros(1)]
+    points = model.points
+    along = [np.zeros(1), np.zeros(1)]
     for axis in np.flatnonzero(points.free[0]):
         unique = np.unique((points.x, points.y)[axis])
         margin = unique.size // 10
@@ -265,7 +271,8 @@ def fit_gaussian_to_points(
 
 
 def _parameters(fit: GaussianFit) -> FloatArray:
-    centres, ellipticity = fit.centre[fit.points.free], fit.ellipticity[: fit.points.ellipse]
+    centres = fit.centre[fit.points.free]
+    ellipticity = fit.ellipticity[: fit.points.ellipse]
     shape = [fit.conversion_constant, fit.sigma]
     return np.concatenate([shape, centres, fit.drift, ellipticity])
 
@@ -287,7 +294,8 @@ def _solve(
         return last[key]
 
     # Typical size of each parameter, so that the solver sees numbers near one.
-    centres, ellipse = int(model.points.free.sum()), model.points.ellipse
+    centres = int(model.points.free.sum())
+    ellipse = model.points.ellipse
     scale = np.full(start.size, np.ptp(model.points.u))
     scale[: 2 + centres] = max(abs(start[1]), 0.05 * _smoothing_length(model))
     scale[0] = abs(start[0])
@@ -310,9 +318,16 @@ def _solve(
     # At a width of zero every slope by the width is zero: steps do not leave it.
     if solution is None or solution[1] < _NARROWEST:
         result = least_squares(
-            residual, begin, slope, loss="soft_l1" if robust else "linear", f_scale=_KNEE,
-            xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100,
-        )  # fmt: skip
+            residual,
+            begin,
+            slope,
+            loss="soft_l1" if robust else "linear",
+            f_scale=_KNEE,
+            xtol=1e-10,
+            ftol=1e-12,
+            gtol=1e-10,
+            max_nfev=100,
+        )
         if not result.success:
             raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
         solution = np.asarray(result.x)
@@ -326,8 +341,10 @@ def _solve(
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
-    free, elliptic = model.points.free, model.points.ellipse
-    amplitude, sigma = float(theta[0]), float(theta[1])
+    free = model.points.free
+    elliptic = model.points.ellipse
+    amplitude = float(theta[0])
+    sigma = float(theta[1])
     centre = np.zeros(free.shape)
     centre[free] = theta[2 : 2 + free.sum()]
     drift = theta[2 + free.sum() : theta.size - elliptic]

@@ -59,7 +59,8 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
                 f"channel {scan.sensor.channel}; or correct /entry/instrument/stress_sensor.",
             )
         return scan.u_zz, scan.u_zz_errors
-    name, along = f"u_{channel}", channel[0]
+    name = f"u_{channel}"
+    along = channel[0]
     if name not in scan.channels:
         held = ", ".join(["u_zz", *scan.channels])
         raise InputError(
@@ -313,7 +314,8 @@ def _loads_of_passes(scan: Scan) -> list[tuple[float, int]]:
     loads = scan.normal_load
     if loads is None:
         return []
-    passes, stated = scan.passes, np.isfinite(loads)
+    passes = scan.passes
+    stated = np.isfinite(loads)
     numbers = np.unique(passes[stated])
     return [(float(loads[stated & (passes == n)].mean()), int(n)) for n in numbers]
 
@@ -349,7 +351,8 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
 def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
     if all(points.decorrelation is None for points in scans):
         return None
-    blocks, first = [], 0
+    blocks = []
+    first = 0
     for points in scans:
         known = points.decorrelation.blocks if points.decorrelation else ()
         blocks += [(rows + first, root) for rows, root in known]
@@ -361,7 +364,9 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> Decorrelation | None:
     """Cholesky factors of the correlation of all kept points, repeat by repeat."""
     if scan.u_zz_correlation is None:
         return None
-    size, blocks, first = len(scan.u_zz_correlation), [], 0
+    size = len(scan.u_zz_correlation)
+    blocks = []
+    first = 0
     roots: dict[bytes, FloatArray] = {}
     for measured in keep.reshape(-1, size):
         kept = np.flatnonzero(measured)
@@ -389,7 +394,8 @@ def _require_usable(points: ScanPoints) -> None:
         return
     # The median of three points does not follow a single outlier.
     ordered = np.sort(rise_of(points.x, points.y, points.u / points.load))
-    rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])
+    rise = np.median(ordered[-3:])
+    fall = -np.median(ordered[:3])
     if fall > 1.5 * rise:
         raise InputError(
             f"The voltage falls by {points.reading.text(fall * points.load.mean(), '.4g')} where "
@@ -403,7 +409,8 @@ def _require_usable(points: ScanPoints) -> None:
 def require_size(scans: Sequence[Scan]) -> None:
     """Refuse more points than a calibration takes, before it does anything."""
     raster = any(scan.planar for scan in scans)
-    size, most = sum(scan.u_zz.size for scan in scans), MOST_OF_RASTER if raster else MOST_OF_LINES
+    size = sum(scan.u_zz.size for scan in scans)
+    most = MOST_OF_RASTER if raster else MOST_OF_LINES
     if size > most:
         named = ", ".join(scan.source.file_name for scan in scans if scan.source) or "The scan"
         of = f"points {'in a plane' if raster else 'on lines'}"

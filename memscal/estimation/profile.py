@@ -73,7 +73,8 @@ class ProfileEstimate:
 
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
-        factor, noise = self.points.decorrelation, self.noise / self.outlier_weight**0.5
+        factor = self.points.decorrelation
+        noise = self.noise / self.outlier_weight**0.5
         if noise.size > DENSE:
             return square_root(numbers.covariance(noise, factor))
         scaled = noise * numbers.dense()
@@ -132,7 +133,8 @@ class ProfileEstimate:
     @property
     def centres(self) -> FloatArray:
         """Centre of the sensor in each scan, shape (scans, 2), in m, departures allowed for."""
-        corrected, free = self.gaussian.centre.copy(), self.points.free
+        corrected = self.gaussian.centre.copy()
+        free = self.points.free
         corrected[free] += self.weighed.mean[2 : 2 + free.sum()]
         return corrected
 
@@ -162,7 +164,9 @@ class ProfileEstimate:
 
     def oval_changes(self, x: FloatArray, y: FloatArray, coefficients: FloatArray) -> FloatArray:
         """What of combinations (p, c) of the posterior's kernels is not round: (y x, c)."""
-        fit, around, flat = self.gaussian, self.basis.angular, self.basis.flat
+        fit = self.gaussian
+        around = self.basis.angular
+        flat = self.basis.flat
         changes = np.zeros((y.size * x.size, coefficients.shape[1]))
         if self.points.ellipse:
             place = np.append(fit.sigma, fit.ellipticity)
@@ -170,7 +174,8 @@ class ProfileEstimate:
             oval, *moved = (
                 elliptic_departure(x, y, p[0], p[1:]).ravel() for p in (place, *(place + steps))
             )
-            end, a = fit.jacobian.shape[1], fit.conversion_constant
+            end = fit.jacobian.shape[1]
+            a = fit.conversion_constant
             changes += np.outer(oval, coefficients[0])
             for row, other, step in zip((1, end - 2, end - 1), moved, steps, strict=True):
                 changes += np.outer(a * (other - oval) / step.sum(), coefficients[row])
@@ -241,12 +246,14 @@ def estimate_profile(
     model = forward_model(points, references)
     fit = start.gaussian if start else fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
-    residual, noise = points.u - fit.predicted, _least_noise(fit)
+    residual = points.u - fit.predicted
+    noise = _least_noise(fit)
     angular = angular and points.planar and not model.order
     first = 2 * OUTLIER_THRESHOLD
     outlier = start.outlier_weight if start else _outliers(points, residual, stated, first)
     for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
-        weights, count = stated * outlier, float(outlier.sum())
+        weights = stated * outlier
+        count = float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
         done_with("Gaussian fit")
         if angular:
@@ -279,7 +286,8 @@ def _weighed(
     angular: bool,
 ) -> tuple[DepartureBasis, WeighedFit]:
     """Weigh departures from a fit for ``count`` readings and a least noise."""
-    rings, around = AngularRings.about(fit) if angular else None, None
+    rings = AngularRings.about(fit) if angular else None
+    around = None
     reduced = ReducedScan.of(model, fit, weights, rings)
     if rings:
         kernels = departure_basis(model, fit, reduced).kernels(model.k)
@@ -309,7 +317,9 @@ def log_marginal_likelihood(
     # uncertainty. It is comparable between references for the same points, weights and ``noise``.
     # ``inputs`` (n, q), in V: what one standard uncertainty of each uncertain input changes, each a
     # Gaussian of unit variance that is integrated, beside ``noise``, that of a point of weight one.
-    points, weights, volume = estimate.points, estimate.weights, 0.0
+    points = estimate.points
+    weights = estimate.weights
+    volume = 0.0
     if inputs is not None and inputs.size:
         points, volume = points.sharing(points.standardised(inputs, weights) / noise)
     model = forward_model(points, estimate.model.references)
@@ -353,7 +363,8 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     """Refuse scans that do not cross their sensor, or whose signal is lost in noise."""
     points = estimate.points
     for scan, axis in np.argwhere(points.free):
-        name, centre = "xy"[axis], estimate.centres[scan, axis]
+        name = "xy"[axis]
+        centre = estimate.centres[scan, axis]
         positions = (points.x, points.y)[axis][points.scan == scan]
         if not positions.min() - points.step <= centre <= positions.max() + points.step:
             raise CentreError(
@@ -370,7 +381,8 @@ def _require_determined(estimate: ProfileEstimate) -> None:
 
 def require_significant(estimate: ProfileEstimate, cure: str) -> None:
     """Refuse a conversion constant that is not distinct from zero, and say why."""
-    a, integrals = estimate.conversion_constant, estimate.basis.integrals
+    a = estimate.conversion_constant
+    integrals = estimate.basis.integrals
     # Rounding makes the variance of a scan without noise negative.
     uncertainty = np.sqrt(max(float(integrals @ estimate.covariance @ integrals), 0.0))
     if not a > LEAST_SIGNIFICANCE * uncertainty:
@@ -387,7 +399,8 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
 
 #: A voltage that varies by less than this many times its noise is lost in it, and a scan that ends
 #: with more than this share of its largest signal shows no baseline.
-_LEAST_RISE, _LEFT = 6.0, 0.1
+_LEAST_RISE = 6.0
+_LEFT = 0.1
 
 
 def _why_undetermined(estimate: ProfileEstimate) -> str:
@@ -400,13 +413,15 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
     signal = np.abs(estimate.predicted - estimate.background)
-    farthest, reach = int(np.argmax(estimate.distance)), float(estimate.distance.max()) * 1e3
+    farthest = int(np.argmax(estimate.distance))
+    reach = float(estimate.distance.max()) * 1e3
     if (left := signal[farthest] / signal.max()) > _LEFT:
         return (
             f"{varies}, but the scan is too short or off centre to show the baseline: {reach:.3g} "
             f"mm from the sensor's centre, where it ends, {left:.0%} of the largest signal is left."
         )
-    centres, flat = 2 + int(estimate.points.free.sum()), estimate.basis.flat
+    centres = 2 + int(estimate.points.free.sum())
+    flat = estimate.basis.flat
     everything = np.arange(len(estimate.covariance))
     blocks = {
         "the baseline: the scan is too short to show the profile's tail": everything[centres:flat],
@@ -419,7 +434,8 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
 
 def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
     """Share of the variance of A that would go if the parameters of a block were known."""
-    covariance, integrals = estimate.covariance, estimate.basis.integrals
+    covariance = estimate.covariance
+    integrals = estimate.basis.integrals
     deviation = np.sqrt(np.maximum(np.diag(covariance)[block], np.finfo(float).tiny))
     with_a = (integrals @ covariance)[block] / deviation
     correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
@@ -455,7 +471,8 @@ class PosteriorProfile:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Hankel transform of A G at ``k`` (rad/m), in V/Pa."""
-        fit, basis = self.estimate.gaussian, self.estimate.basis
+        fit = self.estimate.gaussian
+        basis = self.estimate.basis
         corrections = self.estimate.weighed.mean + self.shift
         gaussian = fit.conversion_constant * gaussian_transfer(k, fit.sigma)
         return np.asarray(gaussian + basis.kernels(k) @ corrections)
@@ -469,7 +486,8 @@ def constrained_profile(
         return PosteriorProfile(estimate, np.zeros_like(estimate.weighed.mean))
     width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
     r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
-    profile, columns = estimate.radial(r), estimate.basis.radial(r)
+    profile = estimate.radial(r)
+    columns = estimate.basis.radial(r)
     if monotone:
         # A profile that falls all the way to zero is nowhere negative.
         profile = np.append(profile[:-1] - profile[1:], profile[-1])

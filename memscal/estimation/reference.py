@@ -28,7 +28,9 @@ from memscal.progress import counted
 _LARGEST_KH = 20.0
 #: A Gaussian G of half the scan's step passes 3e-9 at this wavenumber times the step. A table's
 #: transform is looked at so many wavenumbers, and ends at this share of its largest.
-_PASSED, _WAVENUMBERS, _NOTHING = 4 * math.pi, 400, 1e-6
+_PASSED = 4 * math.pi
+_WAVENUMBERS = 400
+_NOTHING = 1e-6
 #: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
 RECTANGLE = 1 / math.sqrt(3)
 #: Rods of somewhat larger load are in the table, too, where it serves for varied inputs.
@@ -36,7 +38,8 @@ _MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
 #: A field is taken as round where less than this share of it is not, at so many wavenumbers.
-_ROUND, _SEEN = 0.005, 17
+_ROUND = 0.005
+_SEEN = 17
 
 
 def is_source(stress: BaseStress | None) -> bool:
@@ -105,7 +108,8 @@ def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
     stress = scan.reference if reference is None else reference
     if stress is None:
         return scan
-    film, rod = film_of(stress), scan.indenter or stress.indenter
+    film = film_of(stress)
+    rod = scan.indenter or stress.indenter
     if film is None or not isinstance(rod, Rod):
         return replace(scan, film=None, indenter=None, rod_friction=None)
     return replace(scan, film=scan.film or film, indenter=rod)
@@ -166,7 +170,8 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
         differences += points.stated_differences(LOAD, ("rod_friction",), rods, places)
     if law == LINEAR or (scan.load is None and scan.normal_load is None):
         return differences
-    loads, stated = (_farthest(scan, stress), stress), f"law is {law or 'not stated'}"
+    loads = (_farthest(scan, stress), stress)
+    stated = f"law is {law or 'not stated'}"
     return differences + [
         f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
         for text in points.stated_differences(LOAD, ("load",), loads, places)
@@ -195,7 +200,8 @@ def expected_spectra(
     """Move transforms of stresses that are of a film as stated to those of the expected film."""
     moved = []
     for scan, stress, reference in zip(scans, stresses, references, strict=True):
-        film, made_on = scan.film, film_of(stress)
+        film = scan.film
+        made_on = film_of(stress)
         stated = film is not None and made_on is not None and film.expected != film
         if stated and film and made_on and film.poisson_ratio == made_on.poisson_ratio:
             change = _difference(scan.set_up, reference, (scan.set_up.expected, scan.set_up))
@@ -391,7 +397,8 @@ def load_sensitivities(
     changes = [np.zeros_like(reference.values) for reference in references]
     for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
         if scan.film and scan.film.law not in ("", LINEAR) and scan.load_uncertainty:
-            set_up, u = scan.set_up.expected, scan.load_uncertainty
+            set_up = scan.set_up.expected
+            u = scan.load_uncertainty
             varied = [set_up._replace(load=load) for load in (set_up.load + u, set_up.load - u)]
             changes[i] = _difference(set_up, reference, varied) / 2
     return changes
@@ -412,8 +419,10 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
     film, rod, load, friction = set_up
     if film.law == LINEAR or (film.law and friction is not None):
         return {}
-    k, order = reference.wavenumbers.k.tobytes(), reference.order
-    rubber, end = set_up.under(NEO_HOOKEAN).film, load
+    k = reference.wavenumbers.k.tobytes()
+    order = reference.order
+    rubber = set_up.under(NEO_HOOKEAN).film
+    end = load
     if film.law and isinstance(rod, Rod):
         # A film that slides is drawn out from under the rod, and is not solved to any depth.
         end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False)) or load
@@ -431,7 +440,8 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
 
 def _difference(set_up: SetUp, reference: RadialSpectrum, varied: Sequence[SetUp]) -> FloatArray:
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
-    k, order = reference.wavenumbers.k.tobytes(), reference.order
+    k = reference.wavenumbers.k.tobytes()
+    order = reference.order
     return reference.values * _relative_difference(set_up, *varied, k, order)
 
 

@@ -32,7 +32,8 @@ from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 _SHARE_OF_NOISE = 0.1
 _CLIPPED = 4.0
 #: Columns are dependent where a singular value is below this; so many are multiplied at a time.
-_DEPENDENT, _COLUMNS = 1e-10, 8
+_DEPENDENT = 1e-10
+_COLUMNS = 8
 #: Points among which those are chosen that determine the parameters.
 _CANDIDATES = 4000
 
@@ -52,15 +53,19 @@ class FreeModel:
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
     """Linearise about the best Gaussian with all departures that can be resolved."""
     # ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
-    points, basis = estimate.points, estimate.departures
+    points = estimate.points
+    basis = estimate.departures
     ordinary = estimate.outlier_weight >= OUTLIER_WEIGHT
-    weights, u = estimate.weights / estimate.outlier_weight, points.u
+    weights = estimate.weights / estimate.outlier_weight
+    u = points.u
     if clip_outliers:
         most = _CLIPPED * estimate.noise
         u = np.where(ordinary, u, estimate.predicted + np.clip(u - estimate.predicted, -most, most))
         ordinary = np.ones_like(ordinary)
     weights = np.where(ordinary, weights, estimate.weights)
-    point, fit, model = np.flatnonzero(ordinary), estimate.gaussian, estimate.model
+    point = np.flatnonzero(ordinary)
+    fit = estimate.gaussian
+    model = estimate.model
     kernels = basis.kernels(model.k)[:, basis.flat :]
     unexplained = (u - fit.predicted)[:, None]
     beside = [unexplained, fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)]
@@ -69,7 +74,8 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         beside.append(basis.angular.combined(around))
     columns, mix = model.framed(fit.geometry, beside)
     last = columns.shape[1] - (0 if mix is None else len(mix))
-    columns, q = points.standardise(columns, weights), None
+    columns = points.standardise(columns, weights)
+    q = None
     columns[~ordinary] = 0.0
     data = columns[point, 0]
     if mix is None:
@@ -77,10 +83,12 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         rings = points.standardised(model.signal(fit.geometry, kernels), weights)[point]
     else:
         q, columns = orthonormalised(columns)
-        flat, rings = columns[:, 1:last], columns[:, last:] @ (mix @ kernels)
+        flat = columns[:, 1:last]
+        rings = columns[:, last:] @ (mix @ kernels)
     # Angular departures are no parameters: what of them stands above the noise counts.
     count = fit.jacobian.shape[1]
-    rings, flat = np.hstack([flat[:, count:], rings]), flat[:, :count]
+    rings = np.hstack([flat[:, count:], rings])
+    flat = flat[:, :count]
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
@@ -152,18 +160,21 @@ class Residuals:
 
 def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> Residuals:
     """Project a scan off all voltages that an apparatus function can make."""
-    model, points = model or free_model(estimate), estimate.points
+    model = model or free_model(estimate)
+    points = estimate.points
     runs_along_x = points.free[points.scan, 0]
     along = np.where(runs_along_x, points.x, points.y)
     across = np.where(runs_along_x, points.of_places("row"), 0)
     order = np.lexsort((along, across, points.repeat, points.scan))
     keys = np.stack([points.scan, points.repeat, across])[:, order]
     new = np.any(np.diff(keys, axis=1, prepend=keys[:, :1]) != 0, axis=0)
-    place, sequence = np.argsort(order), np.empty_like(order)
+    place = np.argsort(order)
+    sequence = np.empty_like(order)
     sequence[order] = np.cumsum(new)
     order = np.argsort(place[model.point])
     point = model.point[order]
-    basis, data = orthonormal(model.design[order]), model.data[order]
+    basis = orthonormal(model.design[order])
+    data = model.data[order]
     left_over = data - basis @ (basis.T @ data)
     return Residuals(left_over, basis, point, place[point], sequence[point], model.stated)
 
@@ -218,7 +229,8 @@ def runs_test(residuals: Residuals) -> TestOutcome:
     # 11, 1940, count runs for an unknown median).  One-sided, for too few; the p-value is discrete.
     values, rest = residuals.independent
     same_pass = np.diff(residuals.sequence[rest]) == 0
-    pairs, changes = int(same_pass.sum()), int((np.diff(values > 0) & same_pass).sum())
+    pairs = int(same_pass.sum())
+    changes = int((np.diff(values > 0) & same_pass).sum())
     # The fewest changes that chance allows.
     fewest = int(np.argmax(bdtr(np.arange(pairs + 1.0), pairs, 0.5) > FALSE_ALARM))
     share = (pairs - changes) / max(pairs, 1)
@@ -232,7 +244,8 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     # 1950, with more lags).  Normal noise of nu degrees gives it the mean S1/nu and the central
     # moments 2 S2 / nu(nu+2) and 8 S3 / nu(nu+2)(nu+4), where S1 = tr (1 - QQ')W and
     # Sp = tr [(1 - QQ')(W - S1/nu)]^p; the p-value is that of a gamma distribution (Pearson III).
-    nu, values = residuals.degrees, residuals.values
+    nu = residuals.degrees
+    values = residuals.values
     neighbours = _neighbours(residuals)
     first, second, third = _traces(neighbours, residuals.basis)
     mean = first / nu
@@ -251,7 +264,9 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
 
 def _neighbours(residuals: Residuals) -> list[FloatArray]:
     """Weights of the pairs of residuals that follow each other in one pass, by their distance."""
-    place, sequence, n = residuals.place, residuals.sequence, residuals.place.size
+    sequence = residuals.sequence
+    n = residuals.place.size
+    place = residuals.place
     apart = range(1, min(_FARTHEST, n - 1) + 1)
     return [
         0.5 * _DECAY ** (place[i:] - place[:-i]) * (sequence[i:] == sequence[:-i]) for i in apart

@@ -50,7 +50,9 @@ _ORDER = 3
 _DEGREE = 2 * _ORDER - 1
 #: Intervals of the spline: so many for each step of the scan, for each radian of the last
 #: wavenumber, and at most.
-_PER_STEP, _PER_RADIAN, _MOST_INTERVALS = 2, 2, 400
+_PER_STEP = 2
+_PER_RADIAN = 2
+_MOST_INTERVALS = 400
 #: Error of a spline, relative to the largest voltage: what it leaves of a scan without noise.
 _FLOOR_OF_NOISE = 5e-6
 #: The reference's profile counts as no less than this share of its maximum.
@@ -100,9 +102,12 @@ class SmoothedProfile:
 
 def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     """Smooth the voltages of scans about their centres; of several references, put together."""
-    points, references = estimate.points, estimate.model.references
-    predicted, weight = np.zeros(points.u.size), np.ones(points.u.size)
-    gains, groups = [], dict[bytes, list[int]]()
+    points = estimate.points
+    references = estimate.model.references
+    predicted = np.zeros(points.u.size)
+    weight = np.ones(points.u.size)
+    gains = []
+    groups = dict[bytes, list[int]]()
     for scan, reference in enumerate(references):
         groups.setdefault(reference.values.tobytes(), []).append(scan)
     signal = _round_signal(estimate)
@@ -146,7 +151,8 @@ def _fitted(
 ) -> tuple[VoltageMap, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
-    points, load = estimate.points, estimate.points.load[rows]
+    load = estimate.points.load[rows]
+    points = estimate.points
     y = signal / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
     if reference.source:
@@ -154,7 +160,8 @@ def _fitted(
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
         reference = replace(reference, values=reference.values * blurred)
     spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
-    weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
+    weight = np.ones_like(y)
+    threshold = 2 * OUTLIER_THRESHOLD
     for rounds_left in range(_ROUNDS - 1, -1, -1):
         fitted = spline.fit(y, stated * weight)
         left = (y - fitted.predicted) * np.sqrt(stated / np.clip(fitted.freedom, _LEAST_FREEDOM, 1))
@@ -238,7 +245,10 @@ def _by_intervals(weighted: csr_array, interval: NDArray[np.intp]) -> tuple[csr_
 
     order = np.argsort(interval, kind="stable")
     ends = np.flatnonzero(np.diff(interval[order], append=-1)) + 1
-    roots, parts, width, first = [], [], 0, 0
+    roots = []
+    parts = []
+    width = 0
+    first = 0
     for end in ends.tolist():
         rows = order[first:end]
         block = weighted[rows]
@@ -249,7 +259,8 @@ def _by_intervals(weighted: csr_array, interval: NDArray[np.intp]) -> tuple[csr_
         roots.append(whole)
         places = np.broadcast_to(width + np.arange(len(r)), q.shape)
         parts.append((q.ravel(), np.repeat(rows, len(r)), places.ravel()))
-        width, first = width + len(r), end
+        width = width + len(r)
+        first = end
     data, where, places = (np.concatenate(values) for values in zip(*parts, strict=True))
     orthonormal = csr_array((data, (where, places)), shape=(interval.size, width))
     return orthonormal, np.vstack(roots)
@@ -263,7 +274,8 @@ def _leverage(cells: csr_array, hat: FloatArray) -> FloatArray:
     for count in np.unique(counts):
         rows = np.flatnonzero(counts == count)
         inside = cells.indptr[rows][:, None] + np.arange(count)
-        places, values = cells.indices[inside], cells.data[inside]
+        places = cells.indices[inside]
+        values = cells.data[inside]
         for start in range(0, rows.size, BLOCK):
             block = slice(start, start + BLOCK)
             at = places[block]
@@ -276,7 +288,8 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
     """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
     # ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
     # the voltages along their vectors; ``total``: sum of the squares of all ``count``.
-    squares, power = values**2 / values[0] ** 2, data**2
+    squares = values**2 / values[0] ** 2
+    power = data**2
 
     def ratios(logarithms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         ratio = squares / np.exp(logarithms)[:, None]
@@ -315,7 +328,8 @@ def _layout(
     basis = _even_splines(knots)
     nodes, weights = gauss_between(knots, _NODES)
     stress = reference.at(np.append(nodes, [0.0, reach]))
-    peak, end = stress[-2], stress[-1]
+    peak = stress[-2]
+    end = stress[-1]
     slope = -float((of_k * k * per_newton) @ j1(k * reach))
     # At R a spline has the logarithmic slope of the tail, which goes on from there.
     ending = basis(np.array([reach]), 0).toarray()
@@ -346,7 +360,8 @@ def _even_splines(knots: FloatArray) -> Splines:
     outside = (knots[1] - knots[0]) * np.arange(_DEGREE, 0, -1)
     extended = np.concatenate([both[0] - outside, both, both[-1] + outside[::-1]])
     count = extended.size - _DEGREE - 1
-    spline, middle = BSpline(extended, np.eye(count), _DEGREE), count // 2
+    spline = BSpline(extended, np.eye(count), _DEGREE)
+    middle = count // 2
     # The even half of them: each spline with its mirror image.
     upper = eye_array(count - middle).tocsr()
     folding = vstack([upper[count % 2 :][::-1], upper]).tocsr()
@@ -384,9 +399,11 @@ class Band:
 
 def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Band:
     """Find the band of a scan, of a tangential channel (nothing to divide) by its estimate."""
-    k, yardstick = estimate.model.k, gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
+    yardstick = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
+    k = estimate.model.k
     reference = np.abs(estimate.model.reference.values)
-    error, clear = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny), RELEVANT
+    error = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny)
+    clear = RELEVANT
     if smoothed is None:
         signal = np.abs(estimate.spectrum.values)
         noise = error * estimate.conversion_constant * reference
@@ -394,9 +411,11 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
         # Of all points of a raster the noise is equal at all wavenumbers.
         share = points.cell / points.of_places("readings") * estimate.outlier_weight
         noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
-        signal, clear = np.abs(smoothed.spectrum.values), RELEVANT_OF_RASTER
+        signal = np.abs(smoothed.spectrum.values)
+        clear = RELEVANT_OF_RASTER
     else:
-        signal, noise = np.abs(smoothed.spectrum.values), smoothed.noise
+        signal = np.abs(smoothed.spectrum.values)
+        noise = smoothed.noise
     noise = np.maximum(noise, np.finfo(float).tiny)
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
     sampled = np.pi / estimate.points.step
@@ -411,7 +430,8 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
 
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     """Posterior standard uncertainty of K(k)/K(0) at the nodes, K = A G; the reference is exact."""
-    basis, a = estimate.basis, estimate.conversion_constant
+    basis = estimate.basis
+    a = estimate.conversion_constant
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
@@ -423,5 +443,6 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
     i = int(np.flatnonzero(ratio >= threshold).max(initial=-1)) + 1
     if i in (0, k.size):
         return float(k[max(i - 1, 0)])
-    upper, lower = np.log(ratio[i - 1]), np.log(max(ratio[i], np.finfo(float).tiny))
+    upper = np.log(ratio[i - 1])
+    lower = np.log(max(ratio[i], np.finfo(float).tiny))
     return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))

@@ -83,7 +83,8 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     samples = transfer.modulus, EXPANDED * transfer.modulus_errors, transfer.window
     modulus, band, window = style.on_axis(transfer.k, np.stack(samples), k * PER_MM)
     blue = COLOURS["deconvolved"]
-    low, high = np.maximum(modulus - band, 0.0), modulus + band
+    low = np.maximum(modulus - band, 0.0)
+    high = modulus + band
     axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
     axes.plot(k, np.maximum(modulus, 0.0), "-", color=blue, label="modulus for G")
     gaussian = np.exp(-0.5 * (data.gaussian_sigma * k * PER_MM) ** 2)
@@ -102,7 +103,8 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
 
 def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
     """Draw G with its band and the Gaussian, above a floor, to where they have died away."""
-    radial, blue = data.radial_profile, COLOURS["deconvolved"]
+    radial = data.radial_profile
+    blue = COLOURS["deconvolved"]
     end = _shown_radius(radial)
     r = np.linspace(0.0, end, _FINE)
     g, band = style.on_axis(radial.r, np.stack([radial.g, EXPANDED * radial.g_errors]), r)
@@ -140,19 +142,25 @@ _DOTS = 5e3  # area of all points that lie on no lattice, in square points: half
 
 def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: Loads) -> list[Axes]:
     """Draw voltage and residual of each load in a row, and G beside the first."""
-    shown, indices, unit = loads[:_MOST_MAPS], channel_indices(data), data.reading
-    grid, panels = place.subgridspec(len(shown), 3), list[Axes]()
+    shown = loads[:_MOST_MAPS]
+    indices = channel_indices(data)
+    unit = data.reading
+    grid = place.subgridspec(len(shown), 3)
+    panels = list[Axes]()
     for row, (load, part) in enumerate(shown):
-        scan, background = part.reconvolution, np.asarray(part.reconvolution.background)
+        scan = part.reconvolution
+        background = np.asarray(part.reconvolution.background)
         # An outlier does not stretch the colours of the other voltages.
         measured, predicted = (
             (u - background) / unit.scale for u in (scan.u_zz, scan.u_zz_predicted)
         )
         z, _, scale = standardised(scan)
-        for i, (values, span, colours, label) in enumerate((
-            (measured, predicted, "viridis", f"$U_{{{indices}}}$ less baseline ({unit.unit})"),
-            (z, _RESIDUALS, "RdBu_r", f"residual / {scale}"),
-        )):  # fmt: skip
+        for i, (values, span, colours, label) in enumerate(
+            (
+                (measured, predicted, "viridis", f"$U_{{{indices}}}$ less baseline ({unit.unit})"),
+                (z, _RESIDUALS, "RdBu_r", f"residual / {scale}"),
+            )
+        ):
             axes = figure.add_subplot(grid[row, i], label=f"{('voltage', 'residual')[i]} map")
             options = {"vmin": np.min(span), "vmax": np.max(span), "rasterized": True}
             _finish(axes, _draw_points(axes, scan, values, cmap=colours, **options), label)
@@ -172,7 +180,8 @@ def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: Lo
 
 def _draw_points(axes: Axes, scan: Reconvolution, values: Any, **options: Any) -> ScalarMappable:
     """Draw values at the points of a raster; on a lattice nodes that are missing are grey."""
-    x, y = np.asarray(scan.offset_x), np.asarray(scan.offset_y)
+    x = np.asarray(scan.offset_x)
+    y = np.asarray(scan.offset_y)
     lattice = even_lattice(x, y, x.size)
     if lattice is None:
         return axes.scatter(x / MM, y / MM, _DOTS / x.size, values, lw=0, **options)
@@ -194,7 +203,8 @@ _PANELS_HEIGHT = 8.2
 _LINE_HEIGHT = 0.155
 _LINE_WIDTH = 122
 _MAX_FAILED_LINES = 12
-_MOST_MAPS, _MAP_HEIGHT = 4, 2.2
+_MOST_MAPS = 4
+_MAP_HEIGHT = 2.2
 _MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
@@ -211,7 +221,8 @@ def calibration_figure(result: Calibrated) -> Figure:
         }
         data = replace(data, reconvolution=Reconvolution(**columns))
         loads = points_by_load(data)
-    apart, mapped = min(len(loads), MOST_PANELS), min(len(loads), _MOST_MAPS)
+    apart = min(len(loads), MOST_PANELS)
+    mapped = min(len(loads), _MOST_MAPS)
     mapped *= data.reconvolution.offset_x is not None
     with style.house_style():
         heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(apart - 3, 0)]
@@ -266,7 +277,8 @@ def _text_lines(data: ApparatusData, loads: Loads) -> list[tuple[str, str, str]]
     name, _, channel = sensor_title(data).rpartition(", channel ")
     name = textwrap.shorten(name, 82, placeholder=" …")
     title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
-    film, rod = data.film, data.indenter
+    film = data.film
+    rod = data.indenter
     load = f", {data.load:.3g} N; " if data.load else "; "
     if len(loads) > 1:
         load = f", {loads[0][0]} to {loads[-1][0]}; "

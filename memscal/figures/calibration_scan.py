@@ -63,7 +63,8 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         _draw_net(axes, part, look, "_" * (i >= MOST_PANELS or not load) + load)
         for i, ((load, part), look) in enumerate(zip(loads, looks, strict=True))
     ]
-    low, high = np.nanmin([r[0] for r in ranges]), np.nanmax([r[1] for r in ranges])
+    low = np.nanmin([r[0] for r in ranges])
+    high = np.nanmax([r[1] for r in ranges])
     if np.isfinite([low, high]).all():
         axes.set_ylim(0.5 * low / data.reading.scale, 2.0 * high / data.reading.scale)
     _draw_indenter(axes, data)
@@ -107,7 +108,9 @@ def _draw_net(axes: Axes, data: ApparatusData, look: _Look, label: str) -> tuple
 
 def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, label: str) -> None:
     """Draw voltages (V) at the scan's points, with their expanded uncertainties."""
-    x, scale, (colour, marker) = data.reconvolution.x, data.reading.scale, look
+    x = data.reconvolution.x
+    scale = data.reading.scale
+    (colour, marker) = look
     size = style.marker_size(x.size)
     if x.size > style.SCATTER_THRESHOLD:
         (points,) = axes.plot(x / MM, u / scale, ".", color=colour, ms=1.5, mew=0)
@@ -115,9 +118,19 @@ def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, 
         return
     errors = EXPANDED * _finite_errors(data.reconvolution.u_zz_errors)
     axes.errorbar(
-        x / MM, u / scale, errors / scale, fmt=marker, ms=size, mfc="white", mew=0.7, color=colour,
-        elinewidth=0.7, capsize=1.5 if x.size <= 100 else 0, zorder=2, label=label,
-    )  # fmt: skip
+        x / MM,
+        u / scale,
+        errors / scale,
+        fmt=marker,
+        ms=size,
+        mfc="white",
+        mew=0.7,
+        color=colour,
+        elinewidth=0.7,
+        capsize=1.5 if x.size <= 100 else 0,
+        zorder=2,
+        label=label,
+    )
 
 
 def _looks(loads: Loads, alone: str) -> list[_Look]:
@@ -172,7 +185,8 @@ def _aligned(data: ApparatusData) -> bool:
 
 def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> float:
     """Draw baseline + A sigma_zz about the centre (``net``: only the latter); return its peak."""
-    reference, constant = data.reference, data.conversion_constant
+    reference = data.reference
+    constant = data.conversion_constant
     stress = _seen_stress(data)
     if not (np.isfinite(constant) and constant > 0) or stress is None:
         return 0.0
@@ -215,7 +229,8 @@ def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     """Draw the rod's diameter (or the sphere's contact) as the paper's black patch."""
-    rod, radius = isinstance(data.indenter, Rod), data.reference.contact_radius
+    rod = isinstance(data.indenter, Rod)
+    radius = data.reference.contact_radius
     form, radius = ("rod", data.indenter.radius) if rod and data.indenter else ("contact", radius)
     if radius is None:
         return
@@ -229,7 +244,8 @@ def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
     """Add the right-hand axis (U - baseline)/A in kPa; without a positive A there is none."""
     if not (np.isfinite(constant := data.conversion_constant) and constant > 0):
         return
-    unit, shown = data.reading, {"Pa": "kPa"}.get(data.reading.per, data.reading.per)
+    unit = data.reading
+    shown = {"Pa": "kPa"}.get(data.reading.per, data.reading.per)
     per_mv = unit.scale / constant / (KPA if shown == "kPa" else 1.0)
     offset = baseline / unit.scale
     both_ways = (lambda u: (u - offset) * per_mv, lambda stress: stress / per_mv + offset)
@@ -265,7 +281,8 @@ def _baseline(data: ApparatusData) -> float:
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     """Return baseline and drift, its change from end to end, at positions x, in V."""
-    along, stated = data.reconvolution.x, data.reconvolution.background
+    along = data.reconvolution.x
+    stated = data.reconvolution.background
     if stated is not None:
         # Elsewhere than at the points: of a raster or several scans a line through all of them.
         return stated if x is along else np.polynomial.Polynomial.fit(along, stated, 1)(x)
@@ -282,7 +299,8 @@ def _finite_errors(errors: FloatArray) -> FloatArray:
 
 def limit_to_scan(axes: Axes, x: FloatArray) -> None:
     """Show the positions (m) of the scan, whatever the reference reaches."""
-    low, high = float(np.min(x)), float(np.max(x))
+    low = float(np.min(x))
+    high = float(np.max(x))
     margin = 0.03 * (high - low) or MM
     axes.set_xlim((low - margin) / MM, (high + margin) / MM)
 
@@ -295,7 +313,8 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     looks = _looks(loads, COLOURS["deconvolved"])
     for i, ((load, part), (colour, marker)) in enumerate(zip(loads, looks, strict=True)):
         name = "_" * (i >= MOST_PANELS) + (load or "G")
-        place, z = part.reconvolution.x, standardised(part.reconvolution)[0]
+        place = part.reconvolution.x
+        z = standardised(part.reconvolution)[0]
         series.append((name, place, z, colour, marker, colour))
     # One outlier cannot stretch the axis.
     sizes = np.abs([with_g, with_gaussian])
@@ -322,17 +341,20 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
 
 def standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
     """Residuals with G and with the Gaussian over their standard uncertainty, and its symbol."""
-    errors, scale = scan.u_zz_errors, "$u$"
+    errors = scan.u_zz_errors
+    scale = "$u$"
     if not np.all(np.isfinite(errors) & (errors > 0)):
         # Without a stated uncertainty residuals are shown over their own rms.
         rms = float(np.sqrt(np.mean(scan.residual**2)))
-        errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
+        errors = np.full(errors.shape, rms if rms > 0 else 1.0)
+        scale = "own rms"
     return scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors, scale
 
 
 def points_by_load(data: ApparatusData) -> Loads:
     """Return the points of each load apart, from the smallest up; of a single one without text."""
-    scan, parts = data.reconvolution, []
+    scan = data.reconvolution
+    parts = []
     if scan.load is None:
         return [("", data)]
     loads, inverse = np.unique(scan.load, return_inverse=True)

@@ -20,7 +20,9 @@ from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.planning.design import Design, varied_designs
 
 #: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
-_WIDTHS, _BANDS, _FINE = 4.0, 2.0, 401
+_WIDTHS = 4.0
+_BANDS = 2.0
+_FINE = 401
 #: Factors on the planned number at which the third panel is evaluated.
 _FACTORS = np.geomspace(0.25, 4.0, 9)
 #: No variation has more positions than this, unless the plan itself does.
@@ -51,7 +53,8 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
 def _draw_radial(axes: Axes, planned: Design) -> None:
     r = np.linspace(0.0, _WIDTHS * planned.parameters["gaussian_sigma"], _FINE)
     g, error = on_axis(planned.r, np.stack([planned.g, EXPANDED * planned.g_errors]), r) / PER_MM2
-    r, assumed = r / MM, planned.plan.kernel.radial(r) / PER_MM2
+    assumed = planned.plan.kernel.radial(r) / PER_MM2
+    r = r / MM
     colour = COLOURS["deconvolved"]
     axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="±2u")
     axes.plot(r, g, color=colour, label="G expected")

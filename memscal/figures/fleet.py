@@ -13,7 +13,8 @@ from memscal.model.fleet import FleetResults, robust_limit, robust_spread
 from memscal.summaries.declared import power_of_ten
 from memscal.summaries.fleet_results import error_classes, failures
 
-_MOST_BINS, _MOST_BARS = 60, 12
+_MOST_BINS = 60
+_MOST_BARS = 12
 #: Ticks whose labels have room.
 _TICKS = 5
 #: Markers that are drawn as an image, which keeps a page of many sensors small.
@@ -43,10 +44,12 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    centre, spread = float(np.median(values)), robust_spread(values)
+    centre = float(np.median(values))
+    spread = robust_spread(values)
     limit = robust_limit(values.size)
     reach = 1.2 * limit * spread
-    low, high = max(values.min(), centre - reach), min(values.max(), centre + reach)
+    low = max(values.min(), centre - reach)
+    high = min(values.max(), centre + reach)
     inside = values[(values >= low) & (values <= high)]
     bins = int(np.clip(2 * np.cbrt(inside.size), 5, _MOST_BINS))
     axes.hist(inside, bins=bins, color=COLOURS["deconvolved"], alpha=0.8)
@@ -88,7 +91,8 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
     failed[list(fleet.failed)] = True
     limit = 3 * robust_spread(change[finite]) or 1.0
     label = "$A$ over its median, less 1 (%)"
-    x, y = fleet.wafer_x, fleet.wafer_y
+    x = fleet.wafer_x
+    y = fleet.wafer_y
     placed = np.isfinite(x) & np.isfinite(y)
     shown: dict[str, Any] = {"rasterized": a.size > _MANY, "linewidths": 0}
     size = float(np.clip(4e3 / max(a.size, 1), 1, 40))
@@ -103,7 +107,9 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
         axes.set_xlabel("$x$ on the wafer (mm)")
         axes.set_ylabel("$y$ on the wafer (mm)")
     else:
-        x, y, placed = np.arange(a.size, dtype=np.float64), change, np.ones(a.size, dtype=bool)
+        x = np.arange(a.size, dtype=np.float64)
+        y = change
+        placed = np.ones(a.size, dtype=bool)
         axes.scatter(x, y, s=min(size, 8), color=COLOURS["deconvolved"], **shown)
         axes.set_xlabel("place in the batch")
         axes.set_ylabel(label)

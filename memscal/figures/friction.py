@@ -79,7 +79,8 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
 
 def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     """Draw the logarithm of each law's marginal likelihood over that of the best of its kind."""
-    names, height = [], 0
+    names = []
+    height = 0
     for direction, compared in by_direction.items():
         best = max(law.log_evidence for law in compared.laws)
         for law in compared.laws:
@@ -100,7 +101,8 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
     axes.fill_between(implied.loads, low, high, color=blue, alpha=0.25, lw=0)
     axes.plot(implied.loads, best, color=blue, label="what the slip length means")
     for i, at_load in enumerate(measured):
-        reading, black = at_load.by_profile, COLOURS["measured"]
+        reading = at_load.by_profile
+        black = COLOURS["measured"]
         label = "found at each load" if i == 0 else "_found"
         axes.plot([at_load.load] * 2, _ends(reading), color=black, lw=1.0, label=label)
         if reading.value is not None:
@@ -159,7 +161,9 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
 def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArray]) -> None:
     """Name the curves at the end where more are apart; those that end together share a name."""
     end = max((-1, 0), key=lambda end: len(_apart(axes, curves, end)))
-    groups, x, side = _apart(axes, curves, end), loads[end], 1 if end else -1
+    groups = _apart(axes, curves, end)
+    x = loads[end]
+    side = 1 if end else -1
     # Room for the names; a load is never negative.
     room = _ROOM * max(loads[-1] - loads[0], 0.2 * loads[-1])
     if end:
@@ -168,15 +172,21 @@ def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArr
         axes.set_xlim(x - room, loads[-1] + 0.3 * room)
         axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= loads[-1] + 0.3 * room])
     for group in groups:
-        height, (low, high) = float(np.mean(group[:, 0])), (group[:, 1].min(), group[:, 1].max())
+        height = float(np.mean(group[:, 0]))
+        (low, high) = (group[:, 1].min(), group[:, 1].max())
         text = friction_name(low)
         if low < high:
             text = f"≥ {text}" if np.isinf(high) else f"{text}–{high:.3g}"
         axes.annotate(
             text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
-            (x, height), (7 * side, 0), textcoords="offset points", va="center", fontsize=6.5,
-            ha="left" if end else "right", color=profiles.friction_colours(high)[0],
-        )  # fmt: skip
+            (x, height),
+            (7 * side, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=6.5,
+            ha="left" if end else "right",
+            color=profiles.friction_colours(high)[0],
+        )
 
 
 def _apart(axes: Axes, curves: Mapping[float, FloatArray], end: int) -> list[FloatArray]:
@@ -258,10 +268,12 @@ def draw_effective(
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
-            reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
+            reading = getattr(at_load, name)
+            x = at_load.load + side * _ASIDE * span
             look = mark(at_load.lubrication, COLOURS[colour])
             _draw_reading(axes, reading, x, words if i == 0 else "", look)
-    joint, grey = comparison.joint[loads[0].lubrication][loads[0].loading], COLOURS["muted"]
+    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
+    grey = COLOURS["muted"]
     low, top = _ends(joint)
     axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
     if joint.value is not None:
@@ -283,7 +295,9 @@ def _draw_reading(
 ) -> None:
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
     colour = look["color"]
-    low, high, ends = reading.interval.low, reading.interval.high, _ends(reading)
+    low = reading.interval.low
+    high = reading.interval.high
+    ends = _ends(reading)
     (bar,) = axes.plot([x, x], ends, color=colour, lw=1.0, solid_capstyle="butt")
     bar.set_gid("interval")
     axes.plot([x], ends[:1], "_" if low > 0 else "", color=colour, ms=5, mew=1.0)
@@ -311,7 +325,8 @@ def _panels(
 ) -> Figure:
     """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
     lubrications = list(comparison.joint)
-    rows, columns = len(lubrications), len(comparison.loadings)
+    rows = len(lubrications)
+    columns = len(comparison.loadings)
     shared: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "note": note}
     with panels_of(0.6 + height * rows, rows, columns, **shared) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
@@ -362,9 +377,15 @@ def draw_levels(axes: Axes) -> None:
     for level, words in _LEVELS:
         axes.axhline(level, color="0.6", lw=0.6, ls=":")
         axes.annotate(
-            words, (0.995, level), (0, 1), xycoords=("axes fraction", "data"),
-            textcoords="offset points", ha="right", fontsize=6, color="0.4",
-        )  # fmt: skip
+            words,
+            (0.995, level),
+            (0, 1),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right",
+            fontsize=6,
+            color="0.4",
+        )
     axes.set_ylim(0, _HIGHEST)
 
 

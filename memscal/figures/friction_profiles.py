@@ -94,7 +94,8 @@ def calculated_at(
     """Return the calculated blurred stress (n,), in Pa, at any coefficient within those solved."""
     from scipy.interpolate import PchipInterpolator
 
-    places, calculated = friction_position(comparison.friction), at_load.calculated
+    places = friction_position(comparison.friction)
+    calculated = at_load.calculated
     if places.size == 1:
         return np.asarray(calculated[0])
     # As the family interpolates: past the friction of full stick nothing changes.
@@ -112,7 +113,9 @@ def _draw_points(
 ) -> None:
     """Draw the measured points; on a logarithmic scale those below 2u are pale or left out."""
     profile = at_load.profile
-    r, s, bars = profile.r / MM, profile.s_zz / KPA, EXPANDED * profile.s_zz_errors / KPA
+    r = profile.r / MM
+    s = profile.s_zz / KPA
+    bars = EXPANDED * profile.s_zz_errors / KPA
     clear = s > bars if logarithmic else np.ones(s.size, dtype=bool)
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
@@ -222,7 +225,8 @@ def _plot_residuals(
     axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     for at_load, colour in zip(loads, colours, strict=True):
-        profile, look = at_load.profile, mark(at_load.lubrication, colour)
+        profile = at_load.profile
+        look = mark(at_load.lubrication, colour)
         calculated = calculated_at(comparison, at_load, friction)
         z = (profile.s_zz - calculated) / profile.s_zz_errors
         look |= {"many": z.size > SCATTER_THRESHOLD, "ls": "none", "ms": 2.5, "mew": 0.6}
@@ -280,14 +284,16 @@ def _draw_set(
     unit: float,
 ) -> None:
     """Draw stress less that of some profile at its radii, in a unit (Pa)."""
-    profile, look = at_load.profile, mark(at_load.lubrication, COLOURS["measured"]) | _BARS
+    profile = at_load.profile
+    look = mark(at_load.lubrication, COLOURS["measured"]) | _BARS
     # As far as the frictionless profile exceeds a twentieth of its top.
     strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
     r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    stress, errors = (profile.s_zz - less) / unit, EXPANDED * profile.s_zz_errors / unit
+    stress = (profile.s_zz - less) / unit
+    errors = EXPANDED * profile.s_zz_errors / unit
     look |= {"many": stress.size > SCATTER_THRESHOLD, "label": "_points"}
     draw_measured(axes, profile.r / MM, stress, errors, **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
@@ -297,14 +303,22 @@ def _legend_of_friction(
     figure: Figure, comparison: FrictionComparison, at_load: LoadComparison
 ) -> None:
     handles = [
-        Line2D([], [], color=friction_colours(comparison.friction[i])[0], lw=1.2,
-               label=rf"$\mu$ = {friction_name(comparison.friction[i])}")
+        Line2D(
+            [],
+            [],
+            color=friction_colours(comparison.friction[i])[0],
+            lw=1.2,
+            label=rf"$\mu$ = {friction_name(comparison.friction[i])}",
+        )
         for i in _shown_indices(comparison)
-    ]  # fmt: skip
+    ]
     point = Line2D([], [], ms=3, ls="none", **mark(at_load.lubrication, "k"))
     point.set_label(f"measured, {lubricated_words(at_load.lubrication)}")
     title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
     figure.legend(
-        handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,
+        handles=[point, *handles],
+        loc="outside upper center",
+        ncols=len(handles) + 1,
+        title=title,
         title_fontsize=8,
-    )  # fmt: skip
+    )

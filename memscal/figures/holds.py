@@ -19,7 +19,8 @@ def holds_figure(holds: Holds) -> Figure:
     shown = [name for name in names if name in holds.log and np.ptp(holds.log[name]) > 0]
     along = "y" if np.ptp(holds.mean.get("y", 0.0)) > np.ptp(holds.mean["x"]) else "x"
     chosen = np.arange(0, holds.line.size, -(-holds.line.size // _MOST_ROWS))
-    first, last = holds.line[holds.first], holds.line[holds.stop - 1]
+    first = holds.line[holds.first]
+    last = holds.line[holds.stop - 1]
     with panels_of(1.6 * (len(shown) + 1.4), len(shown) + 1) as (figure, panels):
         for axes, name in zip(panels, shown, strict=False):
             label, scale = names[name]
@@ -33,11 +34,18 @@ def holds_figure(holds: Holds) -> Figure:
             f"{first.size} holds (thick) in {holds.line.size} rows of the log", loc="left"
         )
         panels[-2].set_xlabel("line of the file")
-        axes, (label, scale) = panels[-1], names["u_zz"]
+        axes = panels[-1]
+        (label, scale) = names["u_zz"]
         axes.errorbar(
-            holds.mean[along] / MM, holds.mean["u_zz"] / scale, 2 * holds.u_errors / scale,
-            fmt="o", ms=marker_size(first.size), color=COLOURS["measured"], lw=0.8, zorder=3,
-        )  # fmt: skip
+            holds.mean[along] / MM,
+            holds.mean["u_zz"] / scale,
+            2 * holds.u_errors / scale,
+            fmt="o",
+            ms=marker_size(first.size),
+            color=COLOURS["measured"],
+            lw=0.8,
+            zorder=3,
+        )
         axes.set(xlabel=f"{along} (mm)", ylabel=label)
         axes.set_title("mean of each hold ± 2 standard uncertainties (k = 2)", loc="left")
     return figure

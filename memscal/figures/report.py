@@ -218,7 +218,8 @@ def _of_stress(stress: MeasuredStress) -> Report:
 
 @report_of.register
 def _of_restoration(restored: Restoration) -> Report:
-    on_axis, u = float(restored.stress(0.0)) / KPA, float(restored.stress_uncertainty(0.0)) / KPA
+    on_axis = float(restored.stress(0.0)) / KPA
+    u = float(restored.stress_uncertainty(0.0)) / KPA
     alt = (
         "Left: stress at the base against the distance from the centre, restored, blurred again, "
         f"and measured; on the axis it is {format_measured(on_axis, u, 'kPa')}. Right: residuals."
@@ -260,11 +261,14 @@ _COMPARED = {
 @report_of.register(ShearComparison)
 @report_of.register(FrictionComparison)
 def _of_comparison(compared: FrictionComparison | ShearComparison) -> Report:
-    measured, pictures = compared.measured, []
+    measured = compared.measured
+    pictures = []
     checks: Sequence[QualityCheck] = ()
-    messages, joint = compared.messages, joint_text(compared.joint)
+    messages = compared.messages
+    joint = joint_text(compared.joint)
     if isinstance(compared, FrictionComparison):
-        checks, messages = compared.checks, tuple(comparisons.notes(compared))
+        checks = compared.checks
+        messages = tuple(comparisons.notes(compared))
         for stem, draw in comparison_figures(compared).items():
             for name in (name for name in _COMPARED if stem.startswith(name)):
                 caption = _COMPARED[name].format(stem.removeprefix(name).replace("-", ", "))
@@ -288,14 +292,16 @@ def _of_fleet(fleet: FleetResults) -> Report:
         "failed each check, and errors by class. d: A over the wafer, or along the batch."
     )
     picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
-    title, failed = f"Calibrations of {fleet.name}", bool(fleet.failed)
+    title = f"Calibrations of {fleet.name}"
+    failed = bool(fleet.failed)
     return Report(
         title=title, verdict=counts, failed=failed, pictures=[picture], messages=fleet.messages
     )
 
 
 def _contact_words(scan: Scan | MeasuredScan) -> str:
-    film, indenter = scan.film, scan.indenter
+    film = scan.film
+    indenter = scan.indenter
     if film is None or not isinstance(indenter, RoundIndenter):
         return "the film"
     pressed = f"a {indenter.shape} of radius {indenter.radius / MM:.4g} mm"
@@ -336,7 +342,8 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
         if isinstance(value, str) and value:
             yield prefix + quantity.words, value
         elif isinstance(value, float) and not quantity.name.endswith("_uncertainty"):
-            value, spread = value / quantity.scale, f"{quantity.name}_uncertainty"
+            value = value / quantity.scale
+            spread = f"{quantity.name}_uncertainty"
             text = f"{value:.3g} {quantity.unit}".strip()
             if hasattr(holder, spread):
                 u = getattr(holder, spread)

@@ -50,7 +50,8 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: boo
     shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
     look = style.mark(profile.lubrication, colour) | {"ls": "none", "mew": 0.7, "ms": 2.6}
     look |= {"many": profile.r.size > style.SCATTER_THRESHOLD, "elinewidth": 0.6}
-    r, stress = profile.r / MM, profile.s_zz / KPA
+    r = profile.r / MM
+    stress = profile.s_zz / KPA
     style.draw_measured(axes, r[shown], stress[shown], bars[shown] / KPA, **look)
     if not shown.all():
         style.draw_measured(axes, r[~shown], stress[~shown], None, alpha=0.3, **look)

@@ -183,7 +183,8 @@ def draw_measured(
 
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
     """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones."""
-    kept, last = [], -np.inf
+    kept = []
+    last = -np.inf
     for i, radius in enumerate(r):
         if radius - last > _CLOSE:
             kept.append(i)

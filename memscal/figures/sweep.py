@@ -75,7 +75,8 @@ def _draw_seeds(
         beyond = sign * draws > sign * edge
         outside += int(np.sum(beyond))
         places = amplitude[np.any(beyond, axis=1)]
-        level, across_x = np.full(places.size, 0.5 + 0.46 * sign), axes.get_xaxis_transform()
+        level = np.full(places.size, 0.5 + 0.46 * sign)
+        across_x = axes.get_xaxis_transform()
         label = "_beyond the axis"
         axes.plot(places, level, marker, color=colour, ms=4, transform=across_x, label=label)
     if outside:

@@ -36,7 +36,8 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     require_unaltered(file, ARTIFACT_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
     film, indenter = groups.read_stated(file)
-    process, u_zz = groups.read_process(file, "/entry/process"), "/entry/reconvolution/u_zz"
+    process = groups.read_process(file, "/entry/process")
+    u_zz = "/entry/reconvolution/u_zz"
     reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
     reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
@@ -72,7 +73,8 @@ def write_artifact(
 
 def artifact_tree(data: ApparatusData) -> Group:
     """Return what a memscal-artifact file holds; its root states the content digest."""
-    sensor, of_scan = data.sensor.name, records.RECONVOLUTION.read_in(data.reading)
+    sensor = data.sensor.name
+    of_scan = records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
@@ -91,7 +93,8 @@ def artifact_tree(data: ApparatusData) -> Group:
     if data.kernel_changes:
         children["kernel_changes"] = _changes_group(data)
     if data.other is not None:
-        name, radial = data.other.route, data.other.radial_profile
+        name = data.other.route
+        radial = data.other.radial_profile
         children |= {
             f"radial_profile_{name}": write_record(records.RADIAL, radial),
             f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),

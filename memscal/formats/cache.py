@@ -28,7 +28,8 @@ CacheFolder = str | os.PathLike[str] | None
 """A folder in which calculated contacts are kept; ``None`` keeps none."""
 
 #: A folder grows no further than this.
-_MOST_BYTES, _MOST_ENTRIES = 64 * 2**20, 512
+_MOST_BYTES = 64 * 2**20
+_MOST_ENTRIES = 512
 _ENTRY = re.compile(r"[0-9a-f]{64}\.h5")
 _TRANSFORM = ("N", ("value", "load", "k"))
 #: Units and axes of arrays that are not transforms in N.

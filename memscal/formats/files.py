@@ -334,7 +334,9 @@ def read_pieces(path: str | os.PathLike[str], *, limit: int) -> Iterator[bytes]:
             why = "A folder, pipe or device could keep a program waiting for ever."
             cure = "Give the name of a file."
             raise UnsafeFileError(f"{shown} is not a regular file.", why=why, cure=cure)
-        size, total, piece = status.st_size, 0, b""
+        size = status.st_size
+        total = 0
+        piece = b""
         while max(size, total) <= limit:
             yield piece
             if not (piece := os.read(descriptor, 2**20)):

@@ -22,10 +22,13 @@ from memscal.model.notation import VOLTS, Reading
 from memscal.model.quantities import ESTIMATED, parameter_quantity
 from memscal.version import __version__
 
-FLEET_SCHEMA, FLEET_SCHEMA_VERSION = "memscal-fleet", "1.1.0"
+FLEET_SCHEMA = "memscal-fleet"
+FLEET_SCHEMA_VERSION = "1.1.0"
 DIGEST = "memscal_shard_sha256"
 #: What states the batch, and the bytes that it may have; scans that a message names.
-_BATCH, _MOST_STATED, _NAMED = "batch.json", 10_000, 5
+_BATCH = "batch.json"
+_MOST_STATED = 10_000
+_NAMED = 5
 _SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 #: What memscal writes beside scans.
 _RESULTS = (".apparatus", ".stress")
@@ -101,10 +104,24 @@ def _require_places(name: str, head: Sequence[str]) -> None:
 #: Those that a calibration may estimate, with columns of their own.
 _PARAMETERS = tuple(n for n in ESTIMATED if n not in ("baseline_slope", "force", "maximum"))
 _TEXTS = (
-    "path", "sensor", "model", "serial_number", "channel", "start_time", "calibrated_at", "method",
-    "artifact", "error_class", "error", "input_sha256", "options_sha256", "version", "unit",
-)  # fmt: skip
-_CHECK, _UNCERTAINTY = ("value", "limit", "p_value"), ("quantity", "source")
+    "path",
+    "sensor",
+    "model",
+    "serial_number",
+    "channel",
+    "start_time",
+    "calibrated_at",
+    "method",
+    "artifact",
+    "error_class",
+    "error",
+    "input_sha256",
+    "options_sha256",
+    "version",
+    "unit",
+)
+_CHECK = ("value", "limit", "p_value")
+_UNCERTAINTY = ("quantity", "source")
 
 
 def arrow() -> Any:
@@ -120,7 +137,9 @@ def arrow() -> Any:
 def _schema(readings: Iterable[Reading]) -> Any:
     """Return names, types and units of the columns, for sensors with readings in some units."""
     pa = arrow()
-    single, text, double = pa.float32(), pa.string(), pa.float64()
+    single = pa.float32()
+    text = pa.string()
+    double = pa.float64()
     check = {"name": text, "passed": pa.bool_(), **dict.fromkeys(_CHECK, single)}
     source = {**dict.fromkeys(_UNCERTAINTY, text), "errors": single}
     columns = {"place": pa.int64(), **dict.fromkeys(_TEXTS, text), "passed": pa.bool_()}
@@ -141,7 +160,8 @@ def _schema(readings: Iterable[Reading]) -> Any:
 
 def fleet_row(data: ApparatusData) -> dict[str, Any]:
     """Return an apparatus function as a row, in the units of files."""
-    parameters, radial = data.parameters, data.radial_profile
+    parameters = data.parameters
+    radial = data.radial_profile
     scales = {name: parameter_quantity(parameters, name).scale for name in parameters.names}
     names = [name for name in _PARAMETERS if name in scales]
     row: dict[str, Any] = {"passed": data.passed, "calibrated_at": data.process.date}
@@ -150,7 +170,8 @@ def fleet_row(data: ApparatusData) -> dict[str, Any]:
     row["messages"] = [{"kind": m.kind, "text": m.text} for m in data.process.messages]
     row |= {name: parameters[name] / scales[name] for name in names}
     row |= {f"{name}_errors": parameters.uncertainty(name) / scales[name] for name in names}
-    covariance, above = parameters.only(names).covariance, np.triu_indices(len(names), 1)
+    covariance = parameters.only(names).covariance
+    above = np.triu_indices(len(names), 1)
     u = np.sqrt(np.diag(covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         row |= {"correlated": names, "correlation": (covariance / np.outer(u, u))[above]}
@@ -223,13 +244,26 @@ def read_batch(results: Path) -> dict[str, Any]:
 
 
 _NUMBERS = (
-    "conversion_constant", "conversion_constant_errors", "gaussian_sigma", "gaussian_sigma_errors",
-    "wafer_x", "wafer_y",
-)  # fmt: skip
+    "conversion_constant",
+    "conversion_constant_errors",
+    "gaussian_sigma",
+    "gaussian_sigma_errors",
+    "wafer_x",
+    "wafer_y",
+)
 _OF_SUMMARY = (
-    *_NUMBERS, "path", "passed", "error_class", "error", "checks", "unit", "messages",
-    "input_sha256", "options_sha256", "version",
-)  # fmt: skip
+    *_NUMBERS,
+    "path",
+    "passed",
+    "error_class",
+    "error",
+    "checks",
+    "unit",
+    "messages",
+    "input_sha256",
+    "options_sha256",
+    "version",
+)
 
 
 @dataclass
@@ -251,7 +285,8 @@ class _Told:
         self.paths += table["path"].to_pylist()
         for place in np.flatnonzero(~table["passed"].to_numpy().astype(bool)):
             row = table.slice(place, 1).to_pylist()[0]
-            checks, number = row["checks"] or (), start + int(place)
+            checks = row["checks"] or ()
+            number = start + int(place)
             self.failed[number] = tuple(c["name"] for c in checks if not c["passed"])
             if row["error"]:
                 self.errors[number] = row["error_class"], row["error"]
@@ -297,7 +332,8 @@ def read_fleet(results: Path) -> FleetResults:
     if not (shards := shard_paths(results)):
         cure = "Give the folder that memscal batch -o wrote."
         raise InputError(f"{results} holds no results of a batch.", cure=cure)
-    told, numbers = _Told(), []
+    told = _Told()
+    numbers = []
     for shard in shards:
         table = read_shard(shard, _OF_SUMMARY)
         numbers.append([table[name].to_numpy().astype(np.float64) for name in _NUMBERS])

@@ -158,7 +158,8 @@ def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, 
     texts: dict[str, Any] = {}
     notes: dict[str, Any] = {}
     for at, quantity in paths:
-        value, name = KINDS[quantity.dimension].read(file, at), quantity.origin
+        value = KINDS[quantity.dimension].read(file, at)
+        name = quantity.origin
         if isinstance(value, SourceFile):
             texts |= {name: value.file_name, f"{name}_sha256": value.sha256}
         elif isinstance(value, str):
@@ -195,7 +196,8 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
-    pairs, of = zip(parameters.names, stated, strict=True), parameters.reading
+    pairs = zip(parameters.names, stated, strict=True)
+    of = parameters.reading
     dimensions = {name: parameter_dimension(name, unit, of) for name, unit in pairs}
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
@@ -280,7 +282,8 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
 
 def read_stated(file: SafeFile) -> tuple[ElasticFilm | None, RoundIndenter | None]:
     """Read the film and the indenter of a scan or an artifact, where it states them."""
-    film, indenter = "/entry/sample/film", "/entry/indenter"
+    film = "/entry/sample/film"
+    indenter = "/entry/indenter"
     stated = any(file.has(f"{indenter}/{name}") for name in ("shape", "radius"))
     rod_or_sphere = read_round_indenter(file, indenter) if stated else None
     return read_film(file, film) if file.has(film) else None, rod_or_sphere
@@ -377,7 +380,8 @@ def read_circumstances(file: SafeFile) -> dict[str, Any]:
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
-    film, indenter = profile.film, profile.indenter
+    film = profile.film
+    indenter = profile.indenter
     of = {"film": write_record(records.FILM, film)} if film else {}
     of |= {"indenter": indenter_group(indenter)} if indenter else {}
     numerics = write_record(records.NUMERICS, profile)
@@ -404,13 +408,15 @@ def read_field(file: SafeFile, path: str) -> StressField:
     axes = file.attribute(path, "axes") if path else None
     y, x = axes if isinstance(axes, tuple) and len(axes) == 2 else ("y", "x")
     signal = (file.attribute(path, "signal") if path else None) or "sigma_zz"
-    at, unit = f"{path}/{signal}", units_of(file, f"{path}/{signal}") or "1"
+    at = f"{path}/{signal}"
+    unit = units_of(file, f"{path}/{signal}") or "1"
     if not file.has(at):
         why = "The file is no memscal-reference, and should hold a field there."
         raise FormatError(f"{file.where(at)} is missing.", why=why)
     values = file.array(at)
     with suppress(UnitError):
-        values, unit = to_si(values, unit, "stress", file.where(at)), "Pa"
+        values = to_si(values, unit, "stress", file.where(at))
+        unit = "Pa"
     places = [require_array(file, f"{path}/{name}", "length", ndim=1) for name in (x, y)]
     load = require_scalar(file, f"{path}/load", "force") if file.has(f"{path}/load") else None
     with placed(file.where(path or "/")):
@@ -434,7 +440,8 @@ def read_profile(
     load: float | None = None,
 ) -> StressProfile:
     """Read a stress profile; the load is the one given where it names none."""
-    film, indenter = f"{parameters}/film", f"{parameters}/indenter"
+    film = f"{parameters}/film"
+    indenter = f"{parameters}/indenter"
     defaults = {} if load is None else {"load": load}
     contact = read_record(records.CONTACT, file, parameters, defaults=defaults)
     if file.has(f"{data}/shape"):

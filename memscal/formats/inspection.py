@@ -178,7 +178,9 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     errors = f"{path}_errors"
     if not file.has(errors):
         return None
-    spread, unit, spread_unit = _single(file, errors), units_of(file, path), units_of(file, errors)
+    spread = _single(file, errors)
+    unit = units_of(file, path)
+    spread_unit = units_of(file, errors)
     if spread_unit != unit:
         dimension = dimension_of(unit or "1", file.where(path))
         scale = to_si(1.0, unit, dimension, file.where(path))

@@ -19,7 +19,8 @@ from memscal.model.quantities import ESTIMATED
 from memscal.model.scan import Scan
 
 _LONGEST = 1 << 20
-_CELSIUS, ZERO_CELSIUS = ("degC", "°C"), 273.15
+_CELSIUS = ("degC", "°C")
+ZERO_CELSIUS = 273.15
 
 RULES = ("simple acceptance", "guarded acceptance")
 """Decision rules: whether a value must lie within its tolerance, or clear of its limits."""
@@ -107,7 +108,8 @@ class LaboratoryFile:
     def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> dict[str, Any]:
         added = {_NAMES.get(k, k): v for k, v in stated.items() if v not in ("", None)}
         for name in [name for name in added if getattr(part, name) not in ("", None)]:
-            held, value = getattr(part, name), added.pop(name)
+            held = getattr(part, name)
+            value = added.pop(name)
             if held != value:
                 what = f"{name} of the {subject}".replace("_", " ")
                 raise InputError(
@@ -192,17 +194,21 @@ def _value(where: str, kind: str, value: Any) -> Any:
         if isinstance(value, int | float) and math.isfinite(value) and not isinstance(value, bool):
             return float(value)
     elif kind == "limits":
-        limits, form = _section(where, kind, value), "limits, the lower below the upper"
+        limits = _section(where, kind, value)
+        form = "limits, the lower below the upper"
         ends = limits.get("lower", -math.inf), limits.get("upper", math.inf)
         if ends[0] < ends[1] and ends != (-math.inf, math.inf):
             return limits
     else:
-        stated, form = _section(where, "quantity", value), "a value with its unit, u not negative"
+        stated = _section(where, "quantity", value)
+        form = "a value with its unit, u not negative"
         spread = stated.get("uncertainty")
         if {"value", "unit"} <= set(stated) and (spread is None or spread >= 0):
-            unit, zero = stated["unit"], 0.0
+            unit = stated["unit"]
+            zero = 0.0
             if kind == "temperature" and unit in _CELSIUS:
-                unit, zero = "K", ZERO_CELSIUS
+                unit = "K"
+                zero = ZERO_CELSIUS
             number = float(to_si(stated["value"], unit, kind, where)) + zero
             u = None if spread is None else float(to_si(spread, unit, kind, where))
             return Measured(number, u)

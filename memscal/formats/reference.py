@@ -104,7 +104,8 @@ def length(text: str, what: str) -> float:
 
 def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> StressField:
     """Read a field from a 2-D array or an image."""
-    data, name = read_bytes(path), os.path.basename(os.fspath(path))
+    data = read_bytes(path)
+    name = os.path.basename(os.fspath(path))
     if pixel_size is None:
         why = "An array or image does not state it."
         cure = "Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line."
@@ -113,7 +114,8 @@ def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> Stre
     with damage_named(f"{name} cannot be read"):
         array = name.lower().endswith(".npy")
         values = np.load(BytesIO(data), allow_pickle=False) if array else _image(data)
-    notes, channels = "", values.shape[2] if values.ndim == 3 and not array else 0
+    notes = ""
+    channels = values.shape[2] if values.ndim == 3 and not array else 0
     if channels in (2, 3, 4):
         notes = "Of the image the luminance was taken."
         values = values[..., :3] @ _LUMINANCE if channels > 2 else values[..., 0]

@@ -22,7 +22,8 @@ from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, requ
 from memscal.model.sizes import too_large
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
-_DATA, _SAMPLE = "/entry/data", "/entry/sample"
+_DATA = "/entry/data"
+_SAMPLE = "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 _DECLARED = by_name(records.SCAN_DATA.quantities)
@@ -185,7 +186,8 @@ def _entry(scan: Scan) -> Group:
 
 
 def _data_group(scan: Scan) -> Group:
-    along, points = scan.direction, scan.kind == "points"
+    along = scan.direction
+    points = scan.kind == "points"
     axes = _POINTS if points else (_ALONG_Y if along == "y" else _AXES)[scan.kind]
     data: dict[str, Node] = {"point": writer.index_axis("point", scan.x.size)} if points else {}
     data |= _nodes(scan, {"y": scan.y}, axes if points else ("y",))

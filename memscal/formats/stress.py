@@ -52,7 +52,8 @@ def _read_scans(
         raise FormatError(problem, cure="Run memscal apply again.")
     scans = []
     for i, name in enumerate(stored or [f"scan_{i}" for i in range(1, size + 1)], start=1):
-        path, source = f"/entry/scans/{name}", sources.get(str(name))
+        path = f"/entry/scans/{name}"
+        source = sources.get(str(name))
         if stored is not None:
             lubrication = optional_text(file, f"{path}/sample/lubrication")
             numbers = read_record(records.MEASURED_SCAN, file, path)
@@ -142,7 +143,8 @@ def stress_from(file: SafeFile) -> MeasuredStress:
     scans = _read_scans(file, paths, numbers, sources)
     of_scans = zip(paths, numbers, strict=True)
     profiles = tuple(_read_profile(file, path, scans[i - 1]) for path, i in of_scans)
-    accepted, process = accepted_alterations(file.source), groups.read_process(file, _PROCESS)
+    accepted = accepted_alterations(file.source)
+    process = groups.read_process(file, _PROCESS)
     return MeasuredStress(
         profiles=profiles,
         scans=scans,
@@ -177,7 +179,8 @@ def _entry(measured: MeasuredStress) -> Group:
     sources |= {f"scan_{i}": scan.source for i, scan in enumerate(measured.scans, 1)}
     inputs: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     first = measured.scans[0]
-    sensor, digest = first.sensor.name, measured.artifact_digest
+    sensor = first.sensor.name
+    digest = measured.artifact_digest
     of_artifact = {"content_sha256": digest} if digest else {}
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
@@ -228,7 +231,8 @@ def _beside(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
     # Apart from the profiles: programs that read NeXus take a NXdata within another for its signal.
     groups_of: dict[str, dict[str, Node]] = {}
     for i, profile in enumerate(profiles, 1):
-        of, name = profile.scan.reading, f"profile_{i}"
+        of = profile.scan.reading
+        name = f"profile_{i}"
         budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
         groups_of.setdefault("roots", {})[name] = _roots_group(profile)
         groups_of.setdefault("budgets", {})[name] = groups.budget_group(budget, _BUDGET)
@@ -285,10 +289,13 @@ def _root_of(covariance: FloatArray, where: str) -> FloatArray:
 
 def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, FloatArray]:
     """Read the roots of a profile's covariance; of a file before them, those of its matrices."""
-    where, prefix, dimension = f"/entry/roots/{name}", "root_", "stress"
+    where = f"/entry/roots/{name}"
+    prefix = "root_"
+    dimension = "stress"
     if before := not file.has(where):
         where = _beside_or_in(file, "covariances", name, path)
-        prefix, dimension = "covariance_", "stress squared"
+        prefix = "covariance_"
+        dimension = "stress squared"
     roots: dict[str, FloatArray] = {}
     for source in text_list(file, f"{where}/sources"):
         stored = values.require_array(file, place := f"{where}/{prefix}{source}", dimension)
@@ -301,7 +308,8 @@ def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, Float
 
 def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProfile:
     arrays = read_record(records.STRESS_PROFILE, file, path)
-    n, name = arrays["r"].size, path.rpartition("/")[2]
+    n = arrays["r"].size
+    name = path.rpartition("/")[2]
     roots = _read_roots(file, name, path, n)
     budget = groups.read_budget(file, _beside_or_in(file, "budgets", name, f"{path}/budget"))
     if not roots or not budget.keys() >= _BUDGET.keys():

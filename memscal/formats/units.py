@@ -156,7 +156,8 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
     import pint
 
     try:
-        quantity, si = _pint_quantity(unit, dimension, where), DIMENSIONS[dimension].si
+        quantity = _pint_quantity(unit, dimension, where)
+        si = DIMENSIONS[dimension].si
         return float(quantity.to("dimensionless" if si == "1" else si).magnitude)
     except pint.DimensionalityError as error:
         raise _wrong_dimension(where, unit, dimension) from error

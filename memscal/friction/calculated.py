@@ -166,7 +166,8 @@ def contacts_of(
     profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
 ) -> dict[str, Any]:
     """Return film, indenter and options by which contacts of what was measured are calculated."""
-    scan, reach = profiles[0].scan, _REACH * max(float(profile.r[-1]) for profile in profiles)
+    scan = profiles[0].scan
+    reach = _REACH * max(float(profile.r[-1]) for profile in profiles)
     contacts = {"film": scan.film, "indenter": scan.indenter, "reach": reach}
     return contacts | {"cache": cache, "workers": workers}
 
@@ -268,7 +269,8 @@ def _grid(
     tables: Sequence[_Table], frictions: FloatArray, loads: FloatArray
 ) -> list[list[StressProfile]]:
     """Return the table of each friction coefficient and load; name all that are missing."""
-    grid, missing = [], []
+    grid = []
+    missing = []
     for mu in frictions:
         row = [_nearest(tables, float(mu), float(load)) for load in loads]
         absent = (load for load, cell in zip(loads, row, strict=True) if cell is None)

@@ -26,7 +26,8 @@ def comparison_checks(
     # A noise that was estimated from the scatter about a contact is as large as the misfit.
     checks: list[QualityCheck] = []
     for i, of_load in enumerate(zip(*loads.values(), strict=True), start=1):
-        profile, outside = of_load[0].profile, 1 - max(load.bracketed for load in of_load)
+        profile = of_load[0].profile
+        outside = 1 - max(load.bracketed for load in of_load)
         size = np.format_float_positional(profile.load, precision=3, trim="-")
         place = f"the {profile.lubrication} load" if profile.lubrication else "the load"
         place = f"{place} of {size} N"
@@ -115,12 +116,15 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
     for lubrication, by_loading in joint.items():
         if not {"incremental", "total"} <= by_loading.keys():
             continue
-        first, second = by_loading["incremental"], by_loading["total"]
+        first = by_loading["incremental"]
+        second = by_loading["total"]
         of = f"the {lubrication} loads" if lubrication else "the loads"
         if first.value is None or second.value is None:
             # A bound and a value agree where the intervals have values in common.
-            one, other = first.interval, second.interval
-            disagree, by = one.upper < other.low or other.upper < one.low, ""
+            one = first.interval
+            other = second.interval
+            disagree = one.upper < other.low or other.upper < one.low
+            by = ""
         else:
             apart = abs(first.value - second.value)
             errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
@@ -146,7 +150,8 @@ def _against_macroscopic(
         if lubrication == "lubricated":
             continue
         for loading, joint_estimate in by_loading.items():
-            low, high = joint_estimate.interval.low, joint_estimate.interval.high
+            low = joint_estimate.interval.low
+            high = joint_estimate.interval.high
             if value + spread < low:
                 verdict = "is larger than the macroscopic one"
             elif high is not None and value - spread > high:
@@ -173,7 +178,8 @@ def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
 def _unstated(measured: MeasuredStress) -> list[Message]:
     unstated: dict[str, float | None] = {}
     for profile in measured.profiles:
-        film, indenter = profile.scan.film, profile.scan.indenter
+        film = profile.scan.film
+        indenter = profile.scan.indenter
         stated = {
             "Young's modulus": film.young_modulus_uncertainty,
             "Poisson's ratio": film.poisson_ratio_uncertainty,

@@ -79,7 +79,8 @@ def same_apparatus(
     measured: MeasuredStress, apparatus: ApparatusFunction, *, override: bool
 ) -> MeasuredStress:
     """Refuse another apparatus function than that of a measured stress; or record it."""
-    altered, other = accepted_alterations(apparatus.source), []
+    altered = accepted_alterations(apparatus.source)
+    other = []
     if measured.artifact_digest != apparatus.content_digest:
         name = f" ({measured.artifact.file_name})" if measured.artifact else ""
         given = f" ({apparatus.source.file_name})" if apparatus.source else ""
@@ -121,7 +122,8 @@ def require_macroscopic(value: float | None, uncertainty: float | None, *, inter
         )
 
 
-FRICTIONLESS, APART = "frictionless", "apart"
+FRICTIONLESS = "frictionless"
+APART = "apart"
 """How lubricated loads are fitted: with no friction beside the others, or by themselves."""
 
 Tangential: TypeAlias = tuple[ApparatusFunction, Mapping[str, ProfileFamily], Sequence[Message]]
@@ -295,7 +297,8 @@ def _require_few(contacts: Sequence[Scan | MeasuredStress], *channels: str) -> N
             cure = "Average neighbouring readings, or compare without correlation and shear."
             raise too_large(name, size, MOST_COMPARED_TOGETHER, of, why=why, cure=cure)
     if (total := sum(size for _, size, _ in loads)) > MOST_COMPARED:
-        what, why = "What is compared", "Columns over them are held for each friction coefficient."
+        what = "What is compared"
+        why = "Columns over them are held for each friction coefficient."
         cure = "Average neighbouring readings, or leave out repeats."
         raise too_large(what, total, MOST_COMPARED, "readings", why=why, cure=cure)
 
@@ -450,7 +453,8 @@ def _loading_counted(
     joint: Mapping[str, Mapping[str, BoundedEstimate]],
 ) -> tuple[dict[str, tuple[LoadComparison, ...]], dict[str, dict[str, BoundedEstimate]]]:
     """Add to every budget what the other definition of the loading would have given."""
-    counted, together = dict(loads), {kind: dict(by) for kind, by in joint.items()}
+    counted = dict(loads)
+    together = {kind: dict(by) for kind, by in joint.items()}
     for name, other in permutations(loads, 2):
         counted[name] = tuple(
             replace(

@@ -36,7 +36,8 @@ def bracketed_share(
 ) -> float:
     """Return the share of stresses (n,) within 1.96 u of the extremes of calculated ones (m, n)."""
     # Away from the axis the profiles cross: the larger of the two extremes is above.
-    ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
+    ends = calculated[[0, -1]]
+    end_errors = calculated_errors[[0, -1]]
     allowed = EXPANDED * np.hypot(errors, end_errors)
     above = (ends + allowed).max(axis=0)
     return float(np.mean(((ends - allowed).min(axis=0) <= measured) & (measured <= above)))
@@ -68,7 +69,8 @@ def profile_estimate(
     turns = spline.derivative().roots(extrapolate=False)
     turns = turns[(around[0] < turns) & (turns < around[-1])]
     best = float(min([coordinates[i], *turns], key=spline))
-    lowest, least = float(spline(best)), float(CubicSpline(coordinates, chi_square)(best))
+    lowest = float(spline(best))
+    least = float(CubicSpline(coordinates, chi_square)(best))
 
     def interval(at: float) -> Interval:
         rise = float(chdtri(1, 1 - at))
@@ -79,7 +81,8 @@ def profile_estimate(
             0.0 if low is None else value_at(low), None if high is None else value_at(high), at
         )
 
-    wide, narrow = interval(level), interval(_ONE_SIGMA)
+    wide = interval(level)
+    narrow = interval(_ONE_SIGMA)
     # There is no value without an upper end, with ``two_sided`` without both; ``reason`` says why.
     if wide.high is None or (two_sided and not wide.two_sided):
         value = spread = None
@@ -157,7 +160,8 @@ class Confrontation:
 
     def _at(self, value: float, chosen: Sequence[int]) -> Likelihood:
         """Likelihood of some of the loads at one value."""
-        points, loads = [self.points[i] for i in chosen], [self.loads[i] for i in chosen]
+        points = [self.points[i] for i in chosen]
+        loads = [self.loads[i] for i in chosen]
         shear = None if self.shear is None else self.shear.only(chosen)
         return likelihood(points, self.sensor, self.family.at(value), loads, shear)
 
@@ -246,7 +250,8 @@ def load_comparison(
     profile: MeasuredProfile, confronted: Confrontation, index: int
 ) -> LoadComparison:
     """Compare a measured load, by its index, with every calculated profile of a family."""
-    family, load = confronted.family, confronted.loads[index]
+    family = confronted.family
+    load = confronted.loads[index]
     points = confronted.points[index]
     r = np.append(profile.r, 0.0)
     calculated, errors = _blurred(confronted.sensor, family, load, r, points)
@@ -334,9 +339,11 @@ def dry_against_lubricated(
     flat = np.column_stack([sides[0].flat, predicted[0].slope[0] * sides[0].side])[kept[0]]
     noise, correlation = _noise(both)
     left = points_at(sides[0].offset[kept[0]], sides[0], dry - wet, noise)
-    left, nothing = replace(left, flat=flat, correlation=correlation), np.zeros((1, noise.size))
+    left = replace(left, flat=flat, correlation=correlation)
+    nothing = np.zeros((1, noise.size))
     of_noise = standardise(left, Predicted(nothing, nothing, nothing, nothing, {}))
-    chi_square, degrees = float(np.sum(of_noise.residual**2)), left.degrees
+    chi_square = float(np.sum(of_noise.residual**2))
+    degrees = left.degrees
     difference, errors = _difference(profiles, sides, predicted, kept, sensor, conversion_share)
     top = profiles[0].maximum - profiles[1].maximum
     random = (random_uncertainty(profile.maximum_budget) for profile in profiles)
@@ -369,7 +376,8 @@ def _noise(
     both: Sequence[tuple[LoadPoints, Predicted, NDArray[np.intp]]],
 ) -> tuple[FloatArray, FloatArray | None]:
     """Noise of a difference, in V, without what both scans share, and its correlation if any."""
-    variance, shared = np.zeros(()), None
+    variance = np.zeros(())
+    shared = None
     for points, predicted, places in both:
         moved = predicted.by_load[0] * points.load_errors, predicted.slope[0] * points.x_errors
         variance = variance + np.sum(np.square([points.noise, *moved]), axis=0)[places]

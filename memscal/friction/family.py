@@ -215,7 +215,8 @@ def solve_paths(
         solve: Any = map
         if (several := min(workers, len(paths))) > 1:
             solve = stack.enter_context(worker_pool(several)).map
-        solved, total = solve(_solve, paths, [k] * len(paths)), sum(len(p.loads) for p in paths)
+        solved = solve(_solve, paths, [k] * len(paths))
+        total = sum(len(p.loads) for p in paths)
         return list(counted(solved, "contacts", total, lambda arrays: arrays["depths"].size))
 
 
@@ -237,10 +238,12 @@ def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
     spectra = seen(nominal, k)
     by_load = by_wavenumber = np.zeros_like(spectra)
     if path.derivatives:
-        lower, upper = seen(contacts[count:][:count], k), seen(contacts[2 * count :], k)
+        lower = seen(contacts[count:][:count], k)
+        upper = seen(contacts[2 * count :], k)
         # By P d/dP and not by the logarithm's own step: the force is then met exactly.
         by_load = (upper - lower) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
-        above, below = seen(nominal, k * (1 + _STRETCH)), seen(nominal, k * (1 - _STRETCH))
+        above = seen(nominal, k * (1 + _STRETCH))
+        below = seen(nominal, k * (1 - _STRETCH))
         by_wavenumber = (above - below) / (2 * _STRETCH)
     return {
         "spectra": spectra,
@@ -323,10 +326,13 @@ class FamilySetup:
             problem = f"Profiles were asked for under a {indenter.shape}, but a sphere is needed."
             why = "Friction shows under an indenter whose contact grows with the load."
             raise InputError(problem, why=why, cure="Give the sphere of the contact scan.")
-        self.film, self.indenter = film, indenter
+        self.film = film
+        self.indenter = indenter
         self.wavenumbers = base_wavenumbers(film.thickness, reach)
         self.loads = require_loads(loads)
-        self.cache, self.workers, self.order = cache, workers, order
+        self.cache = cache
+        self.workers = workers
+        self.order = order
 
     def path(self, **law: Any) -> LoadingPath:
         """Return the loading path of one member; ``law``: its friction, loading and interface."""
@@ -375,10 +381,12 @@ class FamilySetup:
         lengths: tuple[FloatArray, float] | None,
     ) -> dict[str, FloatArray]:
         """Solve the paths and derive what follows from them: the arrays that are kept."""
-        film, sphere = self.film, self.indenter
+        film = self.film
+        sphere = self.indenter
         ratios = None
         if u := film.poisson_ratio_uncertainty:
-            step, nu = max(u, _SMALLEST_STEP), film.poisson_ratio
+            step = max(u, _SMALLEST_STEP)
+            nu = film.poisson_ratio
             ratios = min(nu + step, 0.5), max(nu - step, 0.0)  # one-sided if incompressible
         # The strength of an interface counts beside a length of film or sphere alone.
         uncertain = film.thickness_uncertainty or sphere.radius_uncertainty

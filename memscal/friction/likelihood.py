@@ -80,7 +80,8 @@ class LoadPoints:
         def mean(values: FloatArray) -> FloatArray:
             return np.asarray((np.add.reduceat(values[order], starts, axis=0).T / counts).T)
 
-        noise, correlation = np.sqrt(mean(self.noise**2) / counts), None
+        noise = np.sqrt(mean(self.noise**2) / counts)
+        correlation = None
         if self.correlation is not None:
             single = np.outer(self.noise, self.noise) * self.correlation
             covariance = mean(mean(single).T)
@@ -245,7 +246,8 @@ def sensor_of(
 def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: int) -> Predicted:
     """Return what the sensor reads of members at the points of one load, by the load's index."""
     bessel = _Bessel.of(points, sensor)
-    spectra, transfer = members.spectra[:, load], sensor.transfer
+    spectra = members.spectra[:, load]
+    transfer = sensor.transfer
     by_load = bessel.values(transfer * members.by_load[:, load])
     slope = bessel.slopes(transfer * spectra)
     changed = [bessel.values(change * spectra) for change in sensor.changes.T]
@@ -279,7 +281,8 @@ class _Bessel:
     def of(cls, points: LoadPoints, sensor: Sensor) -> _Bessel:
         """Return those of a scalar, or of a vector's component where the order is one."""
         radius, back = np.unique(points.radius, return_inverse=True)
-        k, weights = sensor.wavenumbers.k, sensor.wavenumbers.weights
+        k = sensor.wavenumbers.k
+        weights = sensor.wavenumbers.weights
         phase = np.multiply.outer(radius, k)
         if not sensor.order:
             return cls(j0(phase) * weights, -j1(phase) * weights * k, back, 1.0)
@@ -338,7 +341,8 @@ def stacked(
     """Return what two channels read of the same contacts as the readings of one load."""
     # Common are the centre, the scatter of each contact's load and position, and all systematic
     # sources but what is left of each sensor; noise, baseline and drift are each channel's own.
-    points, predicted = (normal[0], shear[0]), (normal[1], shear[1])
+    points = (normal[0], shear[0])
+    predicted = (normal[1], shear[1])
     names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
     both: dict[str, Any] = {
         name: np.concatenate([getattr(side, name) for side in points]) for name in names
@@ -495,7 +499,8 @@ class Likelihood:
             for name, root in load.noises(index).items():
                 share = root * piece if root.ndim == 1 else root.T @ piece
                 shares[name] = float(np.hypot(shares.get(name, 0.0), np.linalg.norm(share)))
-        columns, start = self._systematic[0][index], 0
+        columns = self._systematic[0][index]
+        start = 0
         for source, width in _widths(self.loads).items():
             shares[source] = float(np.linalg.norm(gain @ columns[:, start : start + width]))
             start += width
@@ -523,7 +528,8 @@ def _widths(loads: Sequence[Standardised]) -> dict[str, int]:
 
 def _columns(loads: Sequence[Standardised]) -> list[FloatArray]:
     """Return all sources' columns (V, n, q) of each load, zero where it does not know a source."""
-    widths, stacked = _widths(loads), []
+    widths = _widths(loads)
+    stacked = []
     for load in loads:
         shape = load.residual.shape
         columns = [load.columns.get(name, np.zeros((*shape, q))) for name, q in widths.items()]

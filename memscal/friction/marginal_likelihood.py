@@ -54,7 +54,8 @@ class Tables(NamedTuple):
 
 def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
     """Return the logarithm of the likelihood, and chi-square, of each entry of tables."""
-    squares, q = tables.squares, tables.pulls.shape[-1]
+    squares = tables.squares
+    q = tables.pulls.shape[-1]
     # One factorisation gives both: the last pivot of M bordered by g is chi-square (plus one, so
     # that data without any misfit do not make it singular).
     bordered = np.empty((*squares.shape, q + 1, q + 1))
@@ -86,7 +87,8 @@ def evidence_of_each(
     draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS if steps else None
     paths = _PATHS if steps else 1
     taken = Tables(*(np.zeros((paths, *array.shape[2:])) for array in tables[0]))
-    logs, before = np.zeros(paths), np.zeros(paths)
+    logs = np.zeros(paths)
+    before = np.zeros(paths)
     for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
         both = Tables(
             *(old[:, None] + new[None, :, 0] for old, new in zip(taken, table, strict=True))

@@ -59,7 +59,8 @@ _SLIP_LENGTHS = (1e-7, 1e-4)
 #: Other ranges of them, whose Bayes factors are stated beside.
 _OTHER_SLIP_LENGTHS = ((1e-6, 1e-5), (1e-8, 1e-3))
 #: Over these the likelihood is looked at.
-_WIDEST, _DECADES = _OTHER_SLIP_LENGTHS[-1], 81
+_WIDEST = _OTHER_SLIP_LENGTHS[-1]
+_DECADES = 81
 #: Lengths of the normal law, as shares of the largest that was calculated.
 _NORMAL_SHARES = (1e-2, 1.0)
 _UM = 1e-6
@@ -113,8 +114,10 @@ def weigh_normal_compliance(measured: Measured) -> LawComparison:
         uniform_prior(high, f"length uniform up to {high / _UM:.3g} um"),
     )
     along = curve(measured, also=np.geomspace(low / 10, high, _DECADES))
-    top, least = float(along.log_likelihood[0]), float(along.chi_square[0])
-    degrees, name = measured.degrees, "rigid, frictionless"
+    top = float(along.log_likelihood[0])
+    least = float(along.chi_square[0])
+    degrees = measured.degrees
+    name = "rigid, frictionless"
     rigid = InterfaceLaw(name, (), top, top, 0.0, least, degrees, _p_value(degrees, least))
     yielding = one_of_all("normal compliance, length", along, prior, degrees)
     return LawComparison(
@@ -267,7 +270,9 @@ def _messages(
 
 #: Nodes over all values, over those that the data do not exclude, and over those of one load,
 #: whose parameter is known better with others than alone.
-_COARSE, _FINE, _FINER = 81, 161, 321
+_COARSE = 81
+_FINE = 161
+_FINER = 321
 #: Values are excluded where twice the log-likelihood falls short of the best by this.
 _EXCLUDED = 25.0
 #: Sweeps over the loads that look for the best parameter of each.
@@ -328,7 +333,8 @@ class LawCurve:
 def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
     """Return the likelihood along a family's parameter, of all loads or of one by its index."""
     family = measured.family
-    first, last = family.coordinates[0], family.coordinates[-1]
+    first = family.coordinates[0]
+    last = family.coordinates[-1]
     # Nodes are even in the bounded coordinate, closer where it matters.
     extra = [family.coordinate(value) for value in also]
     coarse = np.unique(np.concatenate([np.linspace(first, last, _COARSE), extra]))
@@ -340,7 +346,8 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     rough = tables_at(coarse)
     rough_log = log_likelihood(rough)[0][:, 0]
     near = np.flatnonzero(2 * (rough_log.max() - rough_log) < _EXCLUDED)
-    low, high = coarse[max(near[0] - 1, 0)], coarse[min(near[-1] + 1, coarse.size - 1)]
+    low = coarse[max(near[0] - 1, 0)]
+    high = coarse[min(near[-1] + 1, coarse.size - 1)]
     fine = np.setdiff1d(np.linspace(low, high, _FINE if load is None else _FINER), coarse)
     close = tables_at(fine)
     both = np.concatenate([coarse, fine])
@@ -349,14 +356,17 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     t = both[order]
     logs, chi_square = log_likelihood(tables)
     middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
-    values, edges = family.values_at(t), family.values_at(middles)
+    values = family.values_at(t)
+    edges = family.values_at(middles)
     return LawCurve(values, t, edges, tables, logs[:, 0], chi_square[:, 0])
 
 
 def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter for all loads; degrees are points less nuisances."""
-    best, log_evidence = float(along.values[along.best]), along.log_evidence(prior)
-    top, least = float(along.log_likelihood[along.best]), float(along.chi_square[along.best])
+    best = float(along.values[along.best])
+    log_evidence = along.log_evidence(prior)
+    top = float(along.log_likelihood[along.best])
+    least = float(along.chi_square[along.best])
     p_value = _p_value(degrees - 1, least)
     return InterfaceLaw(name, (best,), log_evidence, top, 0.0, least, degrees - 1, p_value)
 
@@ -387,7 +397,9 @@ def _p_value(degrees: int, least: float) -> float:
 
 def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int], float, float]:
     """Climb the likelihood, one load after the other, from node to node."""
-    chosen, top, chi_square = list(start), -np.inf, 0.0
+    chosen = list(start)
+    top = -np.inf
+    chi_square = 0.0
     for _ in range(_SWEEPS):
         before = top
         for j, table in enumerate(tables):
@@ -396,7 +408,8 @@ def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int]
             both = Tables(*(a + s for a, s in zip(table, sums, strict=True)))
             logs, squares = log_likelihood(both)
             chosen[j] = int(np.argmax(logs[:, 0]))
-            top, chi_square = float(logs[chosen[j], 0]), float(squares[chosen[j], 0])
+            top = float(logs[chosen[j], 0])
+            chi_square = float(squares[chosen[j], 0])
         if top - before < _SETTLED:
             break
     return chosen, top, chi_square
@@ -415,7 +428,8 @@ def implied_friction(
     lengths = np.array([length.interval.low, length.best, length.interval.upper])
     t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
     values = rigid.family.values_at(t)
-    curves, maxima = _maxima(rigid, values), _maxima(slipping, lengths)
+    curves = _maxima(rigid, values)
+    maxima = _maxima(slipping, lengths)
     implied = [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
     family = slipping.family
     pressures = (family.loads / (np.pi * family.at(length.best).contact_radii[0] ** 2))[order]
@@ -426,7 +440,8 @@ def implied_friction(
 
 def _maxima(measured: Measured, values: FloatArray) -> FloatArray:
     """Return stresses on the axis behind G, times A, shape (V, L)."""
-    sensor, spectra = measured.sensor, measured.family.at(values).spectra
+    sensor = measured.sensor
+    spectra = measured.family.at(values).spectra
     return np.asarray(spectra @ (sensor.transfer * sensor.wavenumbers.weights))
 
 
@@ -437,7 +452,8 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
     above = int(np.argmax(curve >= top))
     if above == 0:
         return float(values[0])
-    low, high = curve[above - 1], curve[above]
+    low = curve[above - 1]
+    high = curve[above]
     last = values[above] if np.isfinite(values[above]) else values[above - 1]
     share = (top - low) / (high - low)
     return float(values[above - 1] + share * (last - values[above - 1]))
@@ -458,7 +474,8 @@ def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> Bound
 
 
 def _length_reason(what: str, interval: Interval, last: float) -> str:
-    low, high = interval.low, interval.high
+    low = interval.low
+    high = interval.high
     if low > 0 and high is not None:
         return ""
     largest = f"the largest that was calculated, {last / _UM:.3g} um,"

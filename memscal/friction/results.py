@@ -103,7 +103,8 @@ class BoundedEstimate:
     def __str__(self) -> str:
         """Return the value with its interval, or the bound that is left of it."""
         scale, tail = (_UM, " um") if self.unit else (1.0, "")
-        low, level = self.interval.low / scale, percent(self.interval.level)
+        low = self.interval.low / scale
+        level = percent(self.interval.level)
         value = None if self.value is None else self.value / scale
         if self.interval.high is None:
             if low <= 0:

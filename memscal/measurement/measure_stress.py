@@ -247,7 +247,8 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
 
 def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
     """Return the name of a profile, and its readings."""
-    points, source = profile.points.get("zz"), profile.scan.source
+    points = profile.points.get("zz")
+    source = profile.scan.source
     arrays = (points.x, points.y, points.u) if points else (profile.r, profile.s_zz)
     named = f"{source.file_name}, {profile.label}" if source else profile.label
     return f"The profile of {named}", tuple(array.tobytes() for array in arrays)

@@ -99,7 +99,8 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
     """Solve all loads on one path."""
     # Contacts at P and P(1 +- 2 %) give dU/d ln P.  One that sticks is stiffer, its derivative
     # larger by up to 40 % on the axis.  A lubricated contact, and a rod's, is frictionless.
-    scan, near = loads[0], np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
+    scan = loads[0]
+    near = np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
     slides = scan.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
     targets, places = np.unique(np.outer([s.stated_load for s in loads], near), return_inverse=True)
     paths = [_path(scan, targets, mu) for mu in ((0.0,) if slides else (0.0, math.inf))]
@@ -119,10 +120,12 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
 
 
 def _path(scan: Scan, loads: FloatArray, friction: float) -> Sequence[Contact]:
-    film, indenter = scan.set_up.film, scan.set_up.indenter
+    film = scan.set_up.film
+    indenter = scan.set_up.indenter
     if isinstance(indenter, Rod):
         return indent(film, indenter, load=loads, friction=friction, strain="linear")
-    law, goals = Interface(), tuple(map(Load, loads.tolist()))
+    law = Interface()
+    goals = tuple(map(Load, loads.tolist()))
     request = RingRequest(
         film, indenter, law, goals, friction, "incremental", "hankel", None, _RINGS, compared=False
     )
@@ -141,7 +144,8 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
     if scan.y is not None:
         return
     order = np.argsort(scan.x)
-    x, measured = scan.x[order], (complete.reshape(-1, scan.x.size).sum(axis=0) > 0)[order]
+    measured = (complete.reshape(-1, scan.x.size).sum(axis=0) > 0)[order]
+    x = scan.x[order]
     places = np.flatnonzero(measured)
     missing = np.diff(places) - 1
     gaps = np.where(missing > 0, np.diff(x[places]), 0.0)
@@ -196,14 +200,17 @@ class _Found:
 
 def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
     estimate, _ = gaussian_pressure(scan, apparatus, points)
-    signal, rest = estimate.predicted - estimate.background, estimate.weighed.residual
-    weight, count = estimate.outlier_weight, estimate.gaussian.jacobian.shape[1]
+    signal = estimate.predicted - estimate.background
+    rest = estimate.weighed.residual
+    weight = estimate.outlier_weight
+    count = estimate.gaussian.jacobian.shape[1]
     return _Found(estimate.centre, estimate.distance, signal, rest, weight, count, estimate)
 
 
 def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
     fit = plain_pressure(scan, apparatus, points)
-    signal, rest = fit.conversion_constant * fit.jacobian[:, 0], points.u - fit.predicted
+    signal = fit.conversion_constant * fit.jacobian[:, 0]
+    rest = points.u - fit.predicted
     count = fit.jacobian.shape[1]
     return _Found(fit.centre[0], fit.geometry.radius, signal, rest, np.ones_like(rest), count)
 
@@ -225,7 +232,8 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
     if scan.normal_load is None:
         return prepared
     # Centre and noise are estimated twice, the second time from the first one's scan.
-    errors, (x, y) = scan.normal_load_errors, scan.positions
+    errors = scan.normal_load_errors
+    (x, y) = scan.positions
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.stated_load
     for find in (_found_quickly, _found):
         level = prepared.scan
@@ -268,7 +276,8 @@ def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan
 
 def _noise_of_load(found: _Found, of_load: FloatArray) -> float:
     """Noise beside that of the loads, by maximum likelihood of the residuals."""
-    residual, count = found.residual, found.residual.size
+    count = found.residual.size
+    residual = found.residual
     # The fitted parameters lower the scatter of the residuals.
     square = found.weight * residual**2 * count / max(count - found.parameters, 1)
     scatter = 1.4826 * float(np.median(np.abs(residual)))
@@ -302,14 +311,16 @@ def measured_profile(
     signal: ContactSignal,
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
-    a, estimate = restored.apparatus.conversion_constant, restored.posterior.estimate
+    a = restored.apparatus.conversion_constant
+    estimate = restored.posterior.estimate
     noise = restored.noise / np.sqrt(estimate.outlier_weight)
     average, x, y = _averaging(restored, noise)
     drift = restored.posterior.state[restored.posterior.nodes + int(restored.points.free.sum()) :]
     level = average @ (restored.points.u - estimate.model.drift_columns @ drift)
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
-    average, s_zz = average[order], level[order] / a
+    average = average[order]
+    s_zz = level[order] / a
     relative = restored.apparatus.parameters.uncertainty("conversion_constant") / a
     if (factor := restored.points.decorrelation) is None:
         of_noise = np.sqrt(average.power(2) @ noise**2)
@@ -400,14 +411,17 @@ def _averaging(restored: Restoration, noise: FloatArray) -> tuple[Any, FloatArra
 
 def _of_place(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
     """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
-    posterior, model = restored.posterior, restored.posterior.estimate.model
-    nodes, free = posterior.nodes, restored.points.free
+    model = restored.posterior.estimate.model
+    posterior = restored.posterior
+    nodes = posterior.nodes
+    free = restored.points.free
     geometry = model.geometry(np.atleast_2d(restored.centre))
     film = film_transfer(restored.scan, model.reference.wavenumbers)
     pressure = posterior.state[:nodes] / restored.scan.stated_load / film
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     columns = [average @ column / restored.apparatus.conversion_constant for column in columns]
-    sigma, n = posterior.covariance[nodes:, nodes:], int(free.sum())
+    sigma = posterior.covariance[nodes:, nodes:]
+    n = int(free.sum())
     carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
     of_centre = columns[0] + columns[1] @ carried.T
     return {
@@ -418,13 +432,17 @@ def _of_place(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
 
 def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     """Return the blurred stress on the axis and its standard uncertainty by source, in Pa."""
-    posterior, apparatus = restored.posterior, restored.apparatus
+    posterior = restored.posterior
+    apparatus = restored.apparatus
     wavenumbers = posterior.estimate.model.reference.wavenumbers
-    nodes, k = posterior.nodes, wavenumbers.k
+    nodes = posterior.nodes
+    k = wavenumbers.k
     on_axis = wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]
     transfer = sensor_transfer(apparatus, k)
-    row, state = on_axis * transfer, posterior.state[:nodes]
-    maximum, a = float(row @ state), apparatus.conversion_constant
+    row = on_axis * transfer
+    state = posterior.state[:nodes]
+    maximum = float(row @ state)
+    a = apparatus.conversion_constant
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
     shared = shared_changes(apparatus, [restored.scan], np.append(k, 0.0))
     of_film = [shared.get(name, np.zeros(k.size + 1)) for name in posterior.film_inputs]

@@ -115,7 +115,8 @@ def _orders(m: float, nodes: bytes, width: float) -> tuple[FloatArray, FloatArra
     if math.isinf(m):
         same = gaussian_transfer(k, width)
         return same, same, same
-    z, b = -(m + 2) * (k * width) ** 2 / 2, m + 2
+    z = -(m + 2) * (k * width) ** 2 / 2
+    b = m + 2
     first, second = (np.asarray(hyp0f1(b + i, z), np.float64) for i in (1, 2))
     # Downwards the recurrence is stable (DLMF 10.6.1).
     return first + z / (b * (b + 1)) * second, first, second
@@ -124,7 +125,8 @@ def _orders(m: float, nodes: bytes, width: float) -> tuple[FloatArray, FloatArra
 @lru_cache(maxsize=16)
 def _pull(film: ElasticFilm, k: bytes) -> FloatArray:
     """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
-    x, nu = np.frombuffer(k) * film.thickness, film.poisson_ratio
+    x = np.frombuffer(k) * film.thickness
+    nu = film.poisson_ratio
     return np.asarray(base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
 
 
@@ -168,7 +170,9 @@ class ShapeFit:
     @classmethod
     def of(cls, start: ProfileEstimate, weighing: Weighing) -> "ShapeFit":
         """Average the hypotheses about the fit of a shape."""
-        model, fit, weighed = start.model, weighing.reduced.fit, weighing.average()
+        model = start.model
+        fit = weighing.reduced.fit
+        weighed = weighing.average()
         kernels = weighing.basis.kernels(model.k)
         rows = np.vstack([kernels, np.eye(weighing.basis.flat, kernels.shape[1])[2:]])
         pressure = fit.conversion_constant * kernels[:, 0]
@@ -189,7 +193,8 @@ class ShapeFit:
 
 def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
     """Fit the shapes, and weigh departures from each fit."""
-    model, pairs = start.model, []
+    model = start.model
+    pairs = []
     for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
         about = departure_basis(model, fit)
         rings = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in about.rings)
@@ -199,15 +204,20 @@ def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> l
 
 
 #: Steps of the fits; largest relative change of a width in one; what is left where it has settled.
-_STEPS, _LONGEST, _SETTLED = 20, 0.5, 1e-3
+_STEPS = 20
+_LONGEST = 0.5
+_SETTLED = 1e-3
 
 
 def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[GaussianFit]:
     """Fit force and width of each shape; keep the Gaussian's where that fails."""
     # All shapes share the waves about the Gaussian's centre.  Another one's lies within a tenth of
     # the width from there: weighing the departures, linear in the centre, takes that step.
-    gaussian, points, drift = start.gaussian, start.points, start.model.drift_columns.shape[1]
-    force, width = gaussian.conversion_constant, max(gaussian.sigma, _NARROWEST * points.step)
+    gaussian = start.gaussian
+    points = start.points
+    drift = start.model.drift_columns.shape[1]
+    force = gaussian.conversion_constant
+    width = max(gaussian.sigma, _NARROWEST * points.step)
     forces, widths = (np.full(len(shapes), value) for value in (force, width))
     data = points.standardised(points.u, start.weights)
     growth = np.zeros_like(widths)
@@ -226,23 +236,29 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
             break
     fits = (forces > 0) & (np.abs(ahead) < _SETTLED)
     fits &= (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
-    forces, widths = np.where(fits, forces, force), np.where(fits, widths, width)
+    forces = np.where(fits, forces, force)
+    widths = np.where(fits, widths, width)
     columns = np.moveaxis(_shape_columns(shapes, start, forces, widths), 1, 0)
     background = start.model.drift_columns @ gaussian.drift
     return [
         replace(
-            gaussian, conversion_constant=float(force), sigma=float(width), ellipticity=np.zeros(2),
-            jacobian=jacobian, predicted=force * jacobian[:, 0] + background,
+            gaussian,
+            conversion_constant=float(force),
+            sigma=float(width),
+            ellipticity=np.zeros(2),
+            jacobian=jacobian,
+            predicted=force * jacobian[:, 0] + background,
         )
         for force, width, jacobian in zip(forces, widths, columns, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _shape_columns(
     shapes: Sequence[PressureShape], start: ProfileEstimate, forces: FloatArray, widths: FloatArray
 ) -> FloatArray:
     """Derivatives of the voltages by force, width, centre and drift, (n, shapes, p)."""
-    model, geometry = start.model, start.gaussian.geometry
+    model = start.model
+    geometry = start.gaussian.geometry
     pairs = [shape.transform(model.k, w) for shape, w in zip(shapes, widths, strict=True)]
     kernels, slopes = (np.stack(each, axis=1) for each in zip(*pairs, strict=True))
     signal, widening = np.hsplit(model.signal(geometry, np.hstack([kernels, slopes])), 2)
@@ -312,20 +328,23 @@ def posterior_of(
     log_marginal = np.array([each.log_marginal_likelihoods[0] for each in weighed])
     weight = np.exp(log_marginal - log_marginal.max())
     kept = np.flatnonzero(weight >= _NEGLIGIBLE)
-    fits, shares = [ShapeFit.of(estimate, weighed[i]) for i in kept], weight[kept]
+    fits = [ShapeFit.of(estimate, weighed[i]) for i in kept]
+    shares = weight[kept]
     shares /= shares.sum()
     mean = shares @ np.stack([fit.state for fit in fits])
     gain = reduce(add, (fit.gain * share for fit, share in zip(fits, shares, strict=True)))
     within = sum(share * fit.covariance for fit, share in zip(fits, shares, strict=True))
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
-    model, nodes = estimate.model, estimate.model.k.size
+    nodes = estimate.model.k.size
+    model = estimate.model
     film = film_transfer(scan, model.reference.wavenumbers)
     scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
     by_film = _film_changes(scan, model.reference.wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
     of_sensor = apparatus_changes(apparatus, model.k, shared)
     of_load = shared.pop("load", None)
-    names, nothing = tuple(dict.fromkeys([*by_film, *shared])), np.zeros(nodes)
+    names = tuple(dict.fromkeys([*by_film, *shared]))
+    nothing = np.zeros(nodes)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
     of_film, of_kernel = (
         np.array([known.get(name, nothing) for name in names]).reshape(-1, nodes).T
@@ -363,8 +382,10 @@ def posterior_of(
 
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
     """Voltages of the pressure through changed references, shape (n, q), in V."""
-    model, kernel = estimate.model, state[: estimate.model.k.size]
-    geometry, wavenumbers = estimate.gaussian.geometry, model.reference.wavenumbers
+    kernel = state[: estimate.model.k.size]
+    model = estimate.model
+    geometry = estimate.gaussian.geometry
+    wavenumbers = model.reference.wavenumbers
     references = [(RadialSpectrum(wavenumbers, change),) for change in changes.T]
     columns = [replace(model, references=own).signal(geometry, kernel) for own in references]
     return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
@@ -391,7 +412,8 @@ def shared_changes(
 
     By one standard uncertainty of each property of its film, and of the load on its load cell.
     """
-    known, names = apparatus.film, list[str]()
+    known = apparatus.film
+    names = list[str]()
     if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
         names += _OF_FILM
     if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
@@ -444,7 +466,8 @@ def _of_sensor(
     apparatus: ApparatusFunction, nodes: bytes, without: tuple[str, ...] = ()
 ) -> tuple[FloatArray, FloatArray]:
     """Return transfer function and changes, which all profiles of one sensor share."""
-    profile, a = apparatus.radial_profile, apparatus.conversion_constant
+    profile = apparatus.radial_profile
+    a = apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
     covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
     if profile.conversion_correlation is not None:

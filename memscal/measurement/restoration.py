@@ -64,7 +64,8 @@ def compare_stress(
             "proportional to it.",
             cure="Calculate the stress for the scan's load.",
         )
-    model, nodes = posterior.estimate.model, posterior.nodes
+    model = posterior.estimate.model
+    nodes = posterior.nodes
     if isinstance(stress, Contact):
         spectrum = stress.base_spectrum(model.k) / stress.load
     else:
@@ -90,8 +91,11 @@ def compare_stress(
 
 def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[float, int]:
     """Return chi-square of the scan against a calculated stress, and its degrees of freedom."""
-    estimate, points = posterior.estimate, posterior.estimate.points
-    model, free, centres = estimate.model, points.free, np.zeros(points.free.shape)
+    points = posterior.estimate.points
+    estimate = posterior.estimate
+    model = estimate.model
+    centres = np.zeros(points.free.shape)
+    free = points.free
     centres[free] = posterior.state[posterior.nodes : posterior.nodes + free.sum()]
     geometry = model.geometry(centres)
     pressure = spectrum / film_transfer(scan, model.reference.wavenumbers)
@@ -183,7 +187,8 @@ class Restoration(Result, Checked):
 
     def stress_uncertainty(self, r: ArrayLike) -> FloatArray:
         """Return the standard uncertainty (k = 1) of :meth:`stress`, in Pa."""
-        matrix, nodes = self._synthesis(r), self.posterior.nodes
+        matrix = self._synthesis(r)
+        nodes = self.posterior.nodes
         covariance = self.posterior.covariance[:nodes, :nodes]
         variance = np.einsum("...j,jk,...k->...", matrix, covariance, matrix)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
@@ -201,7 +206,9 @@ class Restoration(Result, Checked):
     @property
     def force_budget(self) -> Mapping[str, float]:
         """Standard uncertainty of the force by source, in N."""
-        row, n, covariances = self._at_zero, self.posterior.nodes, self.posterior.covariances
+        row = self._at_zero
+        n = self.posterior.nodes
+        covariances = self.posterior.covariances
         variances = {name: float(row @ c[:n, :n] @ row) for name, c in covariances.items()}
         return {name: float(np.sqrt(max(v, 0.0))) for name, v in variances.items()}
 
@@ -233,7 +240,8 @@ class Restoration(Result, Checked):
     @property
     def distance(self) -> FloatArray:
         """Distance of each point from the centre, shape (points,), in m."""
-        dx, dy = self.points.x - self.centre[0], self.points.y - self.centre[1]
+        dx = self.points.x - self.centre[0]
+        dy = self.points.y - self.centre[1]
         return np.asarray(np.hypot(dx, dy))
 
     @property
@@ -278,7 +286,8 @@ class Restoration(Result, Checked):
 
     def blurred_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
-        k, nodes = self.posterior.estimate.model.k, self.posterior.nodes
+        k = self.posterior.estimate.model.k
+        nodes = self.posterior.nodes
         blurred = sensor_transfer(self.apparatus, k) * self.posterior.state[:nodes]
         return np.asarray(self._synthesis(r) @ blurred)
 
@@ -312,9 +321,11 @@ class Restoration(Result, Checked):
 
         Of the centre only the coordinates that the scan determines: shape (4, 4) or (5, 5).
         """
-        nodes, first_drift = self.posterior.nodes, self._first_drift
+        nodes = self.posterior.nodes
+        first_drift = self._first_drift
         rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
-        rows[0, :nodes], rows[1, :nodes] = self._at_zero, self._synthesis(0.0)
+        rows[0, :nodes] = self._at_zero
+        rows[1, :nodes] = self._synthesis(0.0)
         rows[2:, nodes : first_drift + 1] = np.eye(first_drift + 1 - nodes)
         return np.asarray(rows @ self.posterior.covariance @ rows.T)
 
@@ -337,7 +348,8 @@ class Restoration(Result, Checked):
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
-        radii, reach = np.abs(np.asarray(r, dtype=np.float64)), reach_of(self.points)
+        radii = np.abs(np.asarray(r, dtype=np.float64))
+        reach = reach_of(self.points)
         if not np.all(radii <= reach):
             why = f"The stress was restored out to {reach * 1e3:.4g} mm."
             cure = "Give radii in metres, within 1.5 times the scan's width."

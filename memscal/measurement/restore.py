@@ -128,7 +128,8 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
         return
-    low, high = float(np.nanmin(load)), float(np.nanmax(load))
+    low = float(np.nanmin(load))
+    high = float(np.nanmax(load))
     if high - low > SAME_LOAD * scan.stated_load:
         raise InputError(
             f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
@@ -175,12 +176,14 @@ def accept_other_sensor(
     sources = (scan.source, "scan"), (apparatus.source, "artifact")
     places = tuple(scan_points.file_in_words(*source) for source in sources)
     apparatus.require_pascals()
-    unit, si = scan.unit or "V", apparatus.reading.si
+    unit = scan.unit or "V"
+    si = apparatus.reading.si
     if unit != si:
         problem = f"The readings of {places[0]} are in {unit}, those of the artifact in {si}."
         cure = "Give the artifact of this sensor, or correct the units of /entry/data/u_zz."
         raise InputError(problem, cure=cure)
-    sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
+    sensors = (scan.sensor, apparatus.sensor)
+    films = (scan.film, apparatus.film)
     return scan_points.accepted_differences(
         [
             *scan_points.stated_differences(SENSOR, names, sensors, places),
@@ -257,10 +260,12 @@ def _noise(restored: Restoration) -> list[QualityCheck]:
 def _symmetry(restored: Restoration) -> QualityCheck:
     estimate = restored.posterior.estimate
     if restored.points.planar:
-        name, uneven = "axisymmetry", axisymmetry_test(estimate)
+        name = "axisymmetry"
+        uneven = axisymmetry_test(estimate)
         meaning = "elliptic columns. A failure means that the contact, or the sensor, is not round."
     else:
-        name, uneven = "symmetry", symmetry_test(estimate)
+        name = "symmetry"
+        uneven = symmetry_test(estimate)
         meaning = (
             "odd columns. A failure means that the left and right halves differ: a tilted "
             "indenter, an uneven film, or a drifting load."

@@ -22,12 +22,15 @@ from memscal.model.stress import StressProfile
 
 # Steps and reach of a profile's default radii near the contact and far from it, in film
 # thicknesses: a cubic spline through them is good to 1e-6 of the maximum.
-_NEAR_STEP, _FAR_STEP = 0.02, 0.05
-_NEAR_REACH, _FAR_REACH = 6.0, 26.0
+_NEAR_STEP = 0.02
+_FAR_STEP = 0.05
+_NEAR_REACH = 6.0
+_FAR_REACH = 26.0
 # The profile ends where the stress stays below this fraction of its maximum.
 _PROFILE_FLOOR = 1e-9
 # Radii at which the largest interface pressure and base stress are sought; the latter is smooth.
-_PRESSURE_SAMPLES, _BASE_SAMPLES = 2001, 128
+_PRESSURE_SAMPLES = 2001
+_BASE_SAMPLES = 128
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -114,7 +114,8 @@ def base_shear_from_shear(x: ArrayLike, nu: float) -> FloatArray:
 def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return x, exp(-2x), 2 exp(-2x) D and kappa."""
     x = np.minimum(np.asarray(x, dtype=np.float64), _LARGEST_X)
-    kappa, decay = 3 - 4 * nu, np.exp(-2 * x)
+    kappa = 3 - 4 * nu
+    decay = np.exp(-2 * x)
     return x, decay, kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1), kappa
 
 
@@ -170,8 +171,10 @@ def base_spectrum(
     film: ElasticFilm, traction: InterfaceTraction, k: FloatArray, *, order: int = 0
 ) -> FloatArray:
     r"""Return :math:`T\hat p - N\hat q`; of ``order`` one :math:`-(S\hat p + R\hat q)`; in N."""
-    x, nu = k * film.thickness, film.poisson_ratio
-    p, q = traction.pressure_transform(k), traction.shear_transform(k)
+    x = k * film.thickness
+    nu = film.poisson_ratio
+    p = traction.pressure_transform(k)
+    q = traction.shear_transform(k)
     if order:
         return -(base_shear_from_pressure(x, nu) * p + base_shear_from_shear(x, nu) * q)
     return base_normal_from_pressure(x, nu) * p - base_normal_from_shear(x, nu) * q
@@ -181,7 +184,8 @@ def base_stress(
     film: ElasticFilm, traction: InterfaceTraction, r: FloatArray, *, order: int = 0
 ) -> FloatArray:
     """Return stress, or of ``order`` one traction, at the base (Pa), to 1e-13 of the peak."""
-    h, flat = film.thickness, np.ravel(r)
+    h = film.thickness
+    flat = np.ravel(r)
     inside = np.flatnonzero(flat <= traction.radius + _DECAYED * h)
     sorting = inside[np.argsort(flat[inside], kind="stable")]
     stress = np.zeros_like(flat)
@@ -226,7 +230,9 @@ class RingTraction:
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
-        p, q, singular = self.pressures, self.shears, surface.singular_integrals(r, self.rings)
+        p = self.pressures
+        q = self.shears
+        singular = surface.singular_integrals(r, self.rings)
         beyond, within = surface.coupling_integrals(r, self.rings)
         return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
 
@@ -254,7 +260,8 @@ _CHUNK = 2048
 @lru_cache(maxsize=8)
 def _hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     """Return the hats' transforms of one order, (k, rings); the contacts of a path share them."""
-    rings, k = np.frombuffer(ring_bytes), np.frombuffer(k_bytes)
+    rings = np.frombuffer(ring_bytes)
+    k = np.frombuffer(k_bytes)
     widths = np.diff(rings)
     # Gauss nodes between the rings, enough for the largest wavenumber in the widest gap.
     count = 4 + math.ceil(0.7 * float(k.max() * widths.max()))
@@ -276,8 +283,10 @@ class HankelFilm:
     @cached_property
     def compliance(self) -> surface.SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        film, r = self.film, self.r
-        direct, across = surface.singular_integrals(r, r), surface.coupling_integrals(r, r)
+        film = self.film
+        r = self.r
+        direct = surface.singular_integrals(r, r)
+        across = surface.coupling_integrals(r, r)
         k, weights = _wavenumbers(film, 2 * r[-1])
         layer = _layer_integrals(film, r, (k, weights), hat_transforms(r, k))
         matrices = _displacements(film, (direct[0], *across, direct[1]), layer)
@@ -361,9 +370,12 @@ def _layer_integrals(
     film: ElasticFilm, x: FloatArray, wavenumbers: _Pair, transforms: _Pair
 ) -> HalfSpaceIntegrals:
     """Return what the base takes from the surface's displacements at ``x``, times G/(1 - nu)."""
-    (k, weights), (p, q) = wavenumbers, transforms
-    kh, nu = k * film.thickness, film.poisson_ratio
-    normal, radial = j0(np.multiply.outer(x, k)) * weights, j1(np.multiply.outer(x, k)) * weights
+    (k, weights) = wavenumbers
+    (p, q) = transforms
+    kh = k * film.thickness
+    nu = film.poisson_ratio
+    normal = j0(np.multiply.outer(x, k)) * weights
+    radial = j1(np.multiply.outer(x, k)) * weights
     coupling = coupling_correction(kh, nu)
     w_by_p = (normal * normal_correction(kh, nu)) @ p
     u_by_q = (radial * radial_correction(kh, nu)) @ q
@@ -375,7 +387,8 @@ def _displacements(
 ) -> HalfSpaceIntegrals:
     """Add both shares up to the depression by p and q, and the outward displacement by p and q."""
     nu = film.poisson_ratio
-    scale, beta = (1 - nu) / film.shear_modulus, half_space_coupling(nu)
+    scale = (1 - nu) / film.shear_modulus
+    beta = half_space_coupling(nu)
     return (
         scale * (half_space[0] + layer[0]),
         scale * (beta * half_space[1] + layer[1]),

@@ -31,22 +31,36 @@ _SAME = 1e-6
 
 @overload
 def indent(
-    film: ElasticFilm, indenter: Indenter, *,
-    load: float | None = None, depth: float | None = None,
-    friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
-    interface: Interface | None = None, strain: str | None = None,
-    film_radius: float | None = None, rings: int | None = None,
+    film: ElasticFilm,
+    indenter: Indenter,
+    *,
+    load: float | None = None,
+    depth: float | None = None,
+    friction: float = 0.0,
+    loading: str = "incremental",
+    backend: str = "hankel",
+    interface: Interface | None = None,
+    strain: str | None = None,
+    film_radius: float | None = None,
+    rings: int | None = None,
     progress: Listener = None,
-) -> Contact: ...  # fmt: skip
+) -> Contact: ...
 @overload
 def indent(
-    film: ElasticFilm, indenter: Indenter, *,
-    load: _Several | None = None, depth: _Several | None = None,
-    friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
-    interface: Interface | None = None, strain: str | None = None,
-    film_radius: float | None = None, rings: int | None = None,
+    film: ElasticFilm,
+    indenter: Indenter,
+    *,
+    load: _Several | None = None,
+    depth: _Several | None = None,
+    friction: float = 0.0,
+    loading: str = "incremental",
+    backend: str = "hankel",
+    interface: Interface | None = None,
+    strain: str | None = None,
+    film_radius: float | None = None,
+    rings: int | None = None,
     progress: Listener = None,
-) -> list[Contact]: ...  # fmt: skip
+) -> list[Contact]: ...
 @reported
 @single_threaded()
 def indent(
@@ -150,7 +164,8 @@ def indent(
                 cure='Use backend="fem" for a film with a free edge.',
             )
     targets, several = _targets(load, depth)
-    interface, friction = interface or Interface(), float(friction)
+    interface = interface or Interface()
+    friction = float(friction)
     request = RingRequest(
         film, indenter, interface, targets, friction, loading, backend, film_radius, rings
     )
@@ -168,7 +183,10 @@ def indent(
 
 def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
     """Return contacts with more and less of each uncertain input, and u over its difference."""
-    film, indenter, load, loading = contact.film, contact.indenter, contact.load, contact.loading
+    film = contact.film
+    indenter = contact.indenter
+    load = contact.load
+    loading = contact.loading
     names = ("friction", "backend", "interface", "strain")
     settings: dict[str, Any] = {name: getattr(contact, name) for name in names}
     again = partial(indent, load=load, loading=loading or "incremental", **settings)
@@ -215,7 +233,8 @@ def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -
     depth = target.value if isinstance(target, Depth) else target.value / stiffness
     if depth >= film.thickness:
         raise too_deep(film, rod, load, depth)
-    terms, traction = solution.pressure_terms.size, solution.traction(rod.radius, load)
+    terms = solution.pressure_terms.size
+    traction = solution.traction(rod.radius, load)
     return Contact(
         film=film,
         indenter=rod,

@@ -187,7 +187,8 @@ class Interface:
     @property
     def description(self) -> str:
         """What yields, in words; empty for a rigid interface."""
-        compliances, law = [], self.normal_law
+        compliances = []
+        law = self.normal_law
         if isinstance(law, GreenwoodTripp):
             compliances.append(
                 f"Greenwood-Tripp law (roughness {law.roughness * 1e6:.4g} um, "

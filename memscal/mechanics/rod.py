@@ -40,16 +40,19 @@ def rod_integrals(
     """Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's."""
     # By j_2n(x) = (-1)^n int_0^1 P_2n(t) cos(xt) dt, of odd order with sines, and the Hankel
     # transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
-    even, odd = _series(pressure_terms, 0), _series(shear_terms, 1)
+    even = _series(pressure_terms, 0)
+    odd = _series(shear_terms, 1)
     nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
-    share, weights = (nodes + 1) / 2, weights / 2
+    share = (nodes + 1) / 2
+    weights = weights / 2
 
     # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
     inner = np.minimum(rho, 1.0)
     angle = np.arcsin(np.divide(inner, rho, out=np.ones_like(rho), where=rho > 0))
     t = rho[:, None] * np.sin(angle[:, None] * share)
     d_theta = angle[:, None] * weights
-    pressed, sheared = legendre.legval(t, even), legendre.legval(t, odd)
+    pressed = legendre.legval(t, even)
+    sheared = legendre.legval(t, odd)
     w_by_p = np.sum(d_theta * pressed, axis=1)
     inverse = np.divide(1.0, rho, out=np.zeros_like(rho), where=rho > 0)
     u_by_q = np.sum(d_theta * t * sheared, axis=1) * inverse
@@ -83,7 +86,8 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
     start = max(count, int(largest + 15 * (largest / 2) ** (1 / 3))) + 30
     rows = np.zeros((count, x.size))
     norm = np.zeros_like(x)
-    above, current = np.zeros_like(x), np.ones_like(x)
+    above = np.zeros_like(x)
+    current = np.ones_like(x)
     for order in range(start, -1, -1):
         if order < count:
             rows[order] = current
@@ -92,12 +96,15 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
         size = np.abs(current)
         if np.max(size, initial=0.0) > 1e100:
             scale = 1 / np.maximum(size, 1.0)
-            above, current, norm = above * scale, current * scale, norm * scale**2
+            above = above * scale
+            current = current * scale
+            norm = norm * scale**2
             rows[order:] *= scale
     return np.asarray(rows / np.sqrt(norm), dtype=np.float64)
 
 
-_FEWEST_TERMS, _MOST_TERMS = 8, 128
+_FEWEST_TERMS = 8
+_MOST_TERMS = 128
 # Doubling of the terms stops when the stress at the base changes by less than this ...
 _SETTLED = 1e-9
 # ... and a solution that changes by more than this in the last doubling is refused.
@@ -197,7 +204,8 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
         )
     terms = _FEWEST_TERMS
     while True:
-        coarse, terms = _solve(radius_ratio, poisson_ratio, sticking, terms, order=12), 2 * terms
+        coarse = _solve(radius_ratio, poisson_ratio, sticking, terms, order=12)
+        terms = 2 * terms
         fine = _solve(radius_ratio, poisson_ratio, sticking, terms, order=16)
         change = _largest_change(fine, coarse, radius_ratio, poisson_ratio)
         if change < _SETTLED or terms == _MOST_TERMS:
@@ -225,8 +233,10 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     r"""Return :math:`\int j_m(\xi) j_n(\xi) \{W, X, Y\}(\xi h/a)\,d\xi`, even rows before odd."""
     # The integrand turns at the rate 2 a in k, and the poles lie 0.74/h off the axis.
     xi, weights = gauss_panels(_LARGEST_KH * ratio, min(1.5 * ratio, 6.0), order)
-    x, orders = xi / ratio, spherical_bessel(2 * terms, xi)
-    even, odd = orders[::2], orders[1::2]
+    x = xi / ratio
+    orders = spherical_bessel(2 * terms, xi)
+    even = orders[::2]
+    odd = orders[1::2]
     # Of the half-space: the integral of j_l^2 is pi/2(2l + 1).
     even_orders = 2 * np.arange(terms)
     matrix = np.diag(np.pi / (4 * even_orders + 2))
@@ -236,7 +246,8 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     radial = np.diag(np.pi / (4 * even_orders + 6))
     radial += (odd * (weights * film_response.radial_correction(x, nu))) @ odd.T
     # Of the half-space: the integral of j_l j_m is sin((l - m) pi/2)/((l - m)(l + m + 1)).
-    apart, both = even_orders[:, None] - even_orders - 1, even_orders[:, None] + even_orders + 1
+    apart = even_orders[:, None] - even_orders - 1
+    both = even_orders[:, None] + even_orders + 1
     products = np.where(apart % 4 == 1, 1.0, -1.0) / (apart * (both + 1))
     coupling = film_response.half_space_coupling(nu) * products
     coupling += (even * (weights * film_response.coupling_correction(x, nu))) @ odd.T

@@ -43,13 +43,16 @@ class SurfaceCompliance:
     @cached_property
     def whole(self) -> FloatArray:
         """Depressions, then outward displacements, by pressures, then shears: (2 n, 2 n)."""
-        normal, radial = (self.normal, self.normal_by_shear), (self.radial_by_pressure, self.radial)
+        normal = (self.normal, self.normal_by_shear)
+        radial = (self.radial_by_pressure, self.radial)
         return np.block([[*normal], [*radial]])
 
     @cached_property
     def products(self) -> FloatArray:
         r"""Integrals of products of hats over the surface, (n, n) in m^2."""
-        left, right, width = self.r[:-1], self.r[1:], np.diff(self.r) * np.pi / 6
+        left = self.r[:-1]
+        right = self.r[1:]
+        width = np.diff(self.r) * np.pi / 6
         inner, outer, across = (width * (a * left + b * right) for a, b in ((3, 1), (1, 3), (1, 1)))
         diagonal = np.append(inner, 0.0) + np.append(0.0, outer)
         return np.diag(diagonal) + np.diag(across, 1) + np.diag(across, -1)
@@ -85,7 +88,8 @@ class FilmField(Protocol):
 def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return quadratic triangles (m, 6) of points (n, 2) with their nodes anticlockwise."""
     first, second, third = np.moveaxis(points[triangles[:, :3]], 1, 0)
-    (x, y), (u, v) = (second - first).T, (third - first).T
+    (x, y) = (second - first).T
+    (u, v) = (third - first).T
     return np.where((x * v < u * y)[:, None], triangles[:, [0, 2, 1, 5, 4, 3]], triangles)
 
 
@@ -100,14 +104,16 @@ _CROWDING = 5
 
 def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
     r"""Return :math:`\int L_{nn}(x_i, s)\,\phi_j\,s\,ds`, n = 0 and 1, shapes (x, rings), in m."""
-    starts, ends = rings[:-1], rings[1:]
+    starts = rings[:-1]
+    ends = rings[1:]
     lengths = ends - starts
     nodes, weights = np.polynomial.legendre.leggauss(_ORDER)
     share = (nodes + 1) / 2
     s = starts[:, None] + lengths[:, None] * share
     measure = s * lengths[:, None] * weights / 2
     kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
-    rising, falling = measure * share, measure * (1 - share)
+    rising = measure * share
+    falling = measure * (1 - share)
     near = np.maximum(starts - x[:, None], x[:, None] - ends) < lengths
 
     integrals = []
@@ -115,18 +121,21 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     for kernel, (near_falling, near_rising) in zip(kernels, corrections, strict=True):
         left = np.einsum("meo,eo->me", kernel, falling)
         right = np.einsum("meo,eo->me", kernel, rising)
-        left[near], right[near] = near_falling, near_rising
+        left[near] = near_falling
+        right[near] = near_rising
         integrals.append(on_hats(left, right))
     return integrals[0], integrals[1]
 
 
 def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
     r"""Return :math:`\int_{x_i}^\infty\phi_j\,ds` and :math:`\int_0^{x_i}\phi_j\,s\,ds/x_i`."""
-    starts, ends = rings[:-1], rings[1:]
+    starts = rings[:-1]
+    ends = rings[1:]
     lengths = ends - starts
     reach = np.clip((x[:, None] - starts) / lengths, 0.0, 1.0)
     # Integrals of 1 - v and v, and of their products with s = start + length v, up to ``reach``.
-    falling, rising = reach - reach**2 / 2, reach**2 / 2
+    falling = reach - reach**2 / 2
+    rising = reach**2 / 2
     beyond = on_hats(lengths * (0.5 - falling), lengths * (0.5 - rising))
     left = lengths * (starts * falling + lengths * (rising - reach**3 / 3))
     within = on_hats(left, lengths * (starts * rising + lengths * reach**3 / 3))
@@ -140,9 +149,11 @@ def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:
 
 def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return L00 and L11; free of cancellation, also where x and s are close or far apart."""
-    larger, smaller = np.maximum(x, s), np.minimum(x, s)
+    larger = np.maximum(x, s)
+    smaller = np.minimum(x, s)
     complement = distance * (larger + smaller) / larger**2
-    t, whole = smaller / larger, ellipkm1(complement)
+    t = smaller / larger
+    whole = ellipkm1(complement)
     # (K - E)/t, by its series where both are nearly equal.
     series = np.pi / 4 * t * (1 + 3 / 8 * t**2 + 15 / 64 * t**4)
     difference = (whole - ellipe(1 - complement)) / np.maximum(t, _ALIKE)
@@ -155,7 +166,9 @@ def _near_integrals(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Integrate falling and rising hats over near elements, cut at the point; for each kernel."""
     point, element = np.nonzero(near)
-    start, end, at = starts[element], ends[element], x[point]
+    start = starts[element]
+    end = ends[element]
+    at = x[point]
     cut = np.clip(at, start, end)
     v, weights = _crowded()
     totals = [(np.zeros(point.size), np.zeros(point.size)) for _ in range(2)]

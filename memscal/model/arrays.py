@@ -15,7 +15,8 @@ FloatArray = NDArray[np.float64]
 
 
 #: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.
-_SMALLEST, _LARGEST = 1e-30, 1e30
+_SMALLEST = 1e-30
+_LARGEST = 1e30
 #: Wide ranges of what films and indenters have, in SI units; a thousand times the lowest is usual.
 _SIZES = {
     "young_modulus": ("Young's modulus", "Pa", 1e3, 1e10),
@@ -126,7 +127,8 @@ def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
 
     # A table has an edge where it changes by a twentieth of its range within an interval that is
     # narrower than a tenth of its neighbours.
-    widths, jumps = np.diff(x), np.abs(np.diff(y, axis=0))
+    widths = np.diff(x)
+    jumps = np.abs(np.diff(y, axis=0))
     narrow = widths[1:-1] < 0.1 * np.minimum(widths[:-2], widths[2:])
     sharp = bool(np.any(jumps[1:-1][narrow] > 0.05 * np.ptp(y, axis=0)))
     # A cubic spline swings about an edge, by more than the table holds.

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 #: From these values of twice its logarithm on the evidence is positive, and strong.
-POSITIVE, STRONG = 2.0, 6.0
+POSITIVE = 2.0
+STRONG = 6.0
 #: Steps of twice the natural logarithm of a Bayes factor, in words.
 _WORDS = (
     (POSITIVE, "not worth more than a bare mention"),

@@ -244,7 +244,8 @@ def messages_from_json(stored: Sequence[Any]) -> tuple[Message, ...]:
     """Return messages from a file; a plain text, as older files hold them, is a note."""
     messages = []
     for entry in (e if isinstance(e, Mapping) else {"text": e} for e in stored):
-        kind, text = str(entry.get("kind", "note")), str(entry.get("text", ""))
+        kind = str(entry.get("kind", "note"))
+        text = str(entry.get("text", ""))
         warns = entry.get("severity") == "warning"
         messages.append(Message(kind, text, "warning" if warns else "note"))
     return tuple(messages)

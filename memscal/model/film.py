@@ -94,10 +94,12 @@ class ElasticFilm:
         A stated ratio is normally distributed, cut off at these ends: of 1/2 ± u half a normal
         distribution is left, of mean 1/2 - 0.80 u and standard deviation 0.60 u.
         """
-        nu, u = self.poisson_ratio, self.poisson_ratio_uncertainty
+        nu = self.poisson_ratio
+        u = self.poisson_ratio_uncertainty
         if not u or u < _UNCUT**2:
             return self
-        low, high = -nu / u, (0.5 - nu) / u
+        low = -nu / u
+        high = (0.5 - nu) / u
         at_low, at_high = (math.exp(-0.5 * z**2) / math.sqrt(2 * math.pi) for z in (low, high))
         inside = (math.erf(high / math.sqrt(2)) - math.erf(low / math.sqrt(2))) / 2
         shift = (at_low - at_high) / inside
@@ -124,10 +126,12 @@ def more_and_less(record: Any, name: str) -> tuple[Any, Any, float] | None:
     """Return a film or indenter with more and less of a quantity, and u over the difference."""
     # None where no u is stated, or one that rounding hides; one-sided at the ends of a Poisson's
     # ratio, 0 and 1/2, beyond which the expected film's does not go.
-    value, u = getattr(record, name), getattr(record, f"{name}_uncertainty", None)
+    value = getattr(record, name)
+    u = getattr(record, f"{name}_uncertainty", None)
     if not u:
         return None
-    more, less = min(value + u, 0.5) if name == "poisson_ratio" else value + u, max(value - u, 0.0)
+    more = min(value + u, 0.5) if name == "poisson_ratio" else value + u
+    less = max(value - u, 0.0)
     if more == less:
         return None
     return replace(record, **{name: more}), replace(record, **{name: less}), u / (more - less)

@@ -14,7 +14,8 @@ from memscal.model.result import Result
 
 #: A value farther from the median is an outlier, in robust standard deviations: of a million
 #: normal values one; and how much more is allowed where the deviation is that of few values.
-_ROBUST_LIMIT, _OF_FEW = 5.0, 8.0
+_ROBUST_LIMIT = 5.0
+_OF_FEW = 8.0
 _TO_SIGMA = 1.4826  # of a normal law's median absolute deviation
 
 

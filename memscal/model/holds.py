@@ -14,11 +14,14 @@ from memscal.model.result import Result
 
 #: The indenter moves where its position changes, from one row to the next, by more than this share
 #: of the whole way, and presses where the load is above this share of the way from lifted to held.
-_MOVING, _PRESSED = 1e-3, 0.05
+_MOVING = 1e-3
+_PRESSED = 0.05
 #: A load that never falls below this share of the largest is never lifted.
 _LIFTED = 0.5
 #: Load and reading are steady within this share, or so many standard deviations of their noise.
-_STEADY, _NOISE, _TO_SIGMA = 0.02, 5.0, 1.4826 / np.sqrt(2)
+_STEADY = 0.02
+_NOISE = 5.0
+_TO_SIGMA = 1.4826 / np.sqrt(2)
 #: Fewer rows do not tell the scatter.
 _FEWEST = 5
 _LOGGED = ("x", "y", "u_zz", "normal_load")
@@ -47,8 +50,10 @@ class Holds(Result):
 def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: Reading) -> Holds:
     """Find the holds in the columns of a log, which are in the order of time."""
     whole = np.logical_and.reduce([np.isfinite(columns[n]) for n in _LOGGED if n in columns])
-    columns, line = {name: values[whole] for name, values in columns.items()}, line[whole]
-    u, load = columns["u_zz"], columns.get("normal_load")
+    columns = {name: values[whole] for name, values in columns.items()}
+    line = line[whole]
+    u = columns["u_zz"]
+    load = columns.get("normal_load")
     if u.size < _FEWEST:
         raise InputError(f"The log has {u.size} rows without gaps.", cure=_CURE)
     position = columns["x"] + 1j * columns.get("y", np.zeros(u.size))
@@ -70,9 +75,12 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
 
 
 def _averaged(
-    columns: Mapping[str, FloatArray], line: NDArray[Any], held: list[NDArray[np.intp]],
-    left_out: int, reading: Reading,
-) -> Holds:  # fmt: skip
+    columns: Mapping[str, FloatArray],
+    line: NDArray[Any],
+    held: list[NDArray[np.intp]],
+    left_out: int,
+    reading: Reading,
+) -> Holds:
     """Average all columns over the rows of each hold, and say what the readings scatter by."""
     first, stop = np.array([(run[0], run[-1] + 1) for run in held]).T
     u = columns["u_zz"]
@@ -82,7 +90,8 @@ def _averaged(
     for name in mean.keys() & {"repeat", "branch"}:
         mean[name] = columns[name][first]
     apart = [u[run] - u[run].mean() for run in held]
-    size, scatter = stop - first, np.array([np.std(e, ddof=1) for e in apart])
+    size = stop - first
+    scatter = np.array([np.std(e, ddof=1) for e in apart])
     # Noise of neighbouring rows is correlated where an amplifier filters it (autoregression).
     total = sum(float(e @ e) for e in apart) or 1.0
     correlation = sum(float(e[1:] @ e[:-1]) for e in apart) / total + 1 / np.median(size)
@@ -129,7 +138,8 @@ def _timed(u: FloatArray, dwell: NDArray[np.intp]) -> NDArray[np.bool_]:
         if n >= _FEWEST and high - low > 2 * _NOISE * _noise(u[a : a + n]):
             spans.append(time[a : a + n][u[a : a + n] > (low + high) / 2][[0, -1]])
     begins, ends = np.array(spans or [(0.0, 1.0)]).T
-    begin, end = np.quantile(begins, 0.9), np.quantile(ends, 0.1)
+    begin = np.quantile(begins, 0.9)
+    end = np.quantile(ends, 0.1)
     if end - begin < _PRESSED:
         why = "The readings rise at other times at each place."
         raise InputError("The log does not show when the indenter presses.", why=why, cure=_CURE)

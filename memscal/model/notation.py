@@ -88,14 +88,16 @@ def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
     # Decimal arithmetic, because a binary 0.0145 would round differently from what is read.
     with localcontext() as context:
         context.prec = 800  # the widest span of two doubles
-        number, spread = Decimal(repr(float(value))), Decimal(repr(float(uncertainty)))
+        number = Decimal(repr(float(value)))
+        spread = Decimal(repr(float(uncertainty)))
         for _ in range(2):  # 0.0996 gives 0.10, not 0.100
             spread = spread.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
         number = number.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
         exponent = max(number.adjusted() if number else spread.adjusted(), spread.adjusted())
         if exponent in _PLAIN_EXPONENTS:
             exponent = 0
-        number, spread = number.scaleb(-exponent), spread.scaleb(-exponent)
+        number = number.scaleb(-exponent)
+        spread = spread.scaleb(-exponent)
         if not number:
             number = abs(number)  # never "-0.00"
         return f"{number:f}", f"{spread:f}", exponent

@@ -15,10 +15,12 @@ IntArray = NDArray[np.intp]
 
 #: Readings share a place where they are closer than this share of the distance that nine tenths
 #: of the readings of a pass keep from each other; a few may be read twice in one.
-_CLOSE, _TWICE = 0.1, 0.1
+_CLOSE = 0.1
+_TWICE = 0.1
 #: Of many passes over a plane there are too many pairs of readings: positions are rounded to this
 #: share of what is close where there may be more pairs.
-_GRAIN, _MOST_PAIRS = 0.1, 20_000_000
+_GRAIN = 0.1
+_MOST_PAIRS = 20_000_000
 #: Distances below a nanometre are rounding.
 _ROUNDING = 1e-9
 #: Rows and columns make a raster if they cross at no more than this many nodes for each place.
@@ -85,7 +87,8 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
 def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, EvenAxis] | None:
     """Fit an even lattice to the positions of ``count`` places in a plane, or return ``None``."""
     # Rows may be missing, but not most nodes: all positions lie on a lattice that is fine enough.
-    along_x, along_y = _even_axis(x), _even_axis(y)
+    along_x = _even_axis(x)
+    along_y = _even_axis(y)
     if along_x is None or along_y is None:
         return None
     few = _nodes(along_x.index, along_y.index) <= _MOST_NODES * count
@@ -197,7 +200,8 @@ _MISTAKES = {
     1 / 25.4: "mm stated as inches",
     1e-3: "mm stated as m, or um as mm",
 }
-_NEAR, _FEWEST = 0.15, 6
+_NEAR = 0.15
+_FEWEST = 6
 #: A nominal load may lie beyond those recorded by this share.
 _BEYOND = 0.3
 #: Of more points than these some tell the width of a peak.
@@ -218,9 +222,11 @@ _LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
 
 def require_span(scan: Scan) -> None:
     """Refuse positions over which no film is scanned, before anything is built on them."""
-    h, lengths = _film(scan).thickness, _lengths(scan)
+    h = _film(scan).thickness
+    lengths = _lengths(scan)
     row = "The positions span", (span := lengths["span"])
-    short, long = span < _SHORTEST_SPAN * h, span > _LONGEST_SPAN * h
+    short = span < _SHORTEST_SPAN * h
+    long = span > _LONGEST_SPAN * h
     _refuse(scan, lengths, (short, *row, _SHORT), (long, *row, _LONG))
 
 
@@ -228,7 +234,8 @@ def require_recorded(load: float, recorded: FloatArray) -> None:
     """Refuse a nominal load in N that lies beyond those that were recorded."""
     if np.isnan(recorded).all():
         return
-    low, high = float(np.nanmin(recorded)), float(np.nanmax(recorded))
+    low = float(np.nanmin(recorded))
+    high = float(np.nanmax(recorded))
     if not (1 - _BEYOND) * low <= load <= (1 + _BEYOND) * high:
         raise InputError(
             f"The load is stated as {load:.4g} N, but those recorded go from {low:.4g} to "
@@ -243,8 +250,10 @@ def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
     if scan.load is not None and scan.normal_load is not None:
         require_recorded(scan.load, scan.normal_load)
-    h, lengths = _film(scan).thickness, _lengths(scan)
-    span, rod = lengths["span"], 2 * lengths.get("radius", 0.0)
+    h = _film(scan).thickness
+    lengths = _lengths(scan)
+    span = lengths["span"]
+    rod = 2 * lengths.get("radius", 0.0)
     of_rod = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
     short = (span < _SHORTEST_SPAN * h, "The positions span", span, _SHORT)
     _refuse(scan, lengths, short, (rod > span, of_rod, rod, _SHORT))
@@ -252,17 +261,16 @@ def require_plausible(scan: Scan) -> None:
     steps = places_of(x, y, scan.passes.ravel()).steps
     lengths["step"] = step = min((s for s in steps if s > 0), default=0.0)
     lengths["width"] = width = _voltage_width(x, y, scan.u_zz.ravel())
-    no_sensor, of_width = (
-        f"{_WIDE}no sensor is so much wider.",
-        "The voltage's width at half height is",
-    )
+    no_sensor = f"{_WIDE}no sensor is so much wider."
+    of_width = "The voltage's width at half height is"
     _refuse(
-        scan, lengths,
+        scan,
+        lengths,
         (step > _LONGEST_STEP * h, "The positions' step is", step, f"{_WIDE}the scan misses it."),
         (span > _LONGEST_SPAN * h, "The positions span", span, _LONG),
         (rod > h, "The rod's width is", rod, "Under such a rod the stress depends on friction."),
         (width > _WIDEST_VOLTAGE * h, of_width, width, no_sensor),
-    )  # fmt: skip
+    )
 
 
 def _film(scan: Scan) -> ElasticFilm:
@@ -279,7 +287,8 @@ def _lengths(scan: Scan) -> dict[str, float]:
 
 
 def _refuse(scan: Scan, lengths: dict[str, float], *rows: tuple[bool, str, float, str]) -> None:
-    h, place = _film(scan).thickness, f"{scan.source.file_name}: " if scan.source else ""
+    h = _film(scan).thickness
+    place = f"{scan.source.file_name}: " if scan.source else ""
     for wrong, name, value, why in rows:
         if wrong:
             times = f"{value / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
@@ -296,7 +305,9 @@ def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
 def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
     """Full width of the voltage at half its rise above the outer quarter, in m; 0 if unknown."""
     measured = np.flatnonzero(np.isfinite(u))[:: -(-u.size // _MOST_POINTS)]
-    x, y, u = x[measured], y[measured], u[measured]
+    x = x[measured]
+    y = y[measured]
+    u = u[measured]
     if u.size < _FEWEST:
         return 0.0
     rise = rise_of(x, y, u)
@@ -321,7 +332,8 @@ def _cure(lengths: dict[str, float], thickness: float) -> str:
     ):
         if not stated:
             continue
-        low, high = 0.0, np.inf
+        low = 0.0
+        high = np.inf
         for key in (key for key, length in lengths.items() if length > 0):
             least, most = (limit * thickness / lengths[key] for limit in _USUAL[key])
             if path == "sample/film/thickness":
@@ -329,7 +341,8 @@ def _cure(lengths: dict[str, float], thickness: float) -> str:
             elif key not in scaled:
                 # Not changed by this input: any factor will do, or none.
                 least, most = (0.0, np.inf) if least <= 1 <= most else (np.inf, 0.0)
-            low, high = max(low, least), min(high, most)
+            low = max(low, least)
+            high = min(high, most)
         if not 0 < low < high < np.inf:
             continue
         inside = [factor for factor in _MISTAKES if low <= factor <= high]

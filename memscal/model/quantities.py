@@ -11,7 +11,11 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.notation import VOLTS, Reading, format_measured
 
 # SI units in the unit that is shown: m in a mm, V in a mV, ...; dividing by MM shows mm.
-MM, MV, KPA, PER_MM, PER_MM2 = 1e-3, 1e-3, 1e3, 1e3, 1e6
+MM = 1e-3
+MV = 1e-3
+KPA = 1e3
+PER_MM = 1e3
+PER_MM2 = 1e6
 
 
 class Dimension(NamedTuple):
@@ -47,13 +51,19 @@ def dimension_in(dimension: str, reading: Reading) -> str:
     """Return a dimension for readings in a unit, which is entered where they are not in volts."""
     if not dimension.startswith("voltage") or reading == VOLTS:
         return dimension
-    si, shown, scale = reading.si, reading.unit, reading.scale
+    si = reading.si
+    shown = reading.unit
+    scale = reading.scale
     if dimension == "voltage per length":
-        si, shown, scale = f"{si}/m", f"{shown}/mm", scale / MM
+        si = f"{si}/m"
+        shown = f"{shown}/mm"
+        scale = scale / MM
     elif dimension == "voltage per stress":
-        si, shown = reading.over(si), reading.over(shown)
+        si = reading.over(si)
+        shown = reading.over(shown)
     if si == "1":
-        shown, scale = "1", 1.0
+        shown = "1"
+        scale = 1.0
     si, stored = (name.removesuffix(" (relative)") for name in (si, shown))
     key = f"reading in {shown}"
     DIMENSIONS[key] = Dimension(si, stored, shown.removeprefix("1 ") if shown != "1" else "", scale)
@@ -168,7 +178,10 @@ def by_name(quantities: Iterable[Quantity]) -> dict[str, Quantity]:
     return {quantity.name: quantity for quantity in quantities}
 
 
-_A, _L, _U, _ONE = "voltage per stress", "length", "voltage", "dimensionless"
+_A = "voltage per stress"
+_L = "length"
+_U = "voltage"
+_ONE = "dimensionless"
 
 _ESTIMATED = (
     Quantity("conversion_constant", _A, "conversion constant", "A"),

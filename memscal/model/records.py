@@ -2,10 +2,19 @@
 
 from memscal.model.quantities import Quantity, Record, measured, record
 
-_L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
-_A, _W, _PER_AREA = "voltage per stress", "wavenumber", "per area"
+_L = "length"
+_P = "stress"
+_U = "voltage"
+_ONE = "dimensionless"
+_A = "voltage per stress"
+_W = "wavenumber"
+_PER_AREA = "per area"
 _OF_G = "standard uncertainty of G, with detail that the film hides"
-_R, _X, _YX, _K, _PER_LOAD = ("r",), ("x",), ("y", "x"), ("k",), ("load",)
+_R = ("r",)
+_X = ("x",)
+_YX = ("y", "x")
+_K = ("k",)
+_PER_LOAD = ("load",)
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
 
@@ -171,7 +180,8 @@ RADIAL_COVARIANCE = record(
     Quantity("g_covariance", "per area squared", "covariance of G", axes=_RR, required=True),
     signal="g_covariance",
 )
-_G, _COVARIANCE = RADIAL.quantities, RADIAL_COVARIANCE.quantities
+_G = RADIAL.quantities
+_COVARIANCE = RADIAL_COVARIANCE.quantities
 KERNEL_CHANGES = record(
     "NXdata",
     Quantity(
@@ -272,7 +282,8 @@ MEASURED_SCAN = record(
 
 def points_record(channel: str) -> Record:
     """Return the record of the measured points of a channel: ``zz``, ``xz`` or ``yz``."""
-    u, point = f"u_{channel}", ("point",)
+    u = f"u_{channel}"
+    point = ("point",)
     return record(
         "NXdata",
         Quantity("x", _L, "position along x", axes=point, required=True),

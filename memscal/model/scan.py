@@ -93,12 +93,15 @@ def require_plane(x: FloatArray, y: FloatArray) -> None:
 
 
 #: Loads farther apart than this share are not one load that scatters; fewer readings are no line.
-_APART, _FEWEST, _MOST_GROUPS = 0.1, 5, 12
+_APART = 0.1
+_FEWEST = 5
+_MOST_GROUPS = 12
 
 
 def load_groups(loads: FloatArray) -> NDArray[np.intp]:
     """Number loads in N, (n,), by the few that were set, ascending; all 0 if these are not seen."""
-    order, index = np.argsort(loads, kind="stable"), np.zeros(loads.size, dtype=np.intp)
+    order = np.argsort(loads, kind="stable")
+    index = np.zeros(loads.size, dtype=np.intp)
     index[order[1:]] = np.cumsum(np.diff(np.log(loads[order])) > _APART)
     counts = np.bincount(index)
     seen = counts.min() >= _FEWEST and counts.size <= _MOST_GROUPS
@@ -307,7 +310,9 @@ class Scan:
     @property
     def set_up(self) -> SetUp:
         """Film, indenter and load; a scan that does not state all of them is refused."""
-        film, indenter, load = self.film, self.indenter, self.load
+        film = self.film
+        indenter = self.indenter
+        load = self.load
         if film is not None and indenter is not None and load is not None:
             return SetUp(film, indenter, load, self.rod_friction)
         names = {"sample/film": film, "indenter": indenter, "indenter/load": load}
@@ -380,7 +385,8 @@ class Scan:
         return replace(self, **changes, channels=channels)
 
     def _check_signal_shape(self) -> None:
-        n, shape = self.x.size, self.u_zz.shape
+        n = self.x.size
+        shape = self.u_zz.shape
         if self.y is not None:
             good = shape == (self.y.size, n) or shape == (n,) == self.y.shape
             expected = f"({self.y.size}, {n}), from y and x"

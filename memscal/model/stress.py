@@ -19,7 +19,9 @@ from memscal.model.sizes import MOST_PIXELS
 #: Ideal references with what their size is.
 IDEAL = {"disc": "radius", "slit": "width", "gaussian": "standard deviation", "point": ""}
 #: Radii of the table of an ideal reference, a Gaussian's reach in its widths, an edge's share.
-_IDEAL_RADII, _IDEAL_REACH, _EDGE = 121, 6.0, 1e-6
+_IDEAL_RADII = 121
+_IDEAL_REACH = 6.0
+_EDGE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ class IdealReference:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Return the Fourier transform at ``k`` (rad/m), in m^2; of a slit across it, in m."""
-        phase, square = np.asarray(k, dtype=np.float64) * self.size, math.pi * self.size**2
+        phase = np.asarray(k, dtype=np.float64) * self.size
+        square = math.pi * self.size**2
         if self.shape == "disc":
             far = phase != 0
             return square * np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=far)
@@ -99,9 +102,13 @@ class IdealReference:
 
 #: Sides of a field in pixels, what may be left at its border, how even its axes are, and the
 #: least share of its sum in that of its moduli.
-_FEWEST, _BORDER, _EVEN, _LEAST = 8, 0.05, 1e-3, 1e-3
+_FEWEST = 8
+_BORDER = 0.05
+_EVEN = 1e-3
+_LEAST = 1e-3
 #: Rings of a field, to a pixel, in which its mean is summed up; directions over half a turn.
-_RINGS, _WAYS = 16, 8
+_RINGS = 16
+_WAYS = 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -226,7 +233,8 @@ class StressField:
     def profile(self) -> "StressProfile":
         """Return the profile that a calibration takes, with the mean over directions as table."""
         r, total, count = self._rings(1)
-        mean, load = np.asarray(total / count), self.load or 1.0
+        mean = np.asarray(total / count)
+        load = self.load or 1.0
         return StressProfile(r=r, sigma_zz=mean, load=load, field=self, source=self.source)
 
 

@@ -141,7 +141,8 @@ class Plan:
         shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
         shared |= {"half_range": self.step * (count - 1) / 2, "centre": (self.centre, 0.0)}
         x = np.linspace(-1.0, 1.0, count) * shared["half_range"]
-        flat, load = np.zeros(count), self.load
+        flat = np.zeros(count)
+        load = self.load
         require_plausible(Scan(x=x, u_zz=flat, film=self.film, indenter=self.rod, load=load))
         scan = simulate(points=count, noise=0.0, baseline=0.0, drift=0.0, **shared)
         noise = self.point_noise / math.sqrt(self.repeats)
@@ -318,7 +319,8 @@ def least_design(
     def meets(count: int) -> bool:
         if count not in tried:
             # None where the plan determines nothing, or does not sample G.
-            tried[count], attempt = None, planned(count)
+            tried[count] = None
+            attempt = planned(count)
             with suppress(FitError), hushed():
                 design = evaluate(attempt)
                 samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
@@ -327,11 +329,13 @@ def least_design(
         found = tried[count]
         return found is not None and all(_met(found, *target) for target in targets.items())
 
-    fails, works = fewest - 1, fewest
+    fails = fewest - 1
+    works = fewest
     while not meets(works):
         if works == most:
             raise _out_of_reach(what, targets, [d for d in tried.values() if d is not None])
-        fails, works = works, min(max(works + 1, round(_GROWTH * works)), most)
+        fails = works
+        works = min(max(works + 1, round(_GROWTH * works)), most)
     while works - fails > 1:
         middle = (works + fails) // 2
         fails, works = (fails, middle) if meets(middle) else (middle, works)
@@ -342,10 +346,13 @@ def least_design(
 
 def _search(plan: Plan, vary: str) -> tuple[str, int, int, Callable[[int], Plan]]:
     """Return what to vary in words, its least and most count, and the plan of a count."""
-    step, width, off = plan.step, 2 * plan.half_range, abs(plan.centre)
+    step = plan.step
+    width = 2 * plan.half_range
+    off = abs(plan.centre)
     if vary == "repeats":
         return vary, 1, _MOST_REPEATS, lambda count: replace(plan, repeats=count)
-    least, most = _FEWEST_POSITIONS, _MOST_POSITIONS
+    least = _FEWEST_POSITIONS
+    most = _MOST_POSITIONS
     if vary == "step":
         return vary, least, most, lambda count: replace(plan, step=width / (count - 1))
     # The sensor has to lie within.
@@ -385,7 +392,8 @@ def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) 
     out_of_reach = f"is out of reach by the {what} alone: the best is {reached}"
     problem = f"{goal[0].upper()}{goal[1:]} {out_of_reach}, with {count}."
     if name == "resolved_wavenumber":
-        step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
+        sampled = np.pi / best.plan.step
+        step = best.plan.step * 1e3
         if best.resolved_wavenumber >= 0.99 * sampled:
             why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
             return FitError(problem, why=why, cure="Plan a finer step.")

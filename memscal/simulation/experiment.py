@@ -22,7 +22,8 @@ from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, si
 
 # Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
 # its smallest value: closer ones would show the solver's own error.
-_SPREAD, _LEAST_SPREAD = 2.0, 0.02
+_SPREAD = 2.0
+_LEAST_SPREAD = 0.02
 # Beyond this scatter of the loads a parabola in ln P is no longer good to 1e-3.
 _MOST_SCATTER = 0.1
 
@@ -44,7 +45,8 @@ def _at_load(stresses: FloatArray, spread: float, ratio: FloatArray) -> FloatArr
     if len(stresses) == 1:
         return np.asarray(stresses[0])
     below, middle, above = stresses
-    t, slope = np.log(ratio), (above - below) / (2 * spread)
+    t = np.log(ratio)
+    slope = (above - below) / (2 * spread)
     bend = (above - 2 * middle + below) / spread**2
     return np.asarray(middle + slope * t + 0.5 * bend * t**2)
 
@@ -55,17 +57,36 @@ PAPER_LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
 def simulate_contacts(
-    *, film: ElasticFilm = PAPER_FILM, sphere: Sphere = PAPER_SPHERE,
-    kernel: RadialKernel | None = None, conversion_constant: float = 1e-7,
-    channels: Sequence[str] = ("zz",), shear_kernel: RadialKernel | None = None,
-    shear_conversion_constant: float = 5e-8, load: float | Sequence[float] = PAPER_LOADS,
-    friction: float = 0.0, loading: str = "incremental", interface: Interface | None = None,
-    points: int = 33, spacing: float = 0.5e-3, repeats: int = 1, noise: float = 0.005,
-    load_scatter: float = 0.02, record_loads: bool = False, load_reading: float = 0.002,
-    load_scale: float = 1.0, load_uncertainty: float | None = 0.01, position_error: float = 10e-6,
-    centre: tuple[float, float] = (0.14e-3, 0.0), baseline: float = 0.01, drift: float = 0.005,
-    state_noise: bool = True, lubrication: str = "dry", lubricant: str = "", seed: int = 0,
-) -> Scan:  # fmt: skip
+    *,
+    film: ElasticFilm = PAPER_FILM,
+    sphere: Sphere = PAPER_SPHERE,
+    kernel: RadialKernel | None = None,
+    conversion_constant: float = 1e-7,
+    channels: Sequence[str] = ("zz",),
+    shear_kernel: RadialKernel | None = None,
+    shear_conversion_constant: float = 5e-8,
+    load: float | Sequence[float] = PAPER_LOADS,
+    friction: float = 0.0,
+    loading: str = "incremental",
+    interface: Interface | None = None,
+    points: int = 33,
+    spacing: float = 0.5e-3,
+    repeats: int = 1,
+    noise: float = 0.005,
+    load_scatter: float = 0.02,
+    record_loads: bool = False,
+    load_reading: float = 0.002,
+    load_scale: float = 1.0,
+    load_uncertainty: float | None = 0.01,
+    position_error: float = 10e-6,
+    centre: tuple[float, float] = (0.14e-3, 0.0),
+    baseline: float = 0.01,
+    drift: float = 0.005,
+    state_noise: bool = True,
+    lubrication: str = "dry",
+    lubricant: str = "",
+    seed: int = 0,
+) -> Scan:
     """Simulate a line scan of contacts of a sphere, each pressed anew with a load of its own."""
     # Arguments are those of simulate_experiment; load_scale: all true loads over the stated ones.
     # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
@@ -91,7 +112,8 @@ def simulate_contacts(
             f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
             "largest signal; they must be finite."
         )
-    interface, truth = interface or Interface(), rod_scan.apparatus_function(kernel)
+    interface = interface or Interface()
+    truth = rod_scan.apparatus_function(kernel)
     shear = rod_scan.shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     states, spread = _pressed(
@@ -125,7 +147,8 @@ def simulate_contacts(
     stated = np.broadcast_to(loads[row, None], u.shape)
     unsure = load_scatter
     if record_loads:
-        stated, unsure = stated * ratio * (1 + load_reading * of_reading), load_reading
+        stated = stated * ratio * (1 + load_reading * of_reading)
+        unsure = load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
     disturbed = rod_scan.Disturbances(noise, baseline, drift, state_noise, seed)
     offset = along, away
@@ -205,7 +228,9 @@ def drawn(
         # Drawn in any case: a source that is not stated moves no other.
         return value + (uncertainty or 0.0) * float(rng.standard_normal())
 
-    film, rod, sphere = stated.film, stated.rod, stated.sphere
+    film = stated.film
+    rod = stated.rod
+    sphere = stated.sphere
     modulus = around(film.young_modulus, film.young_modulus_uncertainty)
     # A Poisson's ratio above 0.5 is reflected at 0.5.
     ratio = 0.5 - abs(0.5 - around(film.poisson_ratio, film.poisson_ratio_uncertainty))
@@ -373,17 +398,31 @@ def simulate_experiment(
     thickness = thickness_factor * reality.film.thickness
     reality = replace(reality, film=replace(reality.film, thickness=thickness))
     shared: dict[str, Any] = {
-        "film": reality.film, "kernel": kernel, "channels": channels, "shear_kernel": shear_kernel,
-        "centre": centre, "baseline": baseline, "drift": drift, "state_noise": state_noise,
+        "film": reality.film,
+        "kernel": kernel,
+        "channels": channels,
+        "shear_kernel": shear_kernel,
+        "centre": centre,
+        "baseline": baseline,
+        "drift": drift,
+        "state_noise": state_noise,
         "load_uncertainty": load_uncertainty,
-    }  # fmt: skip
+    }
     contacts: dict[str, Any] = shared | {
-        "sphere": reality.sphere, "conversion_constant": gain * conversion_constant,
-        "shear_conversion_constant": gain * shear_conversion_constant, "loading": loading,
-        "points": points, "spacing": spacing, "repeats": repeats, "noise": noise,
-        "load_scatter": load_scatter, "record_loads": record_loads, "load_reading": load_reading,
-        "load_scale": reality.load_scale, "position_error": position_error,
-    }  # fmt: skip
+        "sphere": reality.sphere,
+        "conversion_constant": gain * conversion_constant,
+        "shear_conversion_constant": gain * shear_conversion_constant,
+        "loading": loading,
+        "points": points,
+        "spacing": spacing,
+        "repeats": repeats,
+        "noise": noise,
+        "load_scatter": load_scatter,
+        "record_loads": record_loads,
+        "load_reading": load_reading,
+        "load_scale": reality.load_scale,
+        "position_error": position_error,
+    }
     calibration = simulate(
         rod=reality.rod,
         rod_friction=rod_friction,

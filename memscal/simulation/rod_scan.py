@@ -92,7 +92,8 @@ def recorded_shear(
     """Return voltages of the shear along x, at offsets along x and in all (m), and their truth."""
     if shear is None:
         return {}, {}
-    (kernel, constant), (along, away) = shear, offset
+    (kernel, constant) = shear
+    (along, away) = offset
     # Cosine of the angle from x to the indenter; 0 right on the sensor.
     side = np.divide(along, away, out=np.zeros_like(away + along), where=away > 0)
     clean = constant * (blurred(kernel, 1) * side).reshape(shape)

@@ -26,15 +26,16 @@ from memscal.summaries.table import Table, checks_json, checks_table, finite, te
 
 Calibrated: TypeAlias = Calibration | ApparatusData
 
-_OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm",
-               "noise_equivalent_area")  # fmt: skip
+_OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
 #: What scans tell of the film, where they do.
 _OF_FILM = ("film_laws", "free")
 #: Checks that a G that is Gaussian passes.
-_OF_GAUSSIAN, _OF_G = ("gaussian_misfit", "width_agreement"), "reconvolution"
+_OF_GAUSSIAN = ("gaussian_misfit", "width_agreement")
+_OF_G = "reconvolution"
 #: Reduced chi-squares of the Gaussian and of G(r) whose ratio is smaller are alike; where that of
 #: G(r) fails its check, too.
-_ALIKE, _ALIKE_FAILED = 1.1, 1.5
+_ALIKE = 1.1
+_ALIKE_FAILED = 1.5
 
 
 def tables(result: Calibrated) -> list[Table]:
@@ -45,7 +46,8 @@ def tables(result: Calibrated) -> list[Table]:
     if method := _method(apparatus):
         rows.insert(-1, ("method", "", method))
     if isinstance(result, Calibration):
-        misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
+        misfit = result.solution.deconvolution.misfit
+        gaussian = result.solution.gaussian_misfit
         rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
         rows.append(("reconvolution with the Gaussian", "", _misfit(gaussian)))
     title = f"{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
@@ -59,7 +61,8 @@ def tables(result: Calibrated) -> list[Table]:
 def answer(result: Calibrated) -> str:
     """Return which A and which description of G to use, and why."""
     apparatus = apparatus_of(result)
-    parameters, method = apparatus.parameters, _method(apparatus)
+    parameters = apparatus.parameters
+    method = _method(apparatus)
     failed = [c.name for c in apparatus.checks if c.name in _OF_GAUSSIAN and not c.passed]
     checks = {check.name: check for check in apparatus.checks}
     alike = False
@@ -100,7 +103,8 @@ def _method(apparatus: ApparatusData) -> str:
 
 
 def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
-    parameters, other = apparatus.parameters, apparatus.other
+    parameters = apparatus.parameters
+    other = apparatus.other
     own = {name: parameter_json(parameters, name) for name in _OF_A_ROUTE if name in parameters}
     estimates: dict[str, Any] = {_method(apparatus) or "chosen": own}
     if other is not None:
@@ -132,7 +136,8 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
     values |= {name: configuration[name] for name in _OF_FILM if name in configuration}
     if isinstance(result, Calibration):
-        misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
+        misfit = result.solution.deconvolution.misfit
+        gaussian = result.solution.gaussian_misfit
         values["reconvolution"] = {
             "relative_rms": finite(misfit.relative_rms),
             "gaussian_relative_rms": finite(gaussian.relative_rms),
@@ -219,7 +224,9 @@ def rehearsal_table(
     outputs: Sequence[Path],
 ) -> Table:
     """Return what ``calibrate --dry-run`` would do."""
-    film, rod, load = scan.film, scan.indenter, scan.load
+    film = scan.film
+    rod = scan.indenter
+    load = scan.load
     missing = f", {points.missing} missing" if points.missing else ""
     slip = {None: "", 0.0: ", sliding freely", math.inf: ", sticking"}[scan.rod_friction]
     rows = [("scan", f"{scan.kind}, {points.u.size} points{missing}")]

@@ -62,7 +62,8 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
             for i, profile in enumerate(comparison.measured.profiles)
         ]
         return {**head, "loads": loads, "joint": joint, "warnings": texts_of(comparison.messages)}
-    laws, sliding = comparison.interface, comparison.macroscopic
+    laws = comparison.interface
+    sliding = comparison.macroscopic
     first = comparison.loads[comparison.loadings[0]]
     return {
         **head,
@@ -85,7 +86,8 @@ def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
     """Return one row for each load and definition of the loading; open ends are infinite."""
     import pandas as pd
 
-    rows, tested = [], comparison.measured.noise_stated
+    rows = []
+    tested = comparison.measured.noise_stated
     for loading in comparison.loadings:
         loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
         for profile, load in zip(comparison.measured.profiles, loads, strict=True):
@@ -101,7 +103,8 @@ def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
 
 
 def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, float]:
-    value, u = estimate.value, estimate.standard_uncertainty
+    value = estimate.value
+    u = estimate.standard_uncertainty
     return {
         name: math.nan if value is None else value,
         f"u({name})": math.nan if u is None else u,
@@ -180,7 +183,8 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
     names = [quantity.name for quantity in records.CALCULATED]
-    mu, sticking = comparison.friction, np.isinf(comparison.friction).tolist()
+    mu = comparison.friction
+    sticking = np.isinf(comparison.friction).tolist()
     return {
         "effective_friction_coefficient": {
             "by_maximum": _estimate(load.by_maximum, comparison.measured.noise_stated),
@@ -279,7 +283,8 @@ def answer(comparison: FrictionComparison | ShearComparison) -> str:
 
 _LABELS = ("", "state", "load (N)")
 #: From here on chi-square is written without a decimal, and as a power of ten.
-_WIDE, _LONG = 100, 1e5
+_WIDE = 100
+_LONG = 1e5
 
 
 def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
@@ -305,7 +310,8 @@ def _maxima_table(comparison: FrictionComparison) -> Table:
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"
     )
-    force, maxima = records.COMPARED_LOAD[2], records.COMPARED_MAXIMA[::2]
+    force = records.COMPARED_LOAD[2]
+    maxima = records.COMPARED_MAXIMA[::2]
     head = [*_LABELS, *(quantity.heading for quantity in (force, *maxima))]
     rows = [
         [
@@ -349,7 +355,8 @@ def _friction_table(comparison: FrictionComparison | ShearComparison, loading: s
                 rows.append([*labels, *cells, f"{100 * load.bracketed:.0f} %"])
         sheared = isinstance(comparison, FrictionComparison) and comparison.shear is not None
         if count > 1 or sheared:
-            joint, name = by_loading[loading], lubrication or "not stated"
+            joint = by_loading[loading]
+            name = lubrication or "not stated"
             name += " + lubricated" if joint.beside else ""
             name += ", with shear" if sheared else ""
             cells = [str(joint), *fit(joint)]

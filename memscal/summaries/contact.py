@@ -58,11 +58,14 @@ def _deep(contact: Contact) -> str:
 
 
 def _in_rubber(contact: Contact) -> str:
-    film, rod, load = replace(contact.film, law=NEO_HOOKEAN), contact.indenter, contact.load
+    film = replace(contact.film, law=NEO_HOOKEAN)
+    rod = contact.indenter
+    load = contact.load
     if not isinstance(rod, Rod) or not is_tabulated(film, rod, load, math.inf):
         return ""
     rubber = press_rod(film, rod, load, math.inf)
-    stress, depth = rubber.max_base_stress / KPA, rubber.depth / MM
+    stress = rubber.max_base_stress / KPA
+    depth = rubber.depth / MM
     changes = (rubber.max_base_stress / contact.max_base_stress, rubber.depth / contact.depth)
     shares = [f"{change - 1:+.0%}" for change in changes]
     return (

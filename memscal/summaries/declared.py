@@ -41,7 +41,8 @@ def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) ->
     # In the units in which they are shown: a number or an array stands with its unit and, where
     # they are declared, its standard uncertainty and the budget of it; counts, statistics and
     # text stand alone.
-    declared, held = by_name(quantities), {}
+    declared = by_name(quantities)
+    held = {}
     for name, quantity in declared.items():
         key = quantity.label or name
         if quantity.dimension not in DIMENSIONS:
@@ -133,7 +134,8 @@ def record_arrays(
 ) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
     """Return what an object holds of a record as variables of an xarray Dataset, in SI units."""
     # ``names`` replaces names of quantities and axes that another record of the Dataset has, too.
-    names, variables = names or {}, {}
+    names = names or {}
+    variables = {}
     for quantity in record.quantities:
         value = getattr(holder, quantity.name, None)
         if value is not None:

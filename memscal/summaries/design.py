@@ -58,11 +58,13 @@ def tables(planned: Design) -> list[Table]:
 def _expected_rows(planned: Design) -> list[tuple[str, str, str, str]]:
     rows = []
     for name, (words, _) in _SHOWN.items():
-        shown, share = ESTIMATED[name], planned.relative_uncertainty(name)
+        shown = ESTIMATED[name]
+        share = planned.relative_uncertainty(name)
         value = f"{planned.parameters[name] / shown.scale:.4g} {shown.unit}"
         error = f"{planned.parameters.uncertainty(name) / shown.scale:.2g}"
         rows.append((words, value, error, _percent(share)))
-    g, u = planned.g[0] / PER_MM2, planned.g_errors[0] / PER_MM2
+    g = planned.g[0] / PER_MM2
+    u = planned.g_errors[0] / PER_MM2
     rows.append(("G at the axis", f"{g:.4g} 1/mm^2", f"{u:.2g}", _percent(u / abs(g))))
     band = planned.resolved_wavenumber / PER_MM
     detail = f"detail of {2 * math.pi / band:.3g} mm"

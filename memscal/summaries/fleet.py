@@ -26,7 +26,8 @@ def mapping(result: FleetCalibration) -> dict[str, Any]:
     if result.parameters is None or result.resolved_wavenumber is None:
         return values | {"error": str(result.error)}
     estimates = {name: parameter_json(result.parameters, name) for name in result.parameters.names}
-    checks, warnings = checks_json(result.checks), texts_of(result.messages)
+    checks = checks_json(result.checks)
+    warnings = texts_of(result.messages)
     resolved = members(TRANSFER.quantities[-1:], result)
     return values | estimates | resolved | {"checks": checks, "warnings": warnings}
 

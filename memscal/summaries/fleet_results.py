@@ -72,7 +72,8 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
 
 def tables(fleet: FleetResults) -> list[Table]:
     """Return counts and distributions, failed checks, errors, and the farthest outliers."""
-    told, total = mapping(fleet), len(fleet.paths)
+    told = mapping(fleet)
+    total = len(fleet.paths)
     shares, checks = (
         [(name.replace("_", " "), str(n), f"{n / total:.2%}") for name, n in numbers.items()]
         for numbers in (counts(fleet), told["checks"])
@@ -116,7 +117,8 @@ def mapping(fleet: FleetResults) -> dict[str, Any]:
     told: dict[str, Any] = {**counts(fleet), "checks": failures(fleet)}
     for name, unit in zip(_VALUES, (fleet.unit, "mm"), strict=True):
         known = np.isfinite(getattr(fleet, name))
-        values, errors = getattr(fleet, name)[known], getattr(fleet, f"{name}_errors")[known]
+        values = getattr(fleet, name)[known]
+        errors = getattr(fleet, f"{name}_errors")[known]
         low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)) if values.size else [np.nan] * 3
         numbers = {
             "median": middle,

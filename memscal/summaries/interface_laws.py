@@ -81,12 +81,14 @@ def _implied_table(implied: results.ImpliedFriction) -> Table:
     ):
         low, high = sorted((friction[0], friction[2]))
         soft, stiff = sorted((stiffness[0], stiffness[2]))
-        rows.append([
-            f"{load:.4g}",
-            _between(friction[1], low, high),
-            f"{pressure / KPA:.4g}",
-            _between(*(value / _STIFFNESS.scale for value in (stiffness[1], soft, stiff))),
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"{load:.4g}",
+                _between(friction[1], low, high),
+                f"{pressure / KPA:.4g}",
+                _between(*(value / _STIFFNESS.scale for value in (stiffness[1], soft, stiff))),
+            ]
+        )
     head = [quantity.heading for quantity in IMPLIED]
     return Table("What the slip length means at each load [its 95 % interval]", head, rows)
 
@@ -121,7 +123,8 @@ def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:
 
 def bounded_json(quantity: Quantity, estimate: results.BoundedEstimate) -> dict[str, Any]:
     """Return an estimate with its interval; without a value there is a reason."""
-    interval, scale = estimate.interval, quantity.scale
+    interval = estimate.interval
+    scale = quantity.scale
     return {
         "value": plain(estimate.value, scale),
         "standard_uncertainty": plain(estimate.standard_uncertainty, scale),

@@ -16,7 +16,8 @@ def tables(result: MonteCarlo) -> list[Table]:
         quantity = estimated_quantity(comparison.name).read_in(result.reading)
         scale = quantity.scale
         low, high = (end / scale for end in comparison.symmetric)
-        first, draws = comparison.first_order / scale, comparison.uncertainty / scale
+        first = comparison.first_order / scale
+        draws = comparison.uncertainty / scale
         cells = (f"{first:.2g}", f"{draws:.2g}", f"{low:.4g} to {high:.4g}")
         agrees = "yes" if comparison.agrees else "no"
         rows.append((f"{quantity.words} ({quantity.unit})", *cells, agrees))

@@ -76,7 +76,8 @@ def mapping(restored: Restoration) -> dict[str, Any]:
 
 def answer(restored: Restoration) -> str:
     """Return stress on the axis and total force."""
-    shown, values = by_name(_determined(restored)), _values(restored)
+    shown = by_name(_determined(restored))
+    values = _values(restored)
     axis, force = (declared.cell(shown[name], restored, **values) for name in _NUMBERS[1::-1])
     return (
         f"Stress on the axis {axis}; force {force} at {restored.scan.load:.4g} N.\n"
@@ -95,7 +96,8 @@ def tables(restored: Restoration) -> list[Table]:
         ("restored stress blurred again", f"χ²/ν = {restored.chi_square / restored.degrees:.3g}"),
     ]
     if (comparison := restored.comparison) is not None:
-        origin, within = _origin(comparison), comparison.within
+        origin = _origin(comparison)
+        within = comparison.within
         fit = f"χ²/ν = {comparison.chi_square:.3g}, p = {comparison.p_value:.2g}"
         beside = f"within 95 % bounds at {within:.0%} of radii"
         rows += [(f"{origin}, blurred", fit), (f"{origin}, beside the restored", beside)]
@@ -114,7 +116,8 @@ def _stress_table(restored: Restoration) -> Table:
     step = max(round(last / MM / (_SHOWN_RADII - 1) * 4) / 4, 0.05) * MM
     radii = np.arange(_SHOWN_RADII) * step
     radii = radii[radii <= restored.r[-1]]
-    stress, errors = restored.stress(radii) / KPA, restored.stress_uncertainty(radii) / KPA
+    stress = restored.stress(radii) / KPA
+    errors = restored.stress_uncertainty(radii) / KPA
     head = ["r (mm)", "restored"] + (["calculated"] if comparison is not None else [])
     rows = []
     for r, s, u in zip(radii, stress, errors, strict=True):

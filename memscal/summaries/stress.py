@@ -56,7 +56,8 @@ def _centre(profile: MeasuredProfile) -> dict[str, Any]:
 
 def answer(stress: MeasuredStress) -> str:
     """Return how large the stress is, and whether the force is the load."""
-    profiles, force = stress.profiles, records.APPLIED[2]
+    profiles = stress.profiles
+    force = records.APPLIED[2]
     lightest = min(profiles, key=lambda profile: profile.load)
     strongest = max(profiles, key=lambda profile: profile.maximum)
     texts = [
@@ -75,7 +76,8 @@ def tables(stress: MeasuredStress) -> list[Table]:
     """Return the profiles, what holds for all of them, and the quality checks that matter."""
     load, *shown = (_NUMBERS[name] for name in ("load", "force", "maximum", "centre"))
     head = ("", load.heading, "state", *(quantity.heading for quantity in shown), "checks")
-    rows, marked = [], set()
+    rows = []
+    marked = set()
     for i, profile in enumerate(stress.profiles):
         number = str(i + 1)
         failed = [c.kind for c in stress.checks if c.profile == number and not c.passed]
@@ -87,7 +89,8 @@ def tables(stress: MeasuredStress) -> list[Table]:
         state = profile.lubrication or "not stated"
         checks = f"FAILED: {names}" if failed else "passed"
         rows.append((number, f"{profile.load:.4g}", state, *cells, checks))
-    film, indenter = stress.scans[0].film, stress.scans[0].indenter
+    film = stress.scans[0].film
+    indenter = stress.scans[0].indenter
     title = (
         f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
         f"{indenter.shape} of radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
@@ -140,7 +143,9 @@ def frame(stress: MeasuredStress) -> declared.DataFrame:
 def correlated(stress: MeasuredStress) -> dict[str, Any]:
     """Return force, maximum, centre and baseline of each profile, numbered from one."""
     # Forces are correlated by the sources that profiles share; no other covariance is known.
-    names, values, spread = [], [], []
+    names = []
+    values = []
+    spread = []
     for i, profile in enumerate(stress.profiles, start=1):
         numbers = {
             "force": (profile.force, profile.force_uncertainty),

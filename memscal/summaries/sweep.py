@@ -21,7 +21,8 @@ def tables(result: Sweep) -> list[Table]:
     """Return every second amplitude: the exact expectation, and the median of the draws."""
     constant = _RESULTS[0][0].read_in(result.reading)
     power = power_of_ten(result.conversion_constant / constant.scale)
-    scales, forms = (constant.scale * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
+    scales = (constant.scale * 10.0**power, MM, 0.01)
+    forms = (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
     for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
         columns.append([_number(value, form) for value in getattr(result, quantity.name) / scale])

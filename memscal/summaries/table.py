@@ -21,8 +21,13 @@ _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 # How a character is written where the terminal's encoding lacks it.
 _PLAIN = dict(zip("×²Δ₀µ–", "x2d0u-", strict=True)) | {
-    "±": "+/-", "σ": "sigma", "χ": "chi", "ν": "nu", "μ": "mu", "…": "..."
-}  # fmt: skip
+    "±": "+/-",
+    "σ": "sigma",
+    "χ": "chi",
+    "ν": "nu",
+    "μ": "mu",
+    "…": "...",
+}
 
 
 def readable(text: str, stream: TextIO | None = None) -> str:

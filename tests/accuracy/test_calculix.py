@@ -25,7 +25,8 @@ pytestmark = [pytest.mark.accuracy, pytest.mark.skipif(not shutil.which("ccx"), 
 RATIOS = (0.495, 0.499) if FULL else (0.495,)
 HALVINGS = (1, 2, 3) if FULL else (1, 2)
 MESHES = ((0.1, 8), (0.05, 12), (0.025, 20)) if FULL else ((0.1, 8), (0.05, 12))
-ROD, SPHERE = 0.25, 128.8
+ROD = 0.25
+SPHERE = 128.8
 LOADS = (0.34, 0.69, 1.37, 2.75)
 
 

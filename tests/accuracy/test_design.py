@@ -23,7 +23,8 @@ TOLERANCE = 0.15
 #: Least scatter of A, sigma and FWHM over the part of their uncertainty that is their own.
 LEAST = np.array([0.35, 0.85, 0.1])
 #: Chance that a bound fails by accident, and as many standard errors.
-CHANCE, DEVIATIONS = 1e-4, 3.9
+CHANCE = 1e-4
+DEVIATIONS = 3.9
 NAMES = ("conversion_constant", "gaussian_sigma", "fwhm")
 
 
@@ -34,9 +35,12 @@ def random_plan(number: int) -> Plan:
     return Plan(
         film=replace(PAPER_FILM, thickness=thickness),
         kernel=memscal.GaussianMixture((1.0,), (rng.uniform(0.3, 0.6) * thickness,)),
-        step=rng.uniform(0.1, 0.25) * thickness, half_range=rng.uniform(3.5, 5.0) * thickness,
-        repeats=int(rng.integers(1, 5)), noise=rng.uniform(0.002, 0.01), load_uncertainty=0.005,
-    )  # fmt: skip
+        step=rng.uniform(0.1, 0.25) * thickness,
+        half_range=rng.uniform(3.5, 5.0) * thickness,
+        repeats=int(rng.integers(1, 5)),
+        noise=rng.uniform(0.002, 0.01),
+        load_uncertainty=0.005,
+    )
 
 
 @dataclass(frozen=True)
@@ -70,13 +74,19 @@ def study(number: int) -> Study:
     sigma = plan.kernel.sigmas[0]
     planned = memscal.design(**{name: getattr(plan, name) for name in Plan.__dataclass_fields__})
     assert planned.plan == plan
-    stated, found = [], []
+    stated = []
+    found = []
     for seed in range(SEEDS):
         scan = memscal.simulate(
-            film=plan.film, kernel=plan.kernel, half_range=plan.step * (plan.positions - 1) / 2,
-            points=plan.positions, repeats=plan.repeats, noise=plan.noise,
-            load_uncertainty=plan.load_uncertainty, seed=seed,
-        )  # fmt: skip
+            film=plan.film,
+            kernel=plan.kernel,
+            half_range=plan.step * (plan.positions - 1) / 2,
+            points=plan.positions,
+            repeats=plan.repeats,
+            noise=plan.noise,
+            load_uncertainty=plan.load_uncertainty,
+            seed=seed,
+        )
         result = memscal.calibrate(scan, method="evidence").apparatus
         profile = result.radial_profile
         stated.append(shares(result.parameters, profile.r, profile.g_errors, sigma))

@@ -46,10 +46,17 @@ LIMITS = {
     "disc": Limits((0.15, 0.15, 0.23), **BANDS),
     "mixture": Limits((0.15, 0.16, 0.26), **BANDS),
     # The film hides the hole of a ring, of which the band counts less than half.
-    "ring": Limits((0.30, 0.30, 0.30), **BANDS | {
-        "coverage": 0.25, "mean_coverage": 0.80, "bias_g": 2.3, "ratio": (0.1, 2.4),
-    }),
-}  # fmt: skip
+    "ring": Limits(
+        (0.30, 0.30, 0.30),
+        **BANDS
+        | {
+            "coverage": 0.25,
+            "mean_coverage": 0.80,
+            "bias_g": 2.3,
+            "ratio": (0.1, 2.4),
+        },
+    ),
+}
 A_LIMITS = dict(zip(NOISES, (0.003, 0.015, 0.045), strict=True))  # RMS error
 
 
@@ -81,16 +88,20 @@ def study(case: Case) -> tuple[Outcome, dict[str, np.ndarray]]:
         p = apparatus.parameters
         truths = {n: scan.synthetic[n] for n in ("conversion_constant", "baseline", "centre")}
         fitted = {"conversion_constant_gaussian": CONVERSION, "gaussian_sigma": case.sigma or 1.0}
-        rows.append({
-            **errors_of(case, seed, apparatus), "agreement": agreement(apparatus).value,
-            "z": [(p[name] - truth) / p.uncertainty(name) for name, truth in truths.items()],
-            "fit": [p[name] / truth - 1 for name, truth in fitted.items()],
-            "u_fit": [p.uncertainty(name) / truth for name, truth in fitted.items()],
-        })  # fmt: skip
+        rows.append(
+            {
+                **errors_of(case, seed, apparatus),
+                "agreement": agreement(apparatus).value,
+                "z": [(p[name] - truth) / p.uncertainty(name) for name, truth in truths.items()],
+                "fit": [p[name] / truth - 1 for name, truth in fitted.items()],
+                "u_fit": [p.uncertainty(name) / truth for name, truth in fitted.items()],
+            }
+        )
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     z = {"A": columns["z"][:, 0]}
     outcome = Outcome(case, columns["error"], columns["u"], columns["a"], z)
-    held, rms = outcome.held.mean(axis=0), root_mean_square(outcome.a)
+    held = outcome.held.mean(axis=0)
+    rms = root_mean_square(outcome.a)
     told = np.median(outcome.g), held.mean(), held.min(), rms, columns["agreement"].max()
     LOG.info("%s: G %.3f, held %.3f, least %.3f; A %.4f; routes differ by %.2f", case.name, *told)
     return outcome, columns
@@ -106,8 +117,11 @@ def test_g_and_a_are_found_and_are_as_uncertain_as_stated(case: Case) -> None:
 
 @pytest.mark.parametrize("case", GAUSSIANS, ids=lambda case: case.name)
 def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(case: Case) -> None:
-    columns, seeds = study(case)[1], seeds_of(case)
-    error, stated, bounds = columns["fit"], columns["u_fit"], cramer_rao(case.noise, case.kernel)
+    columns = study(case)[1]
+    seeds = seeds_of(case)
+    error = columns["fit"]
+    stated = columns["u_fit"]
+    bounds = cramer_rao(case.noise, case.kernel)
     truths = {"conversion_constant": CONVERSION, "gaussian_sigma": case.sigma}
     bound = np.array([bounds[name] / truth for name, truth in truths.items()])
     limit = root_mean_square_limit(1.1, seeds, CHANCE)
@@ -174,7 +188,8 @@ def of_repeats(noise: float, seed: int, shift: float, **options) -> memscal.Appa
     """Calibrate with three passes over a Gaussian sensor, which moves from one to the next."""
     passes = [case_of("Gaussian", noise).scan(3 * seed + i) for i in range(3)]
     moved = [scan.x + i * shift for scan, i in zip(passes, (-1, 0, 1), strict=True)]
-    u, number = np.concatenate([scan.u_zz for scan in passes]), np.repeat([0, 1, 2], 65)
+    u = np.concatenate([scan.u_zz for scan in passes])
+    number = np.repeat([0, 1, 2], 65)
     scan = replace(passes[0], x=np.concatenate(moved), u_zz=u, repeat=number)
     return memscal.calibrate(scan, **options).apparatus
 
@@ -188,7 +203,8 @@ def test_repeats_that_share_their_centre_are_told_apart_as_rarely_as_is_said() -
 
 
 def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties() -> None:
-    shift, names = 40e-6, ("conversion_constant_gaussian", "gaussian_sigma", "centre", "centre_3")
+    shift = 40e-6
+    names = ("conversion_constant_gaussian", "gaussian_sigma", "centre", "centre_3")
     truths = np.array([CONVERSION, WIDTHS[0.005], CENTRE - shift, CENTRE + shift])
     deviates = []
     for seed in range(PASSES):
@@ -205,7 +221,8 @@ def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties
 
 
 def test_one_centre_for_repeats_that_moved_blurs_the_gaussian() -> None:
-    shift, choices = 100e-6, ("common", "per-repeat")
+    shift = 100e-6
+    choices = ("common", "per-repeat")
     pairs = [[of_repeats(0.02, s, shift, centre=c) for c in choices] for s in range(PASSES)]
     widened = [one.gaussian_sigma - own.gaussian_sigma for one, own in pairs]
     blur = np.hypot(WIDTHS[0.02], shift * np.sqrt(2 / 3)) - WIDTHS[0.02]

@@ -62,8 +62,10 @@ def test_the_table_is_what_its_script_prints(name: str) -> None:
     printed = [cell.strip() for cell in script()["row"](study(name)).split("|")[1:-1]]
     for ours, theirs in zip(printed[5:-1], stated()[list(CASES).index(name)][5:-1], strict=True):
         # Another processor may round differently, and a seed cross a limit by it.
-        numbers = [[float(x) for x in re.findall(r"[-+.\d]+", cell.split("(")[0])]
-                   for cell in (ours, theirs)]  # fmt: skip
+        numbers = [
+            [float(x) for x in re.findall(r"[-+.\d]+", cell.split("(")[0])]
+            for cell in (ours, theirs)
+        ]
         assert numbers[0] == pytest.approx(numbers[1], rel=0.01, abs=0.0101)
 
 
@@ -111,6 +113,7 @@ def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
 ) -> None:
     # Finite elements and a direct sum on one side, transforms on the other.
     setting = {"kernel": kernel, "noise": 1e-3, "repeats": 2, "points": 33, "seed": 5}
-    ours, theirs = direct_scan(**setting), simulated(**setting)
+    ours = direct_scan(**setting)
+    theirs = simulated(**setting)
     assert np.abs(ours.u_zz - theirs.u_zz).max() < 1e-5 * theirs.u_zz.max()
     assert np.abs(ours.u_zz_errors / theirs.u_zz_errors - 1).max() < 1e-5

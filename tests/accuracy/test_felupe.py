@@ -23,7 +23,9 @@ felupe = pytest.importorskip("felupe", reason="FElupe, the other program, is not
 
 pytestmark = pytest.mark.accuracy
 
-H, A, EDGE = 2.0, 0.25, 0.025  # mm
+H = 2.0
+A = 0.25
+EDGE = 0.025  # mm
 WAVENUMBERS = np.linspace(0.0, 3.0, 13)  # rad/mm
 REFINEMENT = 1.0 if FULL else 0.5
 
@@ -71,15 +73,19 @@ def press_with_felupe(loads: tuple[float, ...], friction: float, mesh: Any) -> l
     shear = FILM.shear_modulus * 1e-6
     material = felupe.NearlyIncompressible(felupe.NeoHooke(mu=shear), bulk=5000 * shear)
     z, r = mesh.points.T
-    base, top = np.flatnonzero(z < 1e-9), np.flatnonzero((z > H - 1e-9) & (r < 1.5))[:-1]
+    base = np.flatnonzero(z < 1e-9)
+    top = np.flatnonzero((z > H - 1e-9) & (r < 1.5))[:-1]
     stiff = {"multiplier": 1e3, "multiplier_tangential": 1e3, "curvature": "trial"}  # N/mm
     contact = RodContact(field, points=top, centerpoint=-1, friction=friction, **stiff)
-    solid, weight = felupe.SolidBody(material, field), felupe.PointLoad(field, [r.size - 1])
+    solid = felupe.SolidBody(material, field)
+    weight = felupe.PointLoad(field, [r.size - 1])
     held = (felupe.Boundary(u, mask=z < 1e-9), felupe.Boundary(u, mask=r < 1e-9, skip=(1, 0)))
     fixed, free = felupe.dof.partition(field, dict(enumerate(held)))
     setting = {"dof0": fixed, "dof1": free, "ext0": np.zeros(fixed.size), "verbose": 0, "tol": 1e-6}
     u.values[-1, 0] = -1e-3  # the rod touches
-    reached, step, answers = 0.0, 0.01, []
+    reached = 0.0
+    step = 0.01
+    answers = []
     for load in loads:
         while reached < load:
             ahead = load if load - reached < 1.5 * step else reached + step
@@ -94,7 +100,8 @@ def press_with_felupe(loads: tuple[float, ...], friction: float, mesh: Any) -> l
                 step /= 2
                 assert step > 1e-4
             else:
-                reached, step = ahead, min(1.3 * step, 0.05)
+                reached = ahead
+                step = min(1.3 * step, 0.05)
         forces = np.asarray(solid.assemble.vector(field).todense()).ravel()[2 * base]
         answers.append((-float(u.values[-1, 0]), j0(np.outer(WAVENUMBERS, r[base])) @ forces))
     return answers
@@ -107,7 +114,8 @@ SLIDING = (0.0, (0.1,) if FULL else (0.05,), (0.15, 0.3, 0.00625 / REFINEMENT))
 
 @pytest.mark.parametrize(("friction", "loads", "fold"), [STICKING, SLIDING])
 def test_the_film_under_a_rod_agrees_with_felupe(friction, loads, fold) -> None:
-    targets, sticking = tuple(Load(load) for load in loads), friction > 0
+    targets = tuple(Load(load) for load in loads)
+    sticking = friction > 0
     ours = solve_finite_strain(FILM, ROD, targets, sticking=sticking, refinement=REFINEMENT)
     theirs = press_with_felupe(loads, friction, film_of_quadrilaterals(*fold))
     for state, (depth, base) in zip(ours, theirs, strict=True):

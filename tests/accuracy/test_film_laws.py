@@ -27,12 +27,19 @@ BALANCE = 0.01
 
 
 def scans_of(
-    law: str, sensor: str, seed: int, *, noise: float = 0.005,
-    loads=LOADS, radii=(0.25e-3,), film: memscal.ElasticFilm = PAPER_FILM,
-) -> list[memscal.Scan]:  # fmt: skip
+    law: str,
+    sensor: str,
+    seed: int,
+    *,
+    noise: float = 0.005,
+    loads=LOADS,
+    radii=(0.25e-3,),
+    film: memscal.ElasticFilm = PAPER_FILM,
+) -> list[memscal.Scan]:
     scans = []
     for i, (load, radius) in enumerate((load, radius) for load in loads for radius in radii):
-        rng, kernel = np.random.default_rng([seed, i]), SENSORS[sensor]
+        rng = np.random.default_rng([seed, i])
+        kernel = SENSORS[sensor]
         rod = {"load": load, "radius": radius, "law": law}
         scan = direct_scan(kernel, noise=noise, seed=1000 * seed + i, **rod)
         off = {"u_zz": scan.u_zz * (1 + BALANCE * rng.normal()), "load_uncertainty": BALANCE * load}
@@ -45,24 +52,32 @@ def scans_of(
 def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
     # Mooney-Rivlin is weighed where it is stated, and hardly told from neo-Hookean.
     stated = {"law": truth, "mooney_rivlin_ratio": RATIO} if truth == MOONEY else {}
-    other, factors = RUBBER if truth == LINEAR else LINEAR, []
+    other = RUBBER if truth == LINEAR else LINEAR
+    factors = []
     for seed in range(SEEDS):
         scans = scans_of(truth, sensor, seed, film=replace(PAPER_FILM, **stated))
         made = memscal.calibrate(scans, method="bayesian").to_dict()["film_laws"]
         below = {law["law"]: law["log_evidence_below_best"] for law in made}
         factors.append([below[law] - below[truth] for law in (other, *below) if law != truth])
-    wrong, strongly = np.sum(np.array(factors)[:, 0] < 0), np.sum(np.min(factors, axis=1) < -3)
+    wrong = np.sum(np.array(factors)[:, 0] < 0)
+    strongly = np.sum(np.min(factors, axis=1) < -3)
     assert wrong <= binom.isf(CHANCE, SEEDS, 0.05)
     assert strongly <= binom.isf(CHANCE, SEEDS, 0.01)
 
 
 @pytest.mark.parametrize("sensor", [*SENSORS][: None if FULL else 1])
-@pytest.mark.parametrize(("law", "setting"), [
-    (RUBBER, {}), (LINEAR, {"loads": (1.0,), "radii": (0.15e-3, 0.35e-3)}),
-][: None if FULL else 1])  # fmt: skip
+@pytest.mark.parametrize(
+    ("law", "setting"),
+    [
+        (RUBBER, {}),
+        (LINEAR, {"loads": (1.0,), "radii": (0.15e-3, 0.35e-3)}),
+    ][: None if FULL else 1],
+)
 def test_an_estimated_thickness_is_off_by_what_it_states(law: str, setting, sensor: str) -> None:
     # What is stated is drawn about the truth: of both, the difference is all that counts.
-    u, truth, rows = 0.1e-3, PAPER_FILM.thickness, []
+    u = 0.1e-3
+    truth = PAPER_FILM.thickness
+    rows = []
     for seed in range(SEEDS):
         film = replace(PAPER_FILM, law=law, thickness_uncertainty=u)
         uncertainties = u, film.young_modulus_uncertainty

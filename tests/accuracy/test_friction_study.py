@@ -133,10 +133,12 @@ def test_no_coefficient_is_left_out(friction: float) -> None:
 
 def test_the_intervals_of_single_loads_hold_the_truth() -> None:
     # Loads of one experiment share their systematic errors: the experiment is the unit.
-    held = np.array([
-        [reading.interval.holds(one.truth) for reading in one.readings]
-        for one in outcomes(*FRICTIONS)
-    ])  # fmt: skip
+    held = np.array(
+        [
+            [reading.interval.holds(one.truth) for reading in one.readings]
+            for one in outcomes(*FRICTIONS)
+        ]
+    )
     assert held.mean() > 0.92 - 4 * held.mean(axis=1).std() / math.sqrt(len(held))
     found = [*outcomes(0.3), *outcomes(0.0)[:FEW]]
     confused = [r.interval.holds(0.3 - one.truth) for one in found for r in one.readings]

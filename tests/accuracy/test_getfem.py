@@ -49,15 +49,26 @@ def python() -> str:
 def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> list[dict[str, Any]]:
     """States of the paper's sphere and film at the paper's loads, in mm, N and MPa."""
     case = {
-        "young_modulus": 2.2, "poisson_ratio": 0.5, "thickness": 2.0, "radius": 128.8,
-        "friction": min(friction, STICKING), "loads": LOADS, "steps": steps, "contact": 4.2,
-        "step": step, "layers": LAYERS, "first_depth": 2e-3,
-    }  # fmt: skip
+        "young_modulus": 2.2,
+        "poisson_ratio": 0.5,
+        "thickness": 2.0,
+        "radius": 128.8,
+        "friction": min(friction, STICKING),
+        "loads": LOADS,
+        "steps": steps,
+        "contact": 4.2,
+        "step": step,
+        "layers": LAYERS,
+        "first_depth": 2e-3,
+    }
     done = subprocess.run(
-        [python, str(PROGRAM)], input=json.dumps(case),
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}, capture_output=True, text=True,
+        [python, str(PROGRAM)],
+        input=json.dumps(case),
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     states = json.loads(done.stdout)["states"]
     return [
@@ -72,7 +83,8 @@ def by_memscal(friction: float) -> list[memscal.Contact]:
 
 def edge(state: dict[str, Any]) -> float:
     """Contact radius in mm."""
-    r, pressure = state["r"], state["pressure"]
+    r = state["r"]
+    pressure = state["pressure"]
     return contact_radius(r, load_beyond(r, pressure), r[pressure > 0.02 * pressure.max()].max())
 
 

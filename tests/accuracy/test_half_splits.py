@@ -34,10 +34,12 @@ SPLITS = [*((case, "points") for case in SENSORS), (SENSORS[4], "repeats")]
 def estimates(scan: memscal.Scan) -> FloatArray:
     """By division and by model averaging: NUMBERS and G at RADII, and the noise of each."""
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
-    solution, rows = solve([scan], [contact], WhiteNoise()), []
+    solution = solve([scan], [contact], WhiteNoise())
+    rows = []
     for route in (solution.deconvolution, solution.other):
         assert route is not None
-        results, r = uncertainties(solution, route, {}, {}), route.g.r
+        results = uncertainties(solution, route, {}, {})
+        r = route.g.r
         noises = [results.budget[name]["noise"] for name in NUMBERS]
         of_g = (np.interp(RADII, r, y) for y in (route.g.radial, results.radial_scatter))
         values = [results.parameters[name] for name in NUMBERS]
@@ -64,9 +66,11 @@ def deviates(case: Case, split: str) -> FloatArray:
 def require_unit(
     deviates: FloatArray, route: str, of_shape: tuple[float, float] = (0.8, 1.2)
 ) -> None:
-    ratio, count = np.sqrt(np.mean(deviates[:, ROUTES.index(route)] ** 2, axis=0)), len(deviates)
+    ratio = np.sqrt(np.mean(deviates[:, ROUTES.index(route)] ** 2, axis=0))
+    count = len(deviates)
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count) / count)
-    least, most = np.full(ratio.size, 0.8), np.full(ratio.size, 1.2)
+    least = np.full(ratio.size, 0.8)
+    most = np.full(ratio.size, 1.2)
     least[NUMBERS.index("fwhm") :], most[NUMBERS.index("fwhm") :] = of_shape
     assert (least * low < ratio).all(), ratio
     assert (ratio < most * high).all(), ratio
@@ -94,16 +98,23 @@ def scatter(values: np.ndarray, stated: np.ndarray) -> float:
 
 @pytest.mark.parametrize("case", [c for c in SENSORS if c.noise < 0.01], ids=lambda c: c.name)
 def test_runs_of_other_reach_and_step_differ_as_stated(case: Case) -> None:
-    rng, rows = np.random.default_rng(3), []
+    rng = np.random.default_rng(3)
+    rows = []
     for seed in range(RUNS):
-        half_range, step = rng.uniform(5e-3, 10e-3), rng.uniform(0.2e-3, 0.5e-3)
+        half_range = rng.uniform(5e-3, 10e-3)
+        step = rng.uniform(0.2e-3, 0.5e-3)
         scan = simulated(
-            kernel=case.kernel, noise=case.noise, seed=seed, half_range=half_range,
-            points=int(2 * half_range / step), centre=(rng.uniform(-1e-3, 1e-3), 0.0),
+            kernel=case.kernel,
+            noise=case.noise,
+            seed=seed,
+            half_range=half_range,
+            points=int(2 * half_range / step),
+            centre=(rng.uniform(-1e-3, 1e-3), 0.0),
             repeats=int(rng.integers(1, 4)),
-        )  # fmt: skip
+        )
         apparatus = memscal.calibrate(scan, method="bayesian").apparatus
-        p, budget = apparatus.parameters, apparatus.budget["gaussian_sigma"]
+        p = apparatus.parameters
+        budget = apparatus.budget["gaussian_sigma"]
         names = "gaussian_sigma", "conversion_constant_gaussian"
         rows.append(
             [budget["noise"], *(n for name in names for n in (p[name], p.uncertainty(name)))]

@@ -33,18 +33,23 @@ SLIP_LENGTH = 16e-6
 _REACH = 12e-3
 
 PRECISE: dict[str, Any] = {
-    "noise": 0.001, "record_loads": True, "load_reading": 0.002, "position_error": 2e-6,
+    "noise": 0.001,
+    "record_loads": True,
+    "load_reading": 0.002,
+    "position_error": 2e-6,
     "repeats": 9,
-}  # fmt: skip
+}
 KINDS: dict[str, dict[str, Any]] = {
     "paper": {"noise": 0.003, "repeats": 3},
     "precise": PRECISE,
     "known": {**PRECISE, "load_uncertainty": 0.003},
 }
 KNOWN_FILM = replace(
-    PAPER_FILM, young_modulus_uncertainty=0.005 * PAPER_FILM.young_modulus,
-    thickness_uncertainty=0.0025 * PAPER_FILM.thickness, poisson_ratio_uncertainty=0.001,
-)  # fmt: skip
+    PAPER_FILM,
+    young_modulus_uncertainty=0.005 * PAPER_FILM.young_modulus,
+    thickness_uncertainty=0.0025 * PAPER_FILM.thickness,
+    poisson_ratio_uncertainty=0.001,
+)
 
 
 @lru_cache

@@ -29,9 +29,11 @@ CHANCE = 1e-5
 NOISES = (0.003, 0.02)
 SENSORS = {
     # The disc is sharper than any departure of the model.
-    "Gaussian": memscal.GaussianMixture(), "tails": TAILS, "ring": RING,
+    "Gaussian": memscal.GaussianMixture(),
+    "tails": TAILS,
+    "ring": RING,
     "disc": memscal.SmoothedDisc(1e-3, 0.05e-3),
-}  # fmt: skip
+}
 
 
 @lru_cache
@@ -44,12 +46,14 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
         runs = runs_test(residuals)
         same = int(np.sum(np.diff(residuals.sequence[residuals.independent[1]]) == 0))
         changes = round(same * (1 - runs.value))
-        rows.append({
-            "size": chi_square_test(residuals).p_value,
-            # A count's p-value moves in steps: spread evenly over its own, it is uniform.
-            "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
-            "neighbours": neighbour_correlation_test(residuals).p_value,
-        })  # fmt: skip
+        rows.append(
+            {
+                "size": chi_square_test(residuals).p_value,
+                # A count's p-value moves in steps: spread evenly over its own, it is uniform.
+                "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
+                "neighbours": neighbour_correlation_test(residuals).p_value,
+            }
+        )
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
@@ -71,7 +75,8 @@ def test_p_values_of_all_sensors_together_are_uniform_in_their_lower_tail(name: 
 
 
 def test_uncertain_positions_are_noise_of_every_chi_square() -> None:
-    fine, error = simulated(noise=0.0, points=1025), 10e-6
+    fine = simulated(noise=0.0, points=1025)
+    error = 10e-6
     voltage = make_interp_spline(fine.x, fine.u_zz, k=5)
     found: dict[str, list[float]] = {"gaussian_misfit": [], "chi_square": [], "reconvolution": []}
     for seed in range(SEEDS):

@@ -50,7 +50,8 @@ def on_plane(apparatus: memscal.ApparatusFunction, name: str) -> FloatArray:
 def true_g(apparatus: memscal.ApparatusFunction) -> FloatArray:
     """G at the same places."""
     p = apparatus.parameters
-    x, y = AXIS + p["centre"] - CENTRE[0], AXIS + p["centre_y"] - CENTRE[1]
+    x = AXIS + p["centre"] - CENTRE[0]
+    y = AXIS + p["centre_y"] - CENTRE[1]
     return np.asarray(TailedEllipse().at(x[None, :], y[:, None])[INSIDE])
 
 
@@ -60,7 +61,12 @@ def rms(values: FloatArray) -> float:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_halves_of_a_raster_differ_as_their_uncertainty_says(method: str) -> None:
-    of_noise, of_all, of_truth, relative, deviates, outliers = [], [], [], [], [], []
+    of_noise = []
+    of_all = []
+    of_truth = []
+    relative = []
+    deviates = []
+    outliers = []
     for seed in range(SEEDS):
         first, second = halves(seed, method)
         difference = on_plane(first, "g") - on_plane(second, "g")
@@ -68,10 +74,12 @@ def test_halves_of_a_raster_differ_as_their_uncertainty_says(method: str) -> Non
             both = np.hypot(on_plane(first, name), on_plane(second, name))
             ratios.append(rms(difference / both))
         for half in (first, second):
-            error, truth = on_plane(half, "g") - true_g(half), true_g(half)
+            error = on_plane(half, "g") - true_g(half)
+            truth = true_g(half)
             of_truth.append(rms(error / on_plane(half, "g_errors")))
             relative.append(rms(error) / rms(truth))
-            a, u = half.conversion_constant, half.parameters.uncertainty("conversion_constant")
+            a = half.conversion_constant
+            u = half.parameters.uncertainty("conversion_constant")
             deviates.append((a - CONVERSION) / u)
             outliers.append(sum(m.kind == "outlier" for m in half.process.messages))
     names = "noise", "all", "truth", "relative error", "deviates of A"
@@ -106,7 +114,9 @@ def test_held_out_points_are_predicted_as_well_as_by_a_tuned_wiener_filter() -> 
 def predicted(train: Scan, method: str) -> FloatArray:
     """Voltages at all nodes by the field of G, without baseline."""
     calibration = memscal.calibrate(train, method=method)
-    p, step, beyond = calibration.apparatus.parameters, train.x[1] - train.x[0], 40
+    p = calibration.apparatus.parameters
+    step = train.x[1] - train.x[0]
+    beyond = 40
     far = step * np.arange(1, beyond + 1)
     axis = np.concatenate([train.x[0] - far[::-1], train.x, train.x[-1] + far])
     stress = stress_about(train, axis - p["centre"], axis - p["centre_y"])
@@ -131,7 +141,8 @@ def best_wiener(scan: Scan, held: FloatArray) -> float:
     )
     image[held] = np.where(np.isnan(inner), edge, inner)
     image -= np.median(np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]))
-    axis, top = scan.x - scan.x[scan.x.size // 2], image.max()
+    axis = scan.x - scan.x[scan.x.size // 2]
+    top = image.max()
     psf = stress_about(scan, axis, axis)
     psf /= psf.sum()
     restored = (wiener(image / top, psf, b, clip=False) for b in np.geomspace(1e-8, 1, 60))

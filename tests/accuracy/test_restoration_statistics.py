@@ -38,16 +38,21 @@ def at_once(load: float, indenter: memscal.Sphere = made.SPHERE) -> memscal.Cont
 
 
 CHOSEN_ON = {
-    "light": (pressed(0.34), GAUSSIAN), "middle": (pressed(1.0), GAUSSIAN),
-    "heavy": (pressed(2.75), GAUSSIAN), "sticking, light": (pressed(0.34, np.inf), GAUSSIAN),
-    "sticking, heavy": (pressed(2.75, np.inf), GAUSSIAN), "at once": (at_once(2.75), GAUSSIAN),
+    "light": (pressed(0.34), GAUSSIAN),
+    "middle": (pressed(1.0), GAUSSIAN),
+    "heavy": (pressed(2.75), GAUSSIAN),
+    "sticking, light": (pressed(0.34, np.inf), GAUSSIAN),
+    "sticking, heavy": (pressed(2.75, np.inf), GAUSSIAN),
+    "at once": (at_once(2.75), GAUSSIAN),
     "compressible": (pressed(film=COMPRESSIBLE), GAUSSIAN),
-    "nearly incompressible": (pressed(film=NEARLY), GAUSSIAN), "ring": (pressed(), RING),
-    "tails": (pressed(), TAILS), "cone": (pressed(indenter=FLAT), GAUSSIAN),
+    "nearly incompressible": (pressed(film=NEARLY), GAUSSIAN),
+    "ring": (pressed(), RING),
+    "tails": (pressed(), TAILS),
+    "cone": (pressed(indenter=FLAT), GAUSSIAN),
     "thin rod": (pressed(indenter=memscal.Rod(radius=0.25e-3)), GAUSSIAN),
     "deep rod": (pressed(0.3, np.inf, film=RUBBER, indenter=made.EXACT_ROD), GAUSSIAN),
     "wide rod": (pressed(indenter=memscal.Rod(radius=2.5e-3)), GAUSSIAN),
-}  # fmt: skip
+}
 """Contacts on which the strength of a pressure's departures was chosen; that choice alone is tested
 on them."""
 
@@ -66,7 +71,7 @@ CASES = {
     "rod": (pressed(0.5, indenter=memscal.Rod(radius=0.6e-3)), GAUSSIAN),
     "wide rod": (pressed(indenter=memscal.Rod(radius=1.5e-3)), GAUSSIAN),
     "deep rod": (pressed(0.5, np.inf, film=RUBBER, indenter=memscal.Rod(radius=0.35e-3)), GAUSSIAN),
-}  # fmt: skip
+}
 """Contacts of other loads, radii, films and sensors, on which everything else is tested."""
 
 
@@ -88,7 +93,9 @@ def drawn(
 
 def outcome(found: memscal.Restoration, contact: memscal.Contact) -> tuple[float, ...]:
     r = found.r[found.r <= REACH]
-    stress, errors, truth = found.stress(r), found.stress_uncertainty(r), contact.base_stress(r)
+    stress = found.stress(r)
+    errors = found.stress_uncertainty(r)
+    truth = contact.base_stress(r)
     within = np.mean(np.abs(stress - truth) <= 1.96 * errors)
     stated = plane_error(r, truth + errors, truth)
     z = (found.force - contact.load) / found.force_uncertainty

@@ -16,7 +16,8 @@ pytestmark = pytest.mark.accuracy
 
 def press(elements: ElementFilm, *, sticking: bool) -> tuple[FloatArray, FloatArray]:
     """Return pressure and shear on the rings under a flat end pressed down by 1 m."""
-    c, size = elements.compliance, elements.r.size
+    c = elements.compliance
+    size = elements.r.size
     if not sticking:
         return np.linalg.solve(c.normal, np.ones(size)), np.zeros(size)
     # On the axis there is no shear.
@@ -39,6 +40,7 @@ def test_the_rod_agrees_with_finite_elements(nu: float, friction: float) -> None
     contact = indent(film, Rod(radius=RADIUS), load=1.0, friction=friction)
     assert contact.load / contact.depth == pytest.approx(stiffness, rel=1e-4)
     r = np.linspace(0.0, 8e-3, 200)
-    normal, radial = contact.base_stress(r), contact.base_shear(r)
+    normal = contact.base_stress(r)
+    radial = contact.base_shear(r)
     assert np.max(np.abs(field.base_normal(r) - normal)) < 3e-4 * normal.max()
     assert np.max(np.abs(field.base_shear(r) - radial)) < 3e-4 * normal.max()

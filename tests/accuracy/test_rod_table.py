@@ -7,16 +7,26 @@ from helpers.rods import compare_with_the_table
 pytestmark = pytest.mark.accuracy
 
 
-@pytest.mark.parametrize(("nu", "radius", "depths"), [
-    (0.495, 0.48, [0.012, 0.06, 0.28, 0.42]), (0.46, 0.24, [0.003, 0.03, 0.15, 0.42]),
-    (0.485, 0.06, [0.012, 0.15]), (0.5, 0.125, [0.28, 0.44]),
-][: None if FULL else 3])  # fmt: skip
+@pytest.mark.parametrize(
+    ("nu", "radius", "depths"),
+    [
+        (0.495, 0.48, [0.012, 0.06, 0.28, 0.42]),
+        (0.46, 0.24, [0.003, 0.03, 0.15, 0.42]),
+        (0.485, 0.06, [0.012, 0.15]),
+        (0.5, 0.125, [0.28, 0.44]),
+    ][: None if FULL else 3],
+)
 def test_a_rod_that_sticks(nu: float, radius: float, depths: list[float]) -> None:
     compare_with_the_table(nu, radius, depths, sticking=True)
 
 
-@pytest.mark.parametrize(("nu", "radius", "depths"), [
-    (0.495, 0.48, [0.06, 0.15]), (0.46, 0.24, [0.01, 0.06, 0.14]), (0.485, 0.06, [0.03]),
-][: None if FULL else 1])  # fmt: skip
+@pytest.mark.parametrize(
+    ("nu", "radius", "depths"),
+    [
+        (0.495, 0.48, [0.06, 0.15]),
+        (0.46, 0.24, [0.01, 0.06, 0.14]),
+        (0.485, 0.06, [0.03]),
+    ][: None if FULL else 1],
+)
 def test_a_rod_that_slides(nu: float, radius: float, depths: list[float]) -> None:
     compare_with_the_table(nu, radius, depths, sticking=False)

@@ -38,7 +38,10 @@ FULL_ONLY = [
 
 @pytest.mark.parametrize("method", ["white-noise-draw", *FULL_ONLY])
 def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated(method: str) -> None:
-    count, radii, values, stated = 20 if FULL else 8, np.linspace(0, 2e-3, 9), [], []
+    count = 20 if FULL else 8
+    radii = np.linspace(0, 2e-3, 9)
+    values = []
+    stated = []
     kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
     for seed in range(count):
         scan = simulated(kernel=kernel, noise=0.01, points=33, seed=seed)

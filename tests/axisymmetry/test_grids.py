@@ -62,7 +62,8 @@ def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) 
 @given(seed=SEEDS)
 def test_convolution_on_a_quarter_plane_is_linear_convolution_in_the_plane(seed: int) -> None:
     # The fields end before half of the grid, so that nothing wraps around.
-    count, rng = 16, np.random.default_rng(seed)
+    count = 16
+    rng = np.random.default_rng(seed)
     grid = EvenGrid(count, 0.4)
     kernel, field = np.zeros((2, count, count))
     kernel[:7, :7], field[:7, :7] = rng.normal(size=(2, 7, 7))
@@ -99,7 +100,8 @@ def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed:
 def test_the_quotient_of_two_displaced_fields_is_centred(axis: tuple[float, float]) -> None:
     grid = Lattice(centred_axis(81, 0.25, -axis[0]), centred_axis(61, 0.35, -axis[1]))
     middle = Lattice(centred_axis(81, 0.25), centred_axis(61, 0.35))
-    narrow, wide = grid.forward(gaussian(grid.radius, 0.45)), grid.forward(gaussian(grid.radius))
+    narrow = grid.forward(gaussian(grid.radius, 0.45))
+    wide = grid.forward(gaussian(grid.radius))
     open_ = np.exp(-(grid.wavenumber**2) * 0.45**2 / 2) > 1e-7
     quotient = np.divide(wide, narrow, out=np.zeros_like(wide), where=open_)
     exact = gaussian(middle.radius, np.sqrt(1 - 0.45**2))
@@ -127,7 +129,8 @@ def test_a_refined_kernel_keeps_its_values_and_its_integral(seed: int, factor: i
     old_y = np.arange(-(grid.y.size // 2), grid.y.size // 2 + 1) * factor + fine.y.size // 2
     old_x = np.arange(-(grid.x.size // 2), grid.x.size // 2 + 1) * factor + fine.x.size // 2
     np.testing.assert_allclose(values[np.ix_(old_y, old_x)], kernel, atol=1e-11)
-    before, after = kernel.sum() * grid.cell_area, values.sum() * fine.cell_area
+    before = kernel.sum() * grid.cell_area
+    after = values.sum() * fine.cell_area
     assert after == pytest.approx(before, abs=1e-9)
 
 
@@ -141,7 +144,8 @@ def test_a_refined_gaussian_is_a_gaussian() -> None:
 def test_lifting_then_cutting_gives_the_profile_back(seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid = EvenGrid(65, 0.1)
-    weights, widths = rng.normal(size=4), rng.uniform(0.6, 2.0, size=4)
+    weights = rng.normal(size=4)
+    widths = rng.uniform(0.6, 2.0, size=4)
 
     def profile(r: FloatArray) -> FloatArray:
         return np.exp(-((r[..., None] / widths) ** 2) / 2) @ weights

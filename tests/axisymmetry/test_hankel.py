@@ -83,16 +83,19 @@ def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: f
     np.testing.assert_allclose(found, gaussian(r), atol=left_out + 1e-13)
 
 
-@pytest.mark.parametrize(("function", "transform", "k_max"), [
-    (lambda r: (1 + r**2) ** -1.5, lambda k: 2 * np.pi * np.exp(-k), 36.0),
-    (gaussian, lambda k: np.exp(-(k**2) / 2), 9.0),
-    # Two Gaussians, one taken off the other: a ring with a hole of no stress.
-    (
-        lambda r: np.exp(-(r**2) / 4) - np.exp(-(r**2)),
-        lambda k: 4 * np.pi * np.exp(-(k**2)) - np.pi * np.exp(-(k**2) / 4),
-        12.0,
-    ),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("function", "transform", "k_max"),
+    [
+        (lambda r: (1 + r**2) ** -1.5, lambda k: 2 * np.pi * np.exp(-k), 36.0),
+        (gaussian, lambda k: np.exp(-(k**2) / 2), 9.0),
+        # Two Gaussians, one taken off the other: a ring with a hole of no stress.
+        (
+            lambda r: np.exp(-(r**2) / 4) - np.exp(-(r**2)),
+            lambda k: 4 * np.pi * np.exp(-(k**2)) - np.pi * np.exp(-(k**2) / 4),
+            12.0,
+        ),
+    ],
+)
 def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, k_max) -> None:
     r = np.linspace(0.0, 30.0, 24).reshape(4, 6)
     wavenumbers = Wavenumbers.covering(k_max, 30.0)

@@ -45,7 +45,8 @@ def blurred_disc(radius: float, sigma: float, r: FloatArray) -> FloatArray:
     nodes, weights = np.polynomial.legendre.leggauss(200)
     q = 0.5 * radius * (nodes + 1)
     angle = 2 * np.pi * np.arange(400) / 400
-    x, y = np.multiply.outer(q, np.cos(angle)), np.multiply.outer(q, np.sin(angle))
+    x = np.multiply.outer(q, np.cos(angle))
+    y = np.multiply.outer(q, np.sin(angle))
     area = (0.5 * radius * weights * q)[:, None] * 2 * np.pi / 400
     square = ((r[:, None, None] - x) ** 2 + y**2) / sigma**2
     density = np.exp(-0.5 * square) / (2 * np.pi * sigma**2)
@@ -73,19 +74,23 @@ def test_a_disc_and_its_transform_belong_together(radius: float, sigma: float) -
 
 def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero() -> None:
     r = np.linspace(0.0, 3e-3, 31)
-    point, gaussian = SmoothedDisc(radius=1e-9, sigma=0.5e-3), GaussianMixture((1.0,), (0.5e-3,))
+    point = SmoothedDisc(radius=1e-9, sigma=0.5e-3)
+    gaussian = GaussianMixture((1.0,), (0.5e-3,))
     np.testing.assert_allclose(point.radial(r), gaussian.radial(r), atol=1e-10 / 0.5e-3**2)
     far = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3).radial(np.array([[50e-3], [0.5]]))
     np.testing.assert_allclose(far, 0.0, atol=1e-12 / 0.8e-3**2)
     assert point.radial(np.empty((0, 3))).shape == (0, 3)
 
 
-@pytest.mark.parametrize(("radius", "sigma", "problem"), [
-    (0.0, 0.3e-3, "radius of the disc"),
-    (float("nan"), 0.3e-3, "radius of the disc"),
-    (0.8e-3, -0.3e-3, "width of the Gaussian that blurs the disc"),
-    (0.8e-3, np.inf, "width of the Gaussian that blurs the disc"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("radius", "sigma", "problem"),
+    [
+        (0.0, 0.3e-3, "radius of the disc"),
+        (float("nan"), 0.3e-3, "radius of the disc"),
+        (0.8e-3, -0.3e-3, "width of the Gaussian that blurs the disc"),
+        (0.8e-3, np.inf, "width of the Gaussian that blurs the disc"),
+    ],
+)
 def test_a_disc_without_a_size_is_refused(radius: float, sigma: float, problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         SmoothedDisc(radius=radius, sigma=sigma)

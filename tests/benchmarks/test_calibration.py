@@ -22,7 +22,8 @@ from memscal.parallel import worker_pool
 pytestmark = pytest.mark.benchmark
 
 WIDTH = 16e-3
-STRESS_WIDTH, BLURRED_WIDTH = 0.9e-3, 1.06e-3
+STRESS_WIDTH = 0.9e-3
+BLURRED_WIDTH = 1.06e-3
 WEAKEST = 1e-3
 
 
@@ -106,7 +107,8 @@ def test_a_division_costs_as_many_steps_as_its_transforms(problem: DivisionProbl
 
 def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     """The paper's steps as plainly as they can be written: lift, add noise, divide, fit."""
-    pixels, rng = 512, np.random.default_rng(0)
+    pixels = 512
+    rng = np.random.default_rng(0)
     axis = (np.arange(pixels) - pixels // 2) * (2 * WIDTH / pixels)
     r = np.hypot.outer(axis, axis)
     volts = (scan.u_zz + scan.u_zz[::-1])[scan.x.size // 2 :] / 2

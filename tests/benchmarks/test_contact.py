@@ -88,7 +88,8 @@ def test_a_compliance_is_built_far_faster_than_entry_by_entry() -> None:
 
 def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:
     problem = contact_of_200_rings(0.3)
-    rough, right = problem.compliance, np.ones(2 * problem.size)
+    rough = problem.compliance
+    right = np.ones(2 * problem.size)
     whole = np.block(
         [[rough.normal, rough.normal_by_shear], [rough.radial_by_pressure, rough.radial]]
     )

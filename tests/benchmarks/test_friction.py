@@ -46,7 +46,8 @@ DATA = Path(__file__).parents[2] / "calibration_data"
 
 def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path: Path) -> None:
     # Processor time over that of one calibration of 65 points, all in one process; docs/speed.md.
-    experiment, scan = DATA / "sphere_experiment", memscal.read_scan(DATA / "rod_scan_65.h5")
+    experiment = DATA / "sphere_experiment"
+    scan = memscal.read_scan(DATA / "rod_scan_65.h5")
     contacts = [memscal.read_scan(experiment / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
     apparatus = memscal.calibrate(experiment / "rod_scan.h5").apparatus
     friction = (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.6, math.inf)

@@ -56,7 +56,8 @@ def study(name: str) -> dict[str, tuple[float, float]]:
     runners |= {peer: PEERS[peer] for peer in INSTALLED}
     rows: dict[str, list[tuple[float, float]]] = {runner: [] for runner in runners}
     for seed in (0, *range(SEEDS.get(case.kind, 40 if FULL else 12))):
-        scan, kernel = case.scan(seed), case.drawn(seed)[0]
+        scan = case.scan(seed)
+        kernel = case.drawn(seed)[0]
         for runner, find in runners.items():
             start = perf_counter()
             found = find(scan, kernel)

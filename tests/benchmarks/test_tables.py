@@ -15,7 +15,8 @@ pytestmark = pytest.mark.benchmark
 def table(folder: Path, rows: int) -> Path:
     x = np.linspace(-8.0, 8.0, rows)
     path = folder / f"{rows}.csv"
-    head, columns = "x/mm,u/mV,pass", [x, np.exp(-(x**2)), np.arange(rows) // 1000]
+    head = "x/mm,u/mV,pass"
+    columns = [x, np.exp(-(x**2)), np.arange(rows) // 1000]
     np.savetxt(path, np.stack(columns, axis=1), "%.6f", ",", header=head, comments="")
     return path
 

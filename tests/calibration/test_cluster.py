@@ -57,7 +57,8 @@ def test_scans_come_in_their_order_from_a_cluster_of_which_a_worker_is_killed(
 def test_a_batch_outlives_a_worker_that_is_killed(
     workers: LocalCluster, scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    results, address = tmp_path / "results", workers.scheduler_address
+    results = tmp_path / "results"
+    address = workers.scheduler_address
     killed: list[int] = []
 
     def kill() -> None:

@@ -46,7 +46,8 @@ def test_every_scan_says_what_it_says_by_itself(kind: str) -> None:
     for result, scan in zip(results, given, strict=True):
         alone = memscal.calibrate(scan, method="bayesian").apparatus
         assert constant(result) == pytest.approx(alone.conversion_constant, rel=1e-9)
-        covariance, g = alone.parameters.covariance, alone.radial_profile.g
+        covariance = alone.parameters.covariance
+        g = alone.radial_profile.g
         np.testing.assert_allclose(result.parameters.covariance, covariance, rtol=1e-6, atol=1e-30)
         np.testing.assert_allclose(result.radial_profile.g, g, rtol=1e-9, atol=1e-9 * g.max())
         assert result.resolved_wavenumber == pytest.approx(alone.resolved_wavenumber, rel=1e-9)
@@ -116,10 +117,13 @@ if {condition}:
 """
 
 
-@pytest.mark.parametrize(("condition", "options", "most"), [
-    ("True", "{}", 1),
-    ("__name__ == '__main__'", "{'method': Half()}", 9),  # workers need a class of the script
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("condition", "options", "most"),
+    [
+        ("True", "{}", 1),
+        ("__name__ == '__main__'", "{'method': Half()}", 9),  # workers need a class of the script
+    ],
+)
 def test_a_script_needs_no_guard(condition: str, options: str, most: int, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(SCRIPT.format(condition=condition, options=options))

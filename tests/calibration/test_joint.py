@@ -43,7 +43,8 @@ def test_without_noise_scans_of_other_loads_rods_and_films_give_one_answer() -> 
 
 def test_a_joint_fit_is_surer_than_each_of_its_scans_and_between_them() -> None:
     scans = several(0.005)
-    together, alone = joint(scans), [joint([scan]) for scan in scans]
+    together = joint(scans)
+    alone = [joint([scan]) for scan in scans]
     for name in ("conversion_constant_gaussian", "gaussian_sigma"):
         weights = np.array([a.parameters.uncertainty(name) for a in alone]) ** -2
         values = np.array([a.parameters[name] for a in alone])
@@ -61,7 +62,8 @@ def assert_a_is_as_stated(parameters: ParameterSet, bounds: list[dict[str, float
 
 
 def test_the_division_joins_scans_of_other_loads_rods_and_films() -> None:
-    scans, name = several(0.005), "conversion_constant"
+    scans = several(0.005)
+    name = "conversion_constant"
     together, *alone = (joint(s, "white-noise").parameters for s in (scans, *([s] for s in scans)))
     sizes = [{"film": s.film, "rod": s.indenter, "load": s.load, "points": s.x.size} for s in scans]
     assert_a_is_as_stated(together, [cramer_rao(0.005, **size) for size in sizes])
@@ -70,7 +72,8 @@ def test_the_division_joins_scans_of_other_loads_rods_and_films() -> None:
 
 def test_a_scan_along_y_says_what_one_along_x_says() -> None:
     scan = simulated(noise=0.003)
-    along_x, along_y = joint([scan]), joint([replace(scan, direction="y")])
+    along_x = joint([scan])
+    along_y = joint([replace(scan, direction="y")])
     assert along_y.conversion_constant == pytest.approx(along_x.conversion_constant, rel=1e-9)
     assert along_y.parameters["centre_y"] == pytest.approx(along_x.parameters["centre"], rel=1e-9)
     both = joint([scan, replace(simulated(noise=0.003, seed=7), direction="y")])
@@ -117,7 +120,8 @@ def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draw
         assert 0 < apparatus.budget["gaussian_sigma"]["load"] < 0.002 * apparatus.gaussian_sigma
     own.apparatus.save(tmp_path / "sensor.h5")
     saved = memscal.load_apparatus(tmp_path / "sensor.h5")
-    parameters, process = saved.parameters, saved.process
+    parameters = saved.parameters
+    process = saved.process
     assert parameters["centre_3"] - parameters["centre"] == pytest.approx(80e-6, abs=1e-5)
     assert process.input_scan.file_name == "scan.h5"
     assert process.configuration["centre"]["chosen_by"] == "test"
@@ -132,11 +136,14 @@ def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draw
     assert memscal.monte_carlo(own, draws=4).sources == ("noise", *common.effects)
 
 
-@pytest.mark.parametrize(("bad", "words"), [
-    ({"repeat": None}, "one repeat"),
-    ({"u_zz_correlation": 0.7 * np.eye(99) + 0.3}, "one repeat with that of another"),
-    ({"u_zz": np.where(np.arange(99) < 90, np.nan, 1e-3)}, "Repeat [123] has [1-5] measured"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [
+        ({"repeat": None}, "one repeat"),
+        ({"u_zz_correlation": 0.7 * np.eye(99) + 0.3}, "one repeat with that of another"),
+        ({"u_zz": np.where(np.arange(99) < 90, np.nan, 1e-3)}, "Repeat [123] has [1-5] measured"),
+    ],
+)
 def test_a_centre_for_each_repeat_needs_repeats_that_stand_alone(bad, words: str) -> None:
     with pytest.raises(InputError, match=words):
         memscal.calibrate(replace(moved_repeats(), **bad), centre="per-repeat")
@@ -162,31 +169,37 @@ def correlated(scan: Scan, seed: int, reach: float = 0.4e-3) -> Scan:
 
 def test_noise_that_is_correlated_is_weighed_as_such() -> None:
     clean = simulated(noise=0.0)
-    stated, naive = [], []
+    stated = []
+    naive = []
     for seed in range(SEEDS):
         scan = correlated(clean, seed)
         for scans, found in ((scan, stated), (replace(scan, u_zz_correlation=None), naive)):
             p = joint([scans]).parameters
             name = "gaussian_sigma"
             found.append(((p[name] - SIGMA) / p.uncertainty(name), p[name] - SIGMA))
-    stated, naive = np.array(stated), np.array(naive)
+    stated = np.array(stated)
+    naive = np.array(naive)
     assert LOW / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < HIGH * 1.1
     assert np.std(stated[:, 1]) < np.std(naive[:, 1])
 
 
-@pytest.mark.parametrize(("correlation", "words"), [
-    (np.ones((65, 65)), "not positive definite"),
-    (np.eye(65) * 2, "not one on its diagonal"),
-    (np.eye(60), r"should be \(65, 65\)"),
-    (np.full((65, 65), np.nan), "finite"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("correlation", "words"),
+    [
+        (np.ones((65, 65)), "not positive definite"),
+        (np.eye(65) * 2, "not one on its diagonal"),
+        (np.eye(60), r"should be \(65, 65\)"),
+        (np.full((65, 65), np.nan), "finite"),
+    ],
+)
 def test_a_correlation_that_no_noise_can_have_is_refused(correlation, words) -> None:
     with pytest.raises(InputError, match=words):
         replace(simulated(), u_zz_correlation=correlation)
 
 
 def test_uncertain_positions_count_as_noise_where_the_voltage_is_steep() -> None:
-    clean, jitter = simulated(noise=0.002, points=65), 0.05e-3
+    clean = simulated(noise=0.002, points=65)
+    jitter = 0.05e-3
     deviates = []
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
@@ -203,7 +216,8 @@ def test_uncertain_positions_count_as_noise_where_the_voltage_is_steep() -> None
 
 def test_the_scale_of_the_stage_moves_the_width_as_it_is_counted() -> None:
     scan = replace(simulated(noise=0.002), position_scale_uncertainty=0.01)
-    usual, stretched = joint([scan]), joint([replace(scan, x=scan.x * 1.01)])
+    usual = joint([scan])
+    stretched = joint([replace(scan, x=scan.x * 1.01)])
     counted = usual.budget["gaussian_sigma"]["position_scale"]
     assert counted == pytest.approx(abs(stretched.gaussian_sigma - usual.gaussian_sigma), rel=0.1)
 
@@ -262,10 +276,13 @@ def test_several_loads_weigh_the_laws_of_the_film_and_one_does_not() -> None:
 UNSURE = replace(EXACT_FILM, thickness_uncertainty=0.1e-3)
 
 
-@pytest.mark.parametrize(("film", "loads", "radii", "words"), [
-    (UNSURE, (1.0, 0.5), (0.25e-3, 0.25e-3), "proportion to the load"),
-    (EXACT_FILM, (1.0, 1.0), (0.15e-3, 0.35e-3), "no uncertainty of its thickness"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("film", "loads", "radii", "words"),
+    [
+        (UNSURE, (1.0, 0.5), (0.25e-3, 0.25e-3), "proportion to the load"),
+        (EXACT_FILM, (1.0, 1.0), (0.15e-3, 0.35e-3), "no uncertainty of its thickness"),
+    ],
+)
 def test_a_thickness_that_the_scans_do_not_determine_is_not_freed(film, loads, radii, words):
     rods = (replace(EXACT_ROD, radius=radius) for radius in radii)
     scans = [simulated(film=film, rod=rod, load=p) for rod, p in zip(rods, loads, strict=True)]

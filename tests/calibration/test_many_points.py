@@ -40,7 +40,8 @@ def correlated_with_neighbours(scan: Scan, width: int) -> list[Scan]:
 
 def test_correlation_of_neighbours_is_that_of_all_pairs() -> None:
     u = memscal.simulate(noise=0.005, seed=3, repeats=2).u_zz.copy()
-    u[0, 5], u[1, 30:33] = np.nan, np.nan
+    u[0, 5] = np.nan
+    u[1, 30:33] = np.nan
     scan = replace(memscal.simulate(noise=0.005, seed=3, repeats=2), u_zz=u)
     whole, banded = (
         memscal.calibrate(s).apparatus.parameters for s in correlated_with_neighbours(scan, 4)
@@ -75,7 +76,8 @@ def test_noise_of_many_points_may_be_correlated_with_neighbours(tmp_path: Path) 
     size = 0.005 * scan.u_zz.max()
     noise = size * np.convolve(independent, share, mode="valid")
     band = np.tile([1.0, 0.625 / 1.3125, 0.25 / 1.3125], (20_001, 1))
-    band[-1, 1:], band[-2, 2] = 0.0, 0.0
+    band[-1, 1:] = 0.0
+    band[-2, 2] = 0.0
     errors = np.full(scan.u_zz.shape, size)
     scan = replace(scan, u_zz=scan.u_zz + noise, u_zz_errors=errors, u_zz_correlation=band)
     memscal.write_scan(scan, tmp_path / "scan.h5")
@@ -103,14 +105,15 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "line": (LINE, {}),
     "repeats": (memscal.simulate(noise=0.005, seed=2, repeats=5), {}),
     "repeats with centres": (
-        memscal.simulate(noise=0.005, seed=2, repeats=3), {"centre": "per-repeat"},
+        memscal.simulate(noise=0.005, seed=2, repeats=3),
+        {"centre": "per-repeat"},
     ),
     "correlated noise": (correlated(LINE), {}),
     "outlier": (with_an_outlier(LINE), {}),
     "loads": ([memscal.simulate(noise=0.005, seed=i, load=0.1 * i) for i in (1, 2, 3)], {}),
     "source": (LINE, {"reference": "disc:0.4mm"}),
     "raster": (tailed_raster(seed=1, side=21), {}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("method", ["white-noise", "bayesian"])

@@ -46,7 +46,8 @@ def correlated(scan: Scan) -> Scan:
 
 def incomplete(scan: Scan) -> Scan:
     u = scan.u_zz.copy()
-    u[10], u[30] = np.nan, u[30] + 0.3 * np.nanmax(u)
+    u[30] += 0.3 * np.nanmax(u)
+    u[10] = np.nan
     return replace(scan, u_zz=u, position_scale_uncertainty=0.002)
 
 
@@ -66,9 +67,11 @@ CASES: dict[str, tuple[Sequence[Scan], dict[str, object]]] = {
     "correlated noise": ([correlated(simulated(**LINE))], {"method": "evidence"}),
     "outlier and gap": ([incomplete(simulated(**LINE, state_noise=False))], {}),
     "tangential": ([shear_scan(seed=11)], {"method": "evidence", "channel": "xz"}),
-    "reference": ([simulated(**(LINE | {"film": LINEAR_FILM}))], {"reference": memscal.indent(
-        EXACT_FILM, EXACT_ROD, load=1.0).profile()}),
-}  # fmt: skip
+    "reference": (
+        [simulated(**(LINE | {"film": LINEAR_FILM}))],
+        {"reference": memscal.indent(EXACT_FILM, EXACT_ROD, load=1.0).profile()},
+    ),
+}
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -201,11 +204,13 @@ def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be() -> None:
 class Failing:
     """White noise that refuses the divisions with these numbers."""
 
-    name, fails = "failing", "It fails."
+    name = "failing"
+    fails = "It fails."
 
     def __init__(self) -> None:
         self.method = create_regulariser("white-noise")
-        self.refused, self.divisions = range(0), 0
+        self.refused = range(0)
+        self.divisions = 0
 
     def divide(self, problem: DivisionProblem) -> Division:
         self.divisions += 1
@@ -227,12 +232,15 @@ def test_draws_that_fail_are_left_out_and_told() -> None:
         memscal.monte_carlo(calibration, draws=4)
 
 
-@pytest.mark.parametrize(("options", "named"), [
-    ({"draws": 1}, "draws .* is 1"),
-    ({"draws": 2.5}, "draws .* is 2.5"),
-    ({"seed": -1}, "seed .* is -1"),
-    ({"workers": 0}, "workers is 0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"draws": 1}, "draws .* is 1"),
+        ({"draws": 2.5}, "draws .* is 2.5"),
+        ({"seed": -1}, "seed .* is -1"),
+        ({"workers": 0}, "workers is 0"),
+    ],
+)
 def test_numbers_that_make_no_sense_are_refused(paper, options, named) -> None:
     with pytest.raises(memscal.MemscalError, match=named):
         memscal.monte_carlo(paper, **options)

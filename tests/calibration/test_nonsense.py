@@ -55,20 +55,23 @@ ELSEWHERE = replace(
 )
 
 
-@pytest.mark.parametrize(("scan", "options", "words", "truth", "within"), [
-    (altered(film=1.25), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
-    (altered(film=2), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
-    (altered(film=10), {}, r"thickness\) of NUMBER mm .*mm stated as cm", 2.0, 0.1),
-    (altered(x=0.8), {}, r"data/x\) NUMBER times", 1.25, 0.1),
-    (altered(x=0.5), {}, r"data/x\) NUMBER times", 2.0, 0.1),
-    (altered(x=0.1), {}, r"data/x\) NUMBER times .*cm stated as mm", 10.0, 0.1),
-    (altered(THICK_ROD, rod=1e-3), {}, r"radius\) of NUMBER mm", 0.7, 0.1),
-    # A rod much narrower than the film is thick leaves no trace: a limit is all that can be told.
-    (altered(rod=1e-3), {}, r"radius\) of at most NUMBER mm", 0.6, 0.5),
-    (SCAN, {"reference": ELSEWHERE}, r"reference/r\) NUMBER times", 1 / 1.5, 0.1),
-    # Nothing stated is wrong, but the film hides the sensor.
-    (simulated(kernel=POINT, noise=0.02, seed=1), {}, "width below NUMBER mm", 0.2, 0.6),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("scan", "options", "words", "truth", "within"),
+    [
+        (altered(film=1.25), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
+        (altered(film=2), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
+        (altered(film=10), {}, r"thickness\) of NUMBER mm .*mm stated as cm", 2.0, 0.1),
+        (altered(x=0.8), {}, r"data/x\) NUMBER times", 1.25, 0.1),
+        (altered(x=0.5), {}, r"data/x\) NUMBER times", 2.0, 0.1),
+        (altered(x=0.1), {}, r"data/x\) NUMBER times .*cm stated as mm", 10.0, 0.1),
+        (altered(THICK_ROD, rod=1e-3), {}, r"radius\) of NUMBER mm", 0.7, 0.1),
+        # A rod much narrower than the film is thick leaves no trace: a limit is all there is.
+        (altered(rod=1e-3), {}, r"radius\) of at most NUMBER mm", 0.6, 0.5),
+        (SCAN, {"reference": ELSEWHERE}, r"reference/r\) NUMBER times", 1 / 1.5, 0.1),
+        # Nothing stated is wrong, but the film hides the sensor.
+        (simulated(kernel=POINT, noise=0.02, seed=1), {}, "width below NUMBER mm", 0.2, 0.6),
+    ],
+)
 def test_a_narrow_scan_is_refused_with_the_value_at_which_it_fits(
     scan: Scan, options: dict[str, Any], words: str, truth: float, within: float
 ) -> None:
@@ -87,27 +90,38 @@ def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize(("scan", "words"), [
-    (altered(x=1e3), r"data/x\).*mm stated as m,"),
-    (altered(x=1e-3), r"data/x\).*\(m stated as mm"),
-    (altered(x=1 / 25.4), r"data/x\).*inches stated as mm"),
-    (altered(x=25.4), r"data/x\).*mm stated as inches"),
-    (altered(film=0.01), r"thickness\) of 0.63 to 3.6 mm"),
-    (altered(film=1e3), r"thickness\).*mm stated as m,"),
-    (altered(rod=2.5e-3), r"radius\).*mm stated as cm"),
-    (simulated(half_range=0.8e-3, points=33, seed=1), r"\d times its noise, but .* too short"),
-    (simulated(noise=0.6, seed=1), "does not rise above its noise"),
-    (replace(SCAN, u_zz=SCAN.u_zz + np.interp(SCAN.x - 5e-3, SCAN.x, SCAN.u_zz)), "second peak"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("scan", "words"),
+    [
+        (altered(x=1e3), r"data/x\).*mm stated as m,"),
+        (altered(x=1e-3), r"data/x\).*\(m stated as mm"),
+        (altered(x=1 / 25.4), r"data/x\).*inches stated as mm"),
+        (altered(x=25.4), r"data/x\).*mm stated as inches"),
+        (altered(film=0.01), r"thickness\) of 0.63 to 3.6 mm"),
+        (altered(film=1e3), r"thickness\).*mm stated as m,"),
+        (altered(rod=2.5e-3), r"radius\).*mm stated as cm"),
+        (simulated(half_range=0.8e-3, points=33, seed=1), r"\d times its noise, but .* too short"),
+        (simulated(noise=0.6, seed=1), "does not rise above its noise"),
+        (
+            replace(SCAN, u_zz=SCAN.u_zz + np.interp(SCAN.x - 5e-3, SCAN.x, SCAN.u_zz)),
+            "second peak",
+        ),
+    ],
+)
 def test_what_cannot_be_is_refused_with_its_reason(scan: Scan, words: str) -> None:
     assert re.search(words, refused(scan))
 
 
-@pytest.mark.parametrize(("x", "words"), [
-    (1e3, r"data/x\).*mm stated as m,"), (201.168e3, r"1.2e-06 to 2.5e-05 times"),
-    (1e-3, "too short|So short"),
-    (1e200, r"8e\+197 m(.|\n)*Check the values and their unit"),
-], ids=["m", "furlongs", "um", "1e200"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("x", "words"),
+    [
+        (1e3, r"data/x\).*mm stated as m,"),
+        (201.168e3, r"1.2e-06 to 2.5e-05 times"),
+        (1e-3, "too short|So short"),
+        (1e200, r"8e\+197 m(.|\n)*Check the values and their unit"),
+    ],
+    ids=["m", "furlongs", "um", "1e200"],
+)
 @pytest.mark.parametrize("measured", [memscal.measure_stress, memscal.restore])
 def test_no_stress_is_measured_over_lengths_that_no_film_is_scanned_over(
     measured: Any, x: float, words: str, monkeypatch: pytest.MonkeyPatch
@@ -120,11 +134,15 @@ def test_no_stress_is_measured_over_lengths_that_no_film_is_scanned_over(
     assert re.search(words, str(caught.value))
 
 
-@pytest.mark.parametrize(("plan", "words"), [
-    ({"rod": memscal.Rod(radius=0.25)}, "rod's width is 500 mm"),
-    ({"film": replace(SCAN.film, thickness=1e-9)}, "step is 0.25 mm"),
-    ({"half_range": 3.0, "step": 2e-3}, "span 6000 mm"), ({"step": 1.0}, "span 0 mm"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        ({"rod": memscal.Rod(radius=0.25)}, "rod's width is 500 mm"),
+        ({"film": replace(SCAN.film, thickness=1e-9)}, "step is 0.25 mm"),
+        ({"half_range": 3.0, "step": 2e-3}, "span 6000 mm"),
+        ({"step": 1.0}, "span 0 mm"),
+    ],
+)
 def test_a_plan_of_such_lengths_is_refused_before_its_rod_is_solved(plan, words, monkeypatch):
     monkeypatch.setattr(rod_scan, "press_rod", lambda *_: pytest.fail("it went on"))
     with pytest.raises(memscal.MemscalError, match=words):
@@ -144,7 +162,8 @@ def test_readings_of_a_size_that_no_quantity_has_are_refused(factor: float) -> N
 @pytest.mark.parametrize("noise", [0.001, 0.005])
 def test_a_clipped_peak_fails_and_names_its_points(kernel, noise: float) -> None:
     clean = simulated(kernel=kernel, noise=0.0, seed=1)
-    u, top = clean.u_zz, float(clean.u_zz.max())
+    u = clean.u_zz
+    top = float(clean.u_zz.max())
     clean = replace(clean, u_zz_errors=np.full(u.size, noise * top))
     scatter = np.random.default_rng(1).normal(0.0, noise * top, u.size)
     assert saturation(replace(clean, u_zz=u + scatter)).passed

@@ -130,7 +130,8 @@ def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
 def test_a_raster_s_points_are_kept_with_place_and_baseline() -> None:
     scan = simulated(raster=True, points=17, noise=0.005)
     apparatus = memscal.calibrate(scan).apparatus
-    shown, parameters = apparatus.reconvolution, apparatus.parameters
+    shown = apparatus.reconvolution
+    parameters = apparatus.parameters
     np.testing.assert_allclose(np.hypot(shown.offset_x, shown.offset_y), shown.x)
     rows = np.unique(np.round(shown.offset_y + parameters["centre_y"], 9))
     np.testing.assert_allclose(rows, np.unique(scan.y), atol=1e-9)
@@ -237,14 +238,17 @@ def test_points_on_no_lattice_cannot_be_swept() -> None:
         calibration.sweep(amplitudes=3, draws=1)
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    ({"reference": {1: 2}}, "The reference is a dict"),
-    ({"reference": [None, None]}, "2 references were given, but there is one scan"),
-    ({"method": 3}, "cannot divide"),
-    ({"method": Tikhonov}, "that is set up"),
-    ({"amplitude": "abc"}, "must be a positive number"),
-    ({"method": "white-noise-draw", "seed": -1}, "whole number"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"reference": {1: 2}}, "The reference is a dict"),
+        ({"reference": [None, None]}, "2 references were given, but there is one scan"),
+        ({"method": 3}, "cannot divide"),
+        ({"method": Tikhonov}, "that is set up"),
+        ({"amplitude": "abc"}, "must be a positive number"),
+        ({"method": "white-noise-draw", "seed": -1}, "whole number"),
+    ],
+)
 def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
     with pytest.raises(InputError, match=words):
         memscal.calibrate(simulated(), **arguments)
@@ -274,7 +278,9 @@ def test_ripples_and_spikes_are_no_sound_shape(method: str) -> None:
 def test_a_raster_may_miss_whole_rows_and_columns() -> None:
     scan = simulated(raster=True, points=25, noise=0.002)
     u = scan.u_zz.copy()
-    u[3], u[:, 7], u[10, 10] = np.nan, np.nan, np.nan
+    u[3] = np.nan
+    u[:, 7] = np.nan
+    u[10, 10] = np.nan
     apparatus = memscal.calibrate(replace(scan, u_zz=u)).apparatus
     bounds = cramer_rao(0.002, raster=True, points=25)
     assert_as_stated(apparatus.parameters, scan.synthetic, bounds)
@@ -286,9 +292,15 @@ def test_lengths_and_voltages_of_any_size_give_the_same() -> None:
     small = simulated(
         film=replace(large.film, thickness=large.film.thickness * 1e-2),
         rod=memscal.Rod(radius=large.indenter.radius * 1e-2),
-        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)), half_range=8e-5,
-        centre=(0.14e-5, 0.0), load=1e-4, conversion_constant=1e-2, noise=0.005, seed=3,
-    )  # fmt: skip
-    one, other = memscal.calibrate(large).apparatus, memscal.calibrate(small).apparatus
+        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)),
+        half_range=8e-5,
+        centre=(0.14e-5, 0.0),
+        load=1e-4,
+        conversion_constant=1e-2,
+        noise=0.005,
+        seed=3,
+    )
+    one = memscal.calibrate(large).apparatus
+    other = memscal.calibrate(small).apparatus
     assert other.gaussian_sigma == pytest.approx(one.gaussian_sigma * 1e-2, rel=1e-6)
     assert other.conversion_constant == pytest.approx(one.conversion_constant * 1e5, rel=1e-6)

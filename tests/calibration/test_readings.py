@@ -66,7 +66,8 @@ def test_readings_in_another_unit_are_volts_times_a_factor(bare, tmp_path, unit,
     assert (stored.unit, stored.film, stored.indenter, stored.load) == (unit, None, None, None)
     np.testing.assert_allclose(stored.u_zz, scan.u_zz, rtol=1e-14)
     calibration = memscal.calibrate(stored, reference=BARE)
-    apparatus, scale = calibration.apparatus, np.ones((len(numbers(bare)), 1))
+    apparatus = calibration.apparatus
+    scale = np.ones((len(numbers(bare)), 1))
     names = [n for n in bare.parameters.names if n not in ("baseline", "drift")]
     scale[["conversion_constant" in name for name in names]] = factor
     np.testing.assert_allclose(numbers(apparatus), scale * numbers(bare), rtol=1e-6)
@@ -90,7 +91,8 @@ def test_scans_of_several_units_are_refused():
 def test_a_relative_calibration_takes_no_load_and_states_no_pascals(bare, tmp_path):
     scan = replace(SCAN, load=3.0, load_uncertainty=0.3, normal_load=np.full(SCAN.x.shape, 2.0))
     calibration = memscal.calibrate(scan, reference=BARE, relative=True)
-    apparatus, peak = calibration.apparatus, BARE.sigma_zz.max()
+    apparatus = calibration.apparatus
+    peak = BARE.sigma_zz.max()
     assert apparatus.conversion_constant == pytest.approx(bare.conversion_constant * peak, rel=1e-9)
     assert apparatus.gaussian_sigma == pytest.approx(bare.gaussian_sigma, rel=1e-9)
     assert "load" not in apparatus.budget["conversion_constant"]

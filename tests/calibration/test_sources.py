@@ -20,16 +20,23 @@ from scipy.stats import chi2, norm
 import memscal
 from memscal.errors import InputError, MemscalError
 
-A, SIGMA, CENTRE, SIZE = 2.0, 0.3e-3, (0.05e-3, -0.03e-3), 0.4e-3
-LONG, SHORT, TURNED = 0.5e-3, 0.25e-3, 0.4
-LOBE, SHARE = np.array([0.3e-3, 0.5e-3]), 0.3
+A = 2.0
+SIGMA = 0.3e-3
+CENTRE = (0.05e-3, -0.03e-3)
+SIZE = 0.4e-3
+LONG = 0.5e-3
+SHORT = 0.25e-3
+TURNED = 0.4
+LOBE = np.array([0.3e-3, 0.5e-3])
+SHARE = 0.3
 PIXEL = 25e-6
 NAMES = {"disc": "disc:0.4mm", "slit": "slit:400um", "gaussian": "gaussian:0.4mm", "point": "point"}
 
 
 def lobed(long: float, short: float, blur: float = 0.0) -> TailedEllipse:
     """Elliptic Gaussian of unit integral, blurred; one that is not round has a lobe beside it."""
-    wide, share = np.hypot(SHORT, blur), SHARE * (long != short)
+    wide = np.hypot(SHORT, blur)
+    share = SHARE * (long != short)
     ellipse = (1.0, 0.0, 0.0, np.hypot(long, blur), np.hypot(short, blur), TURNED)
     return TailedEllipse((ellipse, (share, *LOBE, wide, wide, 0.0)))
 
@@ -55,9 +62,14 @@ def scanned(kind: str, *, raster: bool = False, noise: float = 0.005, seed: int 
     deviation = noise * u.max()
     u = 0.99 * u + 0.01 * (u + u.max()) + np.random.default_rng(seed).normal(0, deviation, u.shape)
     return memscal.Scan(
-        x=x, y=x if raster else None, u_zz=u, load=1.3, film=EXACT_FILM, indenter=EXACT_ROD,
+        x=x,
+        y=x if raster else None,
+        u_zz=u,
+        load=1.3,
+        film=EXACT_FILM,
+        indenter=EXACT_ROD,
         u_zz_errors=np.full(u.shape, deviation) if noise else None,
-    )  # fmt: skip
+    )
 
 
 def field(long: float = LONG, short: float = SHORT) -> memscal.StressField:
@@ -89,7 +101,8 @@ def test_a_and_width_are_found_by_both_routes(kind: str) -> None:
     assert exact.other.parameters["conversion_constant"] == pytest.approx(A, rel=2e-4)
     assert exact.conversion_constant == pytest.approx(A, rel=5e-3)
     assert exact.gaussian_sigma == pytest.approx(SIGMA, rel=2e-4)
-    seeds, z = (60 if FULL else 6), {}
+    seeds = 60 if FULL else 6
+    z = {}
     for seed in range(seeds):
         a = memscal.calibrate(scanned(kind, seed=seed), reference=NAMES[kind]).apparatus
         for name, p, truth in (
@@ -122,7 +135,8 @@ def test_loads_are_strengths_relative_to_the_nominal_one() -> None:
 
 
 def test_a_round_field_is_its_radial_profile() -> None:
-    scan, round_field = scanned("gaussian", raster=True, n=21), field(SIZE, SIZE)
+    scan = scanned("gaussian", raster=True, n=21)
+    round_field = field(SIZE, SIZE)
     of_field = memscal.calibrate(scan, reference=round_field).apparatus
     ideal = memscal.calibrate(scan, reference="gaussian:0.4mm").apparatus
     for name in ("conversion_constant", "gaussian_sigma"):
@@ -172,10 +186,15 @@ def test_fields_are_read_from_arrays_and_images(tmp_path: Path) -> None:
 
 
 BAD = {
-    "nan.npy": np.full((9, 9), np.nan), "pull.npy": -field().values, "flat.npy": np.ones((20, 20)),
-    "line.npy": np.ones(9), "empty.npy": np.ones((0, 9)), "text.npy": np.full((9, 9), "a"),
-    "huge.npy": np.ones((3000, 9)), "objects.npy": np.array([[None]]),
-}  # fmt: skip
+    "nan.npy": np.full((9, 9), np.nan),
+    "pull.npy": -field().values,
+    "flat.npy": np.ones((20, 20)),
+    "line.npy": np.ones(9),
+    "empty.npy": np.ones((0, 9)),
+    "text.npy": np.full((9, 9), "a"),
+    "huge.npy": np.ones((3000, 9)),
+    "objects.npy": np.array([[None]]),
+}
 
 
 @pytest.mark.parametrize("name", [*BAD, "cut.npy", "cut.png", "no.npy"])
@@ -191,11 +210,16 @@ def test_what_is_no_field_is_refused(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("reference", "said"),
     [
-        ("disc:0.5", "no length"), ("disc:", "no length"), ("disc:-1mm", "above zero"),
-        ("disc:1s", "length"), ("point:1mm", "no size"), ("disk:1mm", "cannot be read"),
-        (["disc:1mm", None], "2 references"), (field(), "not round"),
+        ("disc:0.5", "no length"),
+        ("disc:", "no length"),
+        ("disc:-1mm", "above zero"),
+        ("disc:1s", "length"),
+        ("point:1mm", "no size"),
+        ("disk:1mm", "cannot be read"),
+        (["disc:1mm", None], "2 references"),
+        (field(), "not round"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_reference_is_refused(reference, said: str) -> None:
     with pytest.raises(InputError, match=said):
         memscal.calibrate(scanned("ellipse"), reference=reference)

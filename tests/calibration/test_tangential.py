@@ -32,8 +32,9 @@ CHANCE = 1e-4
 RING = GaussianMixture((1.5, -0.5), (500e-6, 300e-6))
 OTHERS = {
     "disc": memscal.SmoothedDisc(radius=0.6e-3, sigma=0.1e-3),
-    "tail": GaussianMixture((0.75, 0.25), (450e-6, 900e-6)), "ring": RING,
-}  # fmt: skip
+    "tail": GaussianMixture((0.75, 0.25), (450e-6, 900e-6)),
+    "ring": RING,
+}
 
 
 def calibrated(scan: Scan, channel: str = "xz") -> Calibration:
@@ -51,9 +52,11 @@ EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 def study(noise: float) -> dict[str, np.ndarray]:
     """Errors in standard uncertainties; the film and the rod are exact, and so is the load."""
     truth = {
-        "conversion_constant": SHEAR_CONVERSION, "conversion_constant_gaussian": SHEAR_CONVERSION,
-        "gaussian_sigma": SHEAR_SIGMA, "centre": CENTRE,
-    }  # fmt: skip
+        "conversion_constant": SHEAR_CONVERSION,
+        "conversion_constant_gaussian": SHEAR_CONVERSION,
+        "gaussian_sigma": SHEAR_SIGMA,
+        "centre": CENTRE,
+    }
     found = [
         calibrated(shear_scan(seed=seed, noise=noise, **EXACT)).apparatus.parameters
         for seed in range(SEEDS)
@@ -84,7 +87,9 @@ def test_95_percent_intervals_hold_the_truth_as_often_as_they_say(noise: float) 
 
 
 def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
-    free, gaussian, a = [], [], []
+    free = []
+    gaussian = []
+    a = []
     r = np.linspace(0.0, 2e-3, 81)
     for seed in range(12):
         apparatus = calibrated(shear_scan(seed=seed, noise=0.002, kernel=RING)).apparatus
@@ -101,11 +106,15 @@ def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name: str) -> None:
-    r, kernel, count = np.linspace(0.0, 3e-3, 31), OTHERS[name], SEEDS // 3
-    within, z = [], []
+    r = np.linspace(0.0, 3e-3, 31)
+    kernel = OTHERS[name]
+    count = SEEDS // 3
+    within = []
+    z = []
     for seed in range(count):
         found = calibrated(shear_scan(seed=seed, kernel=kernel, **EXACT)).apparatus
-        error, p = found.radial(r) - kernel.radial(r), found.parameters
+        error = found.radial(r) - kernel.radial(r)
+        p = found.parameters
         within.append(np.mean(np.abs(error) <= 1.96 * found.radial_uncertainty(r)))
         z.append(
             (p["conversion_constant"] - SHEAR_CONVERSION) / p.uncertainty("conversion_constant")
@@ -117,7 +126,8 @@ def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name: str) -> None:
 
 def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
     found = calibrated(shear_scan(seed=3))
-    apparatus, estimate = found.apparatus, found.solution.estimate
+    apparatus = found.apparatus
+    estimate = found.solution.estimate
     contact = memscal.indent(apparatus.film.expected, apparatus.indenter, load=1.0)
     r = np.linspace(0.0, 30e-3, 1501)
     profile = apparatus.predict(r, contact.base_shear(r))
@@ -246,7 +256,8 @@ def test_a_scan_without_the_channel_is_refused() -> None:
 
 
 def test_a_normal_channel_a_line_across_the_component_and_a_raster_are_refused() -> None:
-    scan, raster = shear_scan(seed=15), memscal.simulate(raster=True, points=11)
+    scan = shear_scan(seed=15)
+    raster = memscal.simulate(raster=True, points=11)
     for refused, words in (
         (replace(scan, channels={"u_xz": scan.u_zz}), "same on both sides"),
         (replace(scan, direction="y"), "runs along y"),
@@ -274,8 +285,9 @@ def test_a_reference_from_elsewhere_needs_its_shear() -> None:
 
 
 def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative() -> None:
-    scan = shear_scan(seed=17, film=memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.4,
-                                                        thickness=2e-3))  # fmt: skip
+    scan = shear_scan(
+        seed=17, film=memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.4, thickness=2e-3)
+    )
     sticking = memscal.indent(scan.film, scan.indenter, load=1.0, friction=np.inf)
     found = memscal.calibrate(scan, alternative=sticking, channel="xz", method="bayesian")
     share = found.apparatus.budget["conversion_constant"]["model_form"] / SHEAR_CONVERSION

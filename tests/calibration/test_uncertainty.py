@@ -23,15 +23,19 @@ def calibrated(scan, film=LINEAR_FILM, rod=PAPER_ROD):
     return memscal.calibrate(scan, reference=memscal.indent(film, rod, load=1.0)).apparatus
 
 
-@pytest.mark.parametrize(("source", "change"), [
-    ("thickness", lambda: {"film": replace(LINEAR_FILM, thickness=2.02e-3)}),
-    # Of 0.5 ± 0.005 half a normal distribution is left: of mean 0.5 - 0.00399, and 0.00301.
-    ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.5 - 0.0070)}),
-    ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("source", "change"),
+    [
+        ("thickness", lambda: {"film": replace(LINEAR_FILM, thickness=2.02e-3)}),
+        # Of 0.5 ± 0.005 half a normal distribution is left: of mean 0.5 - 0.00399, and 0.00301.
+        ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.5 - 0.0070)}),
+        ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
+    ],
+)
 def test_each_input_of_the_reference_counts_what_moving_it_changes(source, change) -> None:
     scan = simulated(film=LINEAR_FILM, rod=PAPER_ROD, noise=0.002)
-    usual, moved = calibrated(scan), calibrated(scan, **change())
+    usual = calibrated(scan)
+    moved = calibrated(scan, **change())
     # The window of the deconvolved G follows the reference too, which first order leaves out.
     for name, tolerance in (("gaussian_sigma", 0.05), ("gaussian_sigma_deconvolved", 0.25)):
         difference = abs(moved.parameters[name] - usual.parameters[name])
@@ -56,10 +60,13 @@ def test_at_finite_strain_the_load_counts_in_the_widths_what_moving_it_changes()
     assert memscal.calibrate(linear).apparatus.budget["gaussian_sigma"]["load"] == 0
 
 
-@pytest.mark.parametrize(("film", "kernel", "settings"), [
-    ({"thickness": 5e-3}, memscal.GaussianMixture(), {"noise": 0.003, "half_range": 20e-3}),
-    ({"thickness": 2e-3}, memscal.SmoothedDisc(0.6e-3, 0.05e-3), {"noise": 0.005}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("film", "kernel", "settings"),
+    [
+        ({"thickness": 5e-3}, memscal.GaussianMixture(), {"noise": 0.003, "half_range": 20e-3}),
+        ({"thickness": 2e-3}, memscal.SmoothedDisc(0.6e-3, 0.05e-3), {"noise": 0.005}),
+    ],
+)
 def test_the_area_of_a_division_counts_what_its_window_hides(film, kernel, settings) -> None:
     k = np.linspace(0.0, 60e3, 100_001)
     true = 2 * np.pi / np.trapezoid(kernel.transform(k) ** 2 * k, k)
@@ -116,7 +123,9 @@ R = np.linspace(0.0, 8e-3, 97)
 class PlugIn:
     """The division of method white-noise, as a plug-in of which nothing is known."""
 
-    name, assumes, fails = "plug-in", "", ""
+    name = "plug-in"
+    assumes = ""
+    fails = ""
 
     def divide(self, problem: DivisionProblem) -> Division:
         return WhiteNoise().divide(problem)
@@ -156,15 +165,18 @@ def test_the_width_of_a_ring_is_that_of_its_outer_edge() -> None:
 @pytest.mark.parametrize("kernel", [unit_gaussian(R, SIGMA), RING.radial(R)], ids=["round", "ring"])
 def test_the_rows_are_derivatives(name: str, kernel: FloatArray) -> None:
     change = 1e-4 * kernel.max() * np.exp(-(((R - 0.5e-3) / 0.4e-3) ** 2))
-    above, below = functionals(kernel + change)[name], functionals(kernel - change)[name]
+    above = functionals(kernel + change)[name]
+    below = functionals(kernel - change)[name]
     expected = (above.value - below.value) / 2
     assert functionals(kernel)[name].row @ change == pytest.approx(expected, rel=0.05)
 
 
 def test_kernel_changes_are_those_of_calibrations_with_another_film() -> None:
     scan = memscal.simulate(noise=0.002, seed=4)
-    found, film = memscal.calibrate(scan, method="evidence").apparatus, scan.set_up.film
-    u, kernels = film.thickness_uncertainty or 0.0, []
+    found = memscal.calibrate(scan, method="evidence").apparatus
+    film = scan.set_up.film
+    u = film.thickness_uncertainty or 0.0
+    kernels = []
     for thickness in (film.thickness + u, film.thickness - u):
         other = replace(scan, film=replace(film, thickness=thickness))
         of_other = memscal.calibrate(other, method="evidence").apparatus

@@ -33,8 +33,10 @@ OWN = [f"tables/{name}.csv" for name in ("rod", "sphere_dry", "sphere_lubricated
 TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv", *OWN]
 ARTIFACT = "rod_scan_65.apparatus.h5"
 SETTINGS = {
-    SCANS[2]: {"load": (0.1, 0.3, 1.0)}, SCANS[3]: {"raster": True}, SCANS[4]: {"load": 0.05}
-}  # fmt: skip
+    SCANS[2]: {"load": (0.1, 0.3, 1.0)},
+    SCANS[3]: {"raster": True},
+    SCANS[4]: {"load": 0.05},
+}
 
 
 def commands(block: str) -> list[list[str]]:
@@ -48,9 +50,12 @@ def run_all(argument_lists: list[list[str]], folder: Path) -> None:
     for arguments in argument_lists:
         run = subprocess.run(
             [sys.executable, "-m", "memscal", *arguments],
-            cwd=folder, env={**os.environ, "SOURCE_DATE_EPOCH": "0"},
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            cwd=folder,
+            env={**os.environ, "SOURCE_DATE_EPOCH": "0"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert run.returncode == 0, f"memscal {shlex.join(arguments)}\n{run.stderr}"
 
 
@@ -150,7 +155,8 @@ def own_uncertainty(apparatus: memscal.ApparatusFunction) -> float:
     "name", ["rod_scan_33.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
 )
 def test_lines_loads_and_raster_give_the_same_conversion_constant(name, calibrations) -> None:
-    one, other = calibrations["rod_scan_65.h5"].apparatus, calibrations[name].apparatus
+    one = calibrations["rod_scan_65.h5"].apparatus
+    other = calibrations[name].apparatus
     expected = np.hypot(own_uncertainty(one), own_uncertainty(other))
     assert expected < 0.02 * one.conversion_constant
     assert abs(one.conversion_constant - other.conversion_constant) < 4 * expected
@@ -158,9 +164,11 @@ def test_lines_loads_and_raster_give_the_same_conversion_constant(name, calibrat
 
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
 def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
-    shipped, made = memscal.read_scan(DATA / name), memscal.read_scan(rebuilt / name)
+    shipped = memscal.read_scan(DATA / name)
+    made = memscal.read_scan(rebuilt / name)
     for field in ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
-        expected, found = getattr(shipped, field), getattr(made, field)
+        expected = getattr(shipped, field)
+        found = getattr(made, field)
         assert (expected is None) == (found is None), field
         if expected is not None:
             assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
@@ -203,16 +211,19 @@ def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt: Path) -> None
     assert [c.name for c in made.checks] == [c.name for c in shipped.checks]
     assert_allclose(made.radial_profile.g, shipped.radial_profile.g, atol=1e-6 * made.field.g.max())
     assert_allclose(
-        made.radial_profile.g_errors, shipped.radial_profile.g_errors, rtol=1e-4,
+        made.radial_profile.g_errors,
+        shipped.radial_profile.g_errors,
+        rtol=1e-4,
         atol=1e-6 * made.field.g.max(),
-    )  # fmt: skip
+    )
 
 
 def test_the_tables_are_what_their_generator_makes(generator: ModuleType, tmp_path: Path) -> None:
     generator.messy_scan(tmp_path / "rod_scan_messy.csv")
     generator.finite_element_reference(tmp_path / "rod_reference_fem.csv")
     for name, places in (("rod_scan_messy.csv", 1.1e-5), ("rod_reference_fem.csv", 1e-7)):
-        made, shipped = tmp_path / name, DATA / name
+        made = tmp_path / name
+        shipped = DATA / name
         # A last digit may be rounded the other way by another version of a library.
         assert_allclose(numbers(made), numbers(shipped), rtol=0, atol=places)
     generator.own_experiment(tmp_path / "tables")

@@ -58,11 +58,14 @@ def test_what_the_artifact_states_need_not_be_in_the_file(apparatus, laboratory,
     assert made.equipment == certificate.equipment
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"sensor": memscal.StressSensor(serial_number="2_2")}, "'2_2' in the scan or artifact"),
-    ({"start_time": "2001-01-01T00:00:00Z"}, "start time of the measurement"),
-    ({"user": memscal.User(affiliation="another laboratory")}, "affiliation of the user"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sensor": memscal.StressSensor(serial_number="2_2")}, "'2_2' in the scan or artifact"),
+        ({"start_time": "2001-01-01T00:00:00Z"}, "start time of the measurement"),
+        ({"user": memscal.User(affiliation="another laboratory")}, "affiliation of the user"),
+    ],
+)
 def test_contradictions_of_artifact_and_file_are_refused(apparatus, laboratory, changes, words):
     with pytest.raises(InputError, match=words):
         certify(replace(apparatus, **changes), laboratory)
@@ -116,12 +119,18 @@ def conformity(y: float, u: float, lower: float, upper: float, guard: float = 0.
     return Conformity(CertifiedValue(ESTIMATED[LIMITS], y, u), lower, upper, guard)
 
 
-@pytest.mark.parametrize(("y", "lower", "upper", "expected"), [
-    # Of a normal distribution: the limit itself, and 1, 2 standard uncertainties from limits.
-    (1.0, -np.inf, 1.0, 0.5), (1.0, 0.0, 1.0, 0.5), (0.9, -np.inf, 1.0, 0.841344746),
-    (0.8, -np.inf, 1.0, 0.977249868), (1.2, -np.inf, 1.0, 0.022750132),
-    (0.5, 0.3, 0.7, 0.954499736),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("y", "lower", "upper", "expected"),
+    [
+        # Of a normal distribution: the limit itself, and 1, 2 standard uncertainties from limits.
+        (1.0, -np.inf, 1.0, 0.5),
+        (1.0, 0.0, 1.0, 0.5),
+        (0.9, -np.inf, 1.0, 0.841344746),
+        (0.8, -np.inf, 1.0, 0.977249868),
+        (1.2, -np.inf, 1.0, 0.022750132),
+        (0.5, 0.3, 0.7, 0.954499736),
+    ],
+)
 def test_the_conformance_probability_is_that_of_a_normal_distribution(y, lower, upper, expected):
     assert conformity(y, 0.1, lower, upper).probability == pytest.approx(expected, abs=1e-8)
 
@@ -138,11 +147,17 @@ def test_what_is_accepted_with_a_guard_band_of_U_conforms_with_95_percent(y, u, 
     assert replace(item, guard_band=0.0).accepted == (lower <= y <= lower + width)
 
 
-@pytest.mark.parametrize(("rule", "factor", "upper", "accepted"), [
-    ("simple acceptance", 1.0, 1.018e-4, True), ("guarded acceptance", 1.0, 1.018e-4, False),
-    ("guarded acceptance", 1.0, 1.10e-4, True), ("guarded acceptance", 0.0, 1.018e-4, True),
-    ("guarded acceptance", 2.5, 1.10e-4, False), ("simple acceptance", 1.0, 1.016e-4, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rule", "factor", "upper", "accepted"),
+    [
+        ("simple acceptance", 1.0, 1.018e-4, True),
+        ("guarded acceptance", 1.0, 1.018e-4, False),
+        ("guarded acceptance", 1.0, 1.10e-4, True),
+        ("guarded acceptance", 0.0, 1.018e-4, True),
+        ("guarded acceptance", 2.5, 1.10e-4, False),
+        ("simple acceptance", 1.0, 1.016e-4, False),
+    ],
+)
 def test_the_decision_is_that_of_its_rule(apparatus, laboratory, rule, factor, upper, accepted):
     limits = {LIMITS: {"upper": upper, "unit": "mV/Pa"}}
     decision = stating(laboratory, "decision", rule=rule, guard_band=factor, **limits)

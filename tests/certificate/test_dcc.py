@@ -86,13 +86,23 @@ def test_it_is_valid_by_the_schema(xml, others):
         assert [error.message for error in judge.validate_str(made.decode()).errors] == []
 
 
-@pytest.mark.parametrize(("units", "expected", "scale"), [
-    (("mV/Pa",), r"\milli\volt\pascal\tothe{-1}", 1e-3), (("mm",), r"\milli\metre", 1e-3),
-    (("mm²",), r"\milli\metre\tothe{2}", 1e-6), (("1/mm²",), r"\milli\metre\tothe{-2}", 1e6),
-    (("1/mm⁴",), r"\milli\metre\tothe{-4}", 1e12), (("uT/Pa",), None, 1e-6), (("",), r"\one", 1.0),
-    (("mm", "mm"), r"\milli\metre\tothe{2}", 1e-6), (("1/Pa",), r"\pascal\tothe{-1}", 1.0),
-    (("mm", "1/mm"), r"\one", 1.0), (("mV/Pa", "mm"), None, 1e-6), (("kg*m^2/s^3",), None, 1.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("units", "expected", "scale"),
+    [
+        (("mV/Pa",), r"\milli\volt\pascal\tothe{-1}", 1e-3),
+        (("mm",), r"\milli\metre", 1e-3),
+        (("mm²",), r"\milli\metre\tothe{2}", 1e-6),
+        (("1/mm²",), r"\milli\metre\tothe{-2}", 1e6),
+        (("1/mm⁴",), r"\milli\metre\tothe{-4}", 1e12),
+        (("uT/Pa",), None, 1e-6),
+        (("",), r"\one", 1.0),
+        (("mm", "mm"), r"\milli\metre\tothe{2}", 1e-6),
+        (("1/Pa",), r"\pascal\tothe{-1}", 1.0),
+        (("mm", "1/mm"), r"\one", 1.0),
+        (("mV/Pa", "mm"), None, 1e-6),
+        (("kg*m^2/s^3",), None, 1.0),
+    ],
+)
 def test_units_are_written_as_d_si_reads_them(units, expected, scale):
     written = dsi_unit(*units)
     assert expected in (None, written)

@@ -28,12 +28,14 @@ def stating(certificate: Certificate, section: str, **values: str) -> Certificat
 
 @pytest.fixture(scope="module")
 def reader(certificate: Certificate, pango: None) -> pypdf.PdfReader:
-    page, xml = certificate_page(certificate), certificate_xml(certificate)
+    page = certificate_page(certificate)
+    xml = certificate_xml(certificate)
     return pypdf.PdfReader(io.BytesIO(certificate_pdf(certificate, page, xml)))
 
 
 def test_the_page_states_every_value_of_the_file_and_ends_with_its_mark(certificate):
-    text, stated = text_of(certificate), [certificate.number, certificate.issued]
+    text = text_of(certificate)
+    stated = [certificate.number, certificate.issued]
     for section in ("laboratory", "customer", "person", "sensor"):
         stated += [v for k, v in certificate.sections[section].items() if k != "prefix"]
     for item in certificate.equipment:
@@ -108,7 +110,8 @@ def test_the_same_contents_and_date_give_the_same_bytes(apparatus, laboratory, m
     made = []
     for _ in range(2):
         certificate = certify(apparatus, laboratory)
-        page, xml = certificate_page(certificate), certificate_xml(certificate)
+        page = certificate_page(certificate)
+        xml = certificate_xml(certificate)
         made.append((page, xml, certificate_pdf(certificate, page, xml)))
     assert made[0] == made[1]
     assert b">2026-01-01<" in made[0][1]

@@ -11,7 +11,9 @@ import memscal
 from memscal.cli.failures import CHECK_FAILED
 
 LOADS = (0.69, 2.75)
-REFUSED, EXISTS, USAGE = 3, 4, 2
+REFUSED = 3
+EXISTS = 4
+USAGE = 2
 
 
 @pytest.fixture

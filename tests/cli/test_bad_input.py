@@ -36,10 +36,14 @@ def refused(run: Run, folder: Path) -> Refused:
     return refused_
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    (lambda signal: signal.attrs.__delitem__("units"), (f"scan.h5: {SIGNAL}", "unit")),
-    (lambda signal: signal.write_direct(np.full(65, np.nan)), ("missing (NaN)",)),
-], ids=["no unit", "no number"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda signal: signal.attrs.__delitem__("units"), (f"scan.h5: {SIGNAL}", "unit")),
+        (lambda signal: signal.write_direct(np.full(65, np.nan)), ("missing (NaN)",)),
+    ],
+    ids=["no unit", "no number"],
+)
 def test_a_file_that_was_spoilt_is_refused(refused: Refused, scan: Path, change, words):
     with h5py.File(scan, "r+") as file:
         del file.attrs["memscal_content_sha256"]
@@ -54,13 +58,18 @@ def altered(path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("arguments", [
-    ["calibrate", "scan.h5", "-o", "out.h5"], ["calibrate", "scan.h5", "--dry-run"],
-    ["apply", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
-    ["restore", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
-    ["inspect", "scan.h5"],
-    ["batch", "manifest", "-o", "results", "--artifacts", "all", "--workers", "1"],
-], ids=lambda arguments: " ".join(arguments[::len(arguments) - 1]))  # fmt: skip
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["calibrate", "scan.h5", "-o", "out.h5"],
+        ["calibrate", "scan.h5", "--dry-run"],
+        ["apply", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
+        ["restore", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
+        ["inspect", "scan.h5"],
+        ["batch", "manifest", "-o", "results", "--artifacts", "all", "--workers", "1"],
+    ],
+    ids=lambda arguments: " ".join(arguments[:: len(arguments) - 1]),
+)
 @pytest.mark.usefixtures("artifact")
 def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
     run: Run, scan: Path, folder: Path, arguments
@@ -107,12 +116,19 @@ def test_files_in_the_wrong_order_are_refused(run: Run, scan: Path, command):
     assert run(command, scan, scan).exits(3, "memscal-artifact").out == ""
 
 
-@pytest.mark.parametrize(("scan", "words"), [
-    (memscal.simulate(points=5, seed=1), ("5 measured positions", "Scan more positions")),
-    (replace(SCAN, indenter=memscal.Rod(radius=1.2e-3)), ("rod's width is 2.4 mm", "of 2 mm")),
-    (replace(SCAN, u_zz=-SCAN.u_zz), ("falls by", "sign of u_zz", "--u-sign -1")),
-    (replace(SCAN, indenter=memscal.Sphere(radius=0.1288)), ("made with a sphere", "needs a rod")),
-], ids=["few points", "wide rod", "wrong sign", "sphere"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("scan", "words"),
+    [
+        (memscal.simulate(points=5, seed=1), ("5 measured positions", "Scan more positions")),
+        (replace(SCAN, indenter=memscal.Rod(radius=1.2e-3)), ("rod's width is 2.4 mm", "of 2 mm")),
+        (replace(SCAN, u_zz=-SCAN.u_zz), ("falls by", "sign of u_zz", "--u-sign -1")),
+        (
+            replace(SCAN, indenter=memscal.Sphere(radius=0.1288)),
+            ("made with a sphere", "needs a rod"),
+        ),
+    ],
+    ids=["few points", "wide rod", "wrong sign", "sphere"],
+)
 def test_a_scan_of_no_use_is_refused(refused: Refused, folder: Path, scan, words):
     memscal.write_scan(scan, folder / "scan.h5")
     refused("scan.h5", words=words)

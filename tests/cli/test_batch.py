@@ -23,8 +23,13 @@ from memscal.formats.fleet import read_fleet
 from memscal.model.fleet import FleetResults
 from memscal.summaries.fleet_results import outliers
 
-COUNT, SHARD = 12, 2
-FLAT, DRIFTING, NONSENSE, MISSING, LARGE = 2, 3, 5, 9, 11
+COUNT = 12
+SHARD = 2
+FLAT = 2
+DRIFTING = 3
+NONSENSE = 5
+MISSING = 9
+LARGE = 11
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +89,8 @@ def test_a_row_says_what_a_calibration_says(results: Path, fleet: Path) -> None:
     rows = pd.read_parquet(results / "shards")
     assert list(rows["place"]) == list(range(COUNT))
     path = fleet / "scans" / "s01.h5"
-    row, alone = rows.iloc[1], memscal.calibrate(path).apparatus
+    row = rows.iloc[1]
+    alone = memscal.calibrate(path).apparatus
     assert row["path"] == "scans/s01.h5"
     assert (row["sensor"], row["serial_number"]) == ("S1", "W7-001")
     assert row["input_sha256"] == alone.process.input_scan.sha256
@@ -93,14 +99,16 @@ def test_a_row_says_what_a_calibration_says(results: Path, fleet: Path) -> None:
     expected = {
         "conversion_constant": alone.conversion_constant * 1e3,
         "conversion_constant_errors": u("conversion_constant") * 1e3,
-        "gaussian_sigma": alone.gaussian_sigma * 1e3, "fwhm_errors": u("fwhm") * 1e3,
+        "gaussian_sigma": alone.gaussian_sigma * 1e3,
+        "fwhm_errors": u("fwhm") * 1e3,
         "noise_equivalent_area": alone.parameters["noise_equivalent_area"] * 1e6,
         "resolved_wavenumber": alone.resolved_wavenumber * 1e-3,
-    }  # fmt: skip
+    }
     assert dict(row[list(expected)]) == pytest.approx(expected, rel=1e-9)
     np.testing.assert_allclose(row["g"], alone.radial_profile.g * 1e-6, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(row["r"], alone.radial_profile.r * 1e3, rtol=1e-6)
-    names, covariance = list(row["correlated"]), alone.parameters.only(row["correlated"]).covariance
+    names = list(row["correlated"])
+    covariance = alone.parameters.only(row["correlated"]).covariance
     pairs = list(zip(*np.triu_indices(len(names), 1), strict=True))
     with_sigma = pairs.index((0, names.index("gaussian_sigma")))
     expected_r = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
@@ -177,7 +185,8 @@ def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
 
 
 def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run: Run) -> None:
-    manifest, old = copy / "wafer.csv", copy / "results"
+    manifest = copy / "wafer.csv"
+    old = copy / "results"
     run(*arguments(manifest, old)).exits(4, "results exists", "--resume")
     run(*arguments(manifest, old, "--resume", "--shard-size", "4")).exits(4, "begun with")
     run(*arguments(manifest, old, "--scheduler", "tcp://a:1")).exits(2, "exclude each other")
@@ -203,10 +212,14 @@ def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet: Path, fold
     assert listed == ["c,d.nxs", "'a.h5'"]
 
 
-@pytest.mark.parametrize(("module", "line"), [
-    ("pyarrow", "batch {scans} -o new"), ("pyarrow", "summary {results}"),
-    ("distributed", "batch {scans} -o new --scheduler tcp://127.0.0.1:9"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("pyarrow", "batch {scans} -o new"),
+        ("pyarrow", "summary {results}"),
+        ("distributed", "batch {scans} -o new --scheduler tcp://127.0.0.1:9"),
+    ],
+)
 def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, folder, run: Run):
     monkeypatch.setitem(sys.modules, module, None)
     words = line.format(scans=fleet / "scans", results=results).split()
@@ -228,9 +241,11 @@ def test_ctrl_c_ends_a_batch_at_once(fleet: Path, folder: Path) -> None:
 
 
 def test_a_summary_has_distributions_reasons_and_the_map(results: Path, folder: Path, run: Run):
-    page, picture = folder / "page.html", folder / "fleet.svg"
+    page = folder / "page.html"
+    picture = folder / "fleet.svg"
     shown = run("summary", results, "-o", page, "--figure", picture).exits(0, "Written")
-    text, rows = page.read_text(encoding="utf-8"), pd.read_parquet(results / "shards")
+    text = page.read_text(encoding="utf-8")
+    rows = pd.read_parquet(results / "shards")
     assert all(word not in text.lower() for word in ("<script", "href=", 'src="http'))
     passed = int(rows["passed"].sum())
     assert f"{passed} of {COUNT} sensors passed every check" in text
@@ -299,15 +314,23 @@ def test_a_figure_of_a_fleet_without_places_or_results_is_drawn(results: Path) -
 
 @pytest.mark.parametrize("count", [4, 8, 20, 100])
 def test_sensors_that_scatter_by_chance_are_no_outliers(count: int) -> None:
-    rng, batches, alarms = np.random.default_rng(count), 400, 0
+    rng = np.random.default_rng(count)
+    batches = 400
+    alarms = 0
     for _ in range(batches):
-        values, blank = rng.normal(1.0, 0.02, (2, count)), np.full(count, np.nan)
+        values = rng.normal(1.0, 0.02, (2, count))
+        blank = np.full(count, np.nan)
         names = ("conversion_constant", "gaussian_sigma")
         fleet = FleetResults(
-            paths=["scan.h5"] * count, **dict(zip(names, values, strict=True)),
-            **{f"{name}_errors": 0.02 + 0 * blank for name in names}, wafer_x=blank, wafer_y=blank,
-            failed={}, errors={}, unit="mV/Pa",
-        )  # fmt: skip
+            paths=["scan.h5"] * count,
+            **dict(zip(names, values, strict=True)),
+            **{f"{name}_errors": 0.02 + 0 * blank for name in names},
+            wafer_x=blank,
+            wafer_y=blank,
+            failed={},
+            errors={},
+            unit="mV/Pa",
+        )
         alarms += bool(outliers(fleet))
     assert alarms <= binom.ppf(1 - 1e-3, batches, 0.02)
     assert outliers(replace(fleet, conversion_constant=np.append(values[0][1:], 9.0)))
@@ -349,7 +372,8 @@ def test_a_batch_that_overrides_says_so_in_its_rows(fleet: Path, folder: Path, r
 
 
 def test_artifacts_are_those_of_the_rows(copy: Path, folder: Path) -> None:
-    results, source = copy / "results", copy / "wafer.csv"
+    results = copy / "results"
+    source = copy / "wafer.csv"
     written = sorted((results / "artifacts").rglob("*.h5"))
     assert written
     written[0].unlink()
@@ -386,12 +410,20 @@ def test_a_list_of_which_no_scan_is_there_is_refused(folder: Path, run: Run) -> 
 
 
 def test_a_sensor_apart_from_equal_ones_is_an_outlier() -> None:
-    values, blank = np.array([1.0] * 9 + [2.0]), np.full(10, np.nan)
+    values = np.array([1.0] * 9 + [2.0])
+    blank = np.full(10, np.nan)
     errors = {f"{n}_errors": 0.01 * values for n in ("conversion_constant", "gaussian_sigma")}
     fleet = FleetResults(
-        paths=["scan.h5"] * 10, conversion_constant=values, gaussian_sigma=values, **errors,
-        wafer_x=blank, wafer_y=blank, failed={}, errors={}, unit="mV/Pa",
-    )  # fmt: skip
+        paths=["scan.h5"] * 10,
+        conversion_constant=values,
+        gaussian_sigma=values,
+        **errors,
+        wafer_x=blank,
+        wafer_y=blank,
+        failed={},
+        errors={},
+        unit="mV/Pa",
+    )
     assert list(outliers(fleet)) == [9]
 
 

@@ -137,7 +137,8 @@ def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path
 
 def test_repeats_that_moved_are_given_centres_of_their_own_and_that_is_said(run: Run, folder: Path):
     scan = memscal.simulate(repeats=2, points=33)
-    x, repeat = np.append(scan.x, scan.x + 5e-5), np.repeat([0, 1], 33)
+    x = np.append(scan.x, scan.x + 5e-5)
+    repeat = np.repeat([0, 1], 33)
     flat = {name: getattr(scan, name).ravel() for name in ("u_zz", "u_zz_errors")}
     memscal.write_scan(replace(scan, x=x, repeat=repeat, **flat), "moved.h5")
     done = run("calibrate", "moved.h5", "--figure", "a.svg").exits(0)

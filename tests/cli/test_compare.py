@@ -18,7 +18,10 @@ from memscal.cli.compare import cache_from, user_cache_folder
 from memscal.cli.failures import CHECK_FAILED
 from memscal.simulation.experiment import simulate_experiment
 
-CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
+CHECKED = CHECK_FAILED
+USAGE = 2
+REFUSED = 3
+NOT_WRITTEN = 4
 Give = Callable[..., None]
 Patch = pytest.MonkeyPatch
 
@@ -135,16 +138,25 @@ def test_a_page_and_all_figures_are_written(compare: Run, made_by_hand: Give, fo
     done = compare("--figure", "page.png", "--report", "page.html", *options).exits(0)
     assert (folder / "page.png").read_bytes().startswith(b"\x89PNG")
     page = (folder / "page.html").read_text(encoding="utf-8")
-    figures = ["Measured and calculated profiles, dry.", "Maximum of", "Effective", "Likelihood",
-               "Laws of the interface"]  # fmt: skip
+    figures = [
+        "Measured and calculated profiles, dry.",
+        "Maximum of",
+        "Effective",
+        "Likelihood",
+        "Laws of the interface",
+    ]
     captions = re.findall("<figcaption>(.*)</figcaption>", page)
     assert [c.startswith(f) for c, f in zip(captions, figures, strict=True)] == [True] * 5
     joint = html.escape(str(found.joint["dry"]["incremental"]))
     assert page.count(f"All loads together: dry, incremental: {joint}") == len(captions)
     assert names(folder / "drawn") == [
-        "effective-friction.svg", "friction-set-dry.svg", "interface.svg", "likelihood.svg",
-        "maxima.svg", "profiles-dry.svg",
-    ]  # fmt: skip
+        "effective-friction.svg",
+        "friction-set-dry.svg",
+        "interface.svg",
+        "likelihood.svg",
+        "maxima.svg",
+        "profiles-dry.svg",
+    ]
     assert "Written: drawn/maxima.svg" in done.err.replace("\\", "/")
 
 

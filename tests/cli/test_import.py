@@ -35,9 +35,13 @@ def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
     run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *labels)
     scan = memscal.read_scan("scan.h5")
     assert scan.film == memscal.ElasticFilm(
-        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6,
-        poisson_ratio_uncertainty=0.004, thickness_uncertainty=0.02e-3,
-    )  # fmt: skip
+        young_modulus=2.2e6,
+        poisson_ratio=0.5,
+        thickness=2e-3,
+        young_modulus_uncertainty=0.1e6,
+        poisson_ratio_uncertainty=0.004,
+        thickness_uncertainty=0.02e-3,
+    )
     assert scan.indenter == memscal.Rod(radius=0.25e-3, radius_uncertainty=0.002e-3)
     assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
     assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
@@ -74,7 +78,9 @@ def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Ru
 
 
 def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
-    x, sets, passes = np.arange(9.0), (2.0, 0.5), (1, 2)
+    x = np.arange(9.0)
+    sets = (2.0, 0.5)
+    passes = (1, 2)
     rows = np.array([(p, s, place, 10 * s + p) for p in passes for s in sets for place in x])
     rows = np.delete(rows, 4, axis=0)  # a contact that was never made
     write_table(folder / "sphere.csv", "pass,set,position,voltage", rows)
@@ -92,9 +98,13 @@ def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
         np.testing.assert_allclose(line.u_zz, voltage)
 
 
-@pytest.mark.parametrize(("first", "repeat", "branch"), [
-    ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]), ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("first", "repeat", "branch"),
+    [
+        ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]),
+        ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
+    ],
+)
 def test_branches_are_words_or_numbers(run: Run, folder: Path, first, repeat, branch):
     words = [first, "Retreat", "1", "2", "APPROACH", "2.0", "approach", "retreat"]
     rows = [f"{i // 2},{i},{word}\n" for i, word in enumerate(words)]
@@ -116,12 +126,16 @@ def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: R
     assert (rod.code, "--repeat" in rod.err) == (0, False)
 
 
-@pytest.mark.parametrize(("arguments", "hints"), [
-    ([], ["--x", "--u"]), ([*COLUMNS, "--thickness", 1], ["--young-modulus", "--poisson-ratio"]),
-    ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
-    ([*COLUMNS, *SET_UP, "--shear-sign", -1], ["--shear-sign"]),
-    (["--format", "reference"], ["--r", "--sigma", "--load"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("arguments", "hints"),
+    [
+        ([], ["--x", "--u"]),
+        ([*COLUMNS, "--thickness", 1], ["--young-modulus", "--poisson-ratio"]),
+        ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
+        ([*COLUMNS, *SET_UP, "--shear-sign", -1], ["--shear-sign"]),
+        (["--format", "reference"], ["--r", "--sigma", "--load"]),
+    ],
+)
 def test_all_that_is_missing_is_named(run: Run, table: Path, folder: Path, arguments, hints):
     refused = run("import", table, "-o", "scan.h5", *arguments).exits(2)
     assert all(hint in refused.err for hint in hints), refused.err
@@ -137,10 +151,12 @@ def test_the_table_itself_is_never_replaced(run: Run, table: Path):
 def test_what_was_pressed_on_what_is_told_after_the_import(run: Run, table: Path):
     told = run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, "--noise", 0.04).exits(0).out
     for words in (
-        "Units: u_zz in mV, x in mm.", "Rod: radius (0.2500 ± 0.0020) mm.",
-        "Pressed with: load (1.000 ± 0.010) N.", "Young's modulus (2.20 ± 0.10) MPa",
+        "Units: u_zz in mV, x in mm.",
+        "Rod: radius (0.2500 ± 0.0020) mm.",
+        "Pressed with: load (1.000 ± 0.010) N.",
+        "Young's modulus (2.20 ± 0.10) MPa",
         "uncertainty of each reading: 0.04 mV",
-    ):  # fmt: skip
+    ):
         assert words in told, told
     np.testing.assert_allclose(memscal.read_scan("scan.h5").u_zz_errors, np.full(65, 4e-5))
 

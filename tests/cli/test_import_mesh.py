@@ -54,7 +54,8 @@ def test_lengths_on_the_command_line_are_in_mm(run: Run, folder: Path):
 
 def test_the_file_that_holds_the_numbers_of_a_mesh_is_an_input_too(run: Run, folder: Path):
     film = section()
-    film.point_data, film.cell_data = {"S33": film.point_data["S33"]}, {}
+    film.point_data = {"S33": film.point_data["S33"]}
+    film.cell_data = {}
     meshio.xdmf.write("film.xdmf", film)
     before = Path("film.h5").read_bytes()
     (folder / "link.h5").symlink_to("film.h5")

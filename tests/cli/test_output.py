@@ -24,9 +24,11 @@ class Terminal(io.StringIO):
 
 
 TABLE = Table(
-    "Quality checks", ("check", "result"), [("drift", "passed"), ("[bold]symmetry", "FAILED")],
+    "Quality checks",
+    ("check", "result"),
+    [("drift", "passed"), ("[bold]symmetry", "FAILED")],
     frozenset({1}),
-)  # fmt: skip
+)
 PLAIN = (
     "Quality checks\n"
     "  check           result\n"
@@ -73,7 +75,7 @@ WIDE = Table(
     ("", "state", *(f"quantity {i} (kPa)" for i in range(9))),
     [(str(row), "dry", *(f"(26.14 ± 0.{row}{i})×10⁻⁵ mV/Pa" for i in range(9))) for row in (1, 2)],
     labels=2,
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120])

@@ -144,7 +144,8 @@ def test_the_field_goes_to_a_mesh_that_can_be_imported(run: Run, folder: Path, w
     run("reference", "sphere", "--load", 0.34, *way, "--mesh", "film.vtu", "-o", "film.h5").exits(0)
     units = ["--r-unit", "mm", "--sigma", "stress_Pa", "--sigma-unit", "Pa", "--load", 0.34]
     run("import", "film.vtu", "-o", "back.h5", "--format", "reference", *units).exits(0)
-    written, imported = memscal.read_reference("film.h5"), memscal.read_reference("back.h5")
+    written = memscal.read_reference("film.h5")
+    imported = memscal.read_reference("back.h5")
     # A mesh holds stresses at its nodes, which are less accurate than the base's reaction.
     direct = np.interp(imported.r, written.r, written.sigma_zz)
     assert np.max(np.abs(imported.sigma_zz - direct)) < 1e-2 * written.sigma_zz.max()

@@ -77,13 +77,15 @@ def test_the_commands_print_the_results(
 
 def test_friction_of_a_contact_is_named(restored: memscal.Restoration, contact: memscal.Contact):
     assert restored.to_dict()["calculated"]["origin"] == "calculated without friction"
-    apparatus, scan = restored.apparatus, restored.scan
+    apparatus = restored.apparatus
+    scan = restored.scan
     rubbed = memscal.restore(scan, apparatus, expected=contact).to_dict()["calculated"]
     assert rubbed["origin"] == "calculated with friction 0.3"
 
 
 def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.MeasuredStress):
-    arrays, table = stress.to_xarray(), stress.to_dataframe()
+    arrays = stress.to_xarray()
+    table = stress.to_dataframe()
     assert arrays.s_zz.dims == ("profile", "point")
     assert (arrays.s_zz.attrs["units"], arrays.r.attrs["units"]) == ("Pa", "m")
     second = stress.profiles[1]
@@ -128,8 +130,9 @@ def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design):
 
 
 def test_a_contact_varies_with_its_film_and_indenter():
-    film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3,
-                               young_modulus_uncertainty=0.1e6)  # fmt: skip
+    film = memscal.ElasticFilm(
+        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6
+    )
     rod = memscal.Rod(radius=0.25e-3, radius_uncertainty=5e-6)
     numbers = memscal.indent(film, rod, load=0.2).ufloats()
     # A flat punch: depth is as 1/E at a given load; the stress at the base does not depend on E.

@@ -40,8 +40,11 @@ def started(folder: Path, *, ignoring: bool = False) -> subprocess.Popen[str]:
     ]
     process = subprocess.Popen(
         ["nohup", *command] if ignoring else command,
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     assert process.stdout
     for line in process.stdout:
         if line == "now\n":
@@ -86,9 +89,13 @@ def test_a_signal_during_an_import_has_no_traceback(tmp_path: Path, number, code
         "sys.exit(run())\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", hook, "inspect", "missing.h5"], capture_output=True, text=True,
-        check=False, cwd=tmp_path, env={**os.environ},
-    )  # fmt: skip
+        [sys.executable, "-c", hook, "inspect", "missing.h5"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ},
+    )
     assert (done.returncode, "Traceback" in done.stderr) == (code, False)
 
 

@@ -53,8 +53,15 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
     measured = memscal.measure_stress(made.dry, folder / "zz.apparatus.h5")
     measured.save(folder / "dry.stress.h5")
     options = ("--channel", "xz", "--friction", 0.1, "--loading", "total", "--no-cache")
-    done = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options, "--json",
-               "--report", "shear.html")  # fmt: skip
+    done = run(
+        "compare",
+        folder / "xz.apparatus.h5",
+        folder / "dry.stress.h5",
+        *options,
+        "--json",
+        "--report",
+        "shear.html",
+    )
     page = (folder / "shear.html").read_text(encoding="utf-8")
     assert "by the shear" in page
     friction = (0.0, 0.1, np.inf)
@@ -66,9 +73,21 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
     run("compare", folder / "zz.apparatus.h5", folder / "dry.stress.h5", *options).exits(
         3, "of channel zz"
     )
-    both = run("compare", folder / "zz.apparatus.h5", folder / "dry.stress.h5", *options[2:],
-               "--shear", folder / "xz.apparatus.h5")  # fmt: skip
+    both = run(
+        "compare",
+        folder / "zz.apparatus.h5",
+        folder / "dry.stress.h5",
+        *options[2:],
+        "--shear",
+        folder / "xz.apparatus.h5",
+    )
     assert "dry, with shear" in both.exits(0).out
-    figure = run("compare", folder / "xz.apparatus.h5", folder / "dry.stress.h5", *options,
-                 "--figure", "f.png")  # fmt: skip
+    figure = run(
+        "compare",
+        folder / "xz.apparatus.h5",
+        folder / "dry.stress.h5",
+        *options,
+        "--figure",
+        "f.png",
+    )
     figure.exits(2, "no effect")

@@ -46,10 +46,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     work = tmp_path_factory.mktemp("terminal")
     (work / "scans").mkdir()
     for source, name in {
-        DATA / "rod_scan_65.h5": "rod.h5", DATA / "rod_scan_three_loads.h5": "loads.h5",
-        DATA / "rod_scan_33.h5": "scans/a.h5", DATA / "rod_scan_light.h5": "scans/b.h5",
-        SPHERE / "sphere_dry.h5": "dry.h5", SPHERE / "sphere_lubricated.h5": "lubricated.h5",
-    }.items():  # fmt: skip
+        DATA / "rod_scan_65.h5": "rod.h5",
+        DATA / "rod_scan_three_loads.h5": "loads.h5",
+        DATA / "rod_scan_33.h5": "scans/a.h5",
+        DATA / "rod_scan_light.h5": "scans/b.h5",
+        SPHERE / "sphere_dry.h5": "dry.h5",
+        SPHERE / "sphere_lubricated.h5": "lubricated.h5",
+    }.items():
         shutil.copy(source, work / name)
     measured = f"apply {work / 'sensor.h5'} {work / 'dry.h5'} {work / 'lubricated.h5'}"
     for command in (
@@ -97,15 +100,31 @@ def test_tables_are_whole_at_80_columns(at_80, monkeypatch: pytest.MonkeyPatch, 
         assert sorted(words - set(shown.out.split())) == []
 
 
-@pytest.mark.parametrize(("name", "first", "last"), [
-    ("calibrate", r"Use A = \(.*\)\S* mV/Pa \(method white-noise\)\.", r"Its Gaussian of σ = .*"),
-    ("apply", r"S_zz up to \(.*\) kPa at 0\.34 N, \(.*\) kPa at 2\.75 N\.",
-     r"6 profiles: total force over applied load 1\.0\d\d ± 0\.0\d\d\. All \d+ checks passed\."),
-    ("compare", r"Dry: μ = 0\.\d+ \[0\.\d+, 0\.\d+\].*",
-     r"Lubricated: μ below 0\.\d+ \(95 %\), taken as 0\. All \d+ checks passed\."),
-    ("restore", r"Stress on the axis \(.*\) kPa; force \(.*\) N at 1\.37 N\.",
-     r"All 6 checks passed\."),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "first", "last"),
+    [
+        (
+            "calibrate",
+            r"Use A = \(.*\)\S* mV/Pa \(method white-noise\)\.",
+            r"Its Gaussian of σ = .*",
+        ),
+        (
+            "apply",
+            r"S_zz up to \(.*\) kPa at 0\.34 N, \(.*\) kPa at 2\.75 N\.",
+            r"6 profiles: total force over applied load 1\.0\d+ ± 0\.\d+\. All \d+ checks passed\.",
+        ),
+        (
+            "compare",
+            r"Dry: μ = 0\.\d+ \[0\.\d+, 0\.\d+\].*",
+            r"Lubricated: μ below 0\.\d+ \(95 %\), taken as 0\. All \d+ checks passed\.",
+        ),
+        (
+            "restore",
+            r"Stress on the axis \(.*\) kPa; force \(.*\) N at 1\.37 N\.",
+            r"All 6 checks passed\.",
+        ),
+    ],
+)
 def test_brief_ends_with_the_answer_with_which_the_tables_begin(at_80, name, first, last) -> None:
     lines = at_80(f"{RUNS[name]} --brief").out.splitlines()
     assert re.match(first, lines[0])

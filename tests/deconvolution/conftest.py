@@ -12,7 +12,8 @@ from memscal.deconvolution.division import Division, DivisionProblem
 from memscal.model.arrays import FloatArray
 
 A = 3e-8
-STRESS_WIDTH, KERNEL_WIDTH = 0.9e-3, 0.561e-3
+STRESS_WIDTH = 0.9e-3
+KERNEL_WIDTH = 0.561e-3
 
 
 def _lattice(x: float = 0.0, y: float = 0.0) -> Lattice:
@@ -51,9 +52,12 @@ def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
     k = np.sqrt(-2 * np.log(weakest)) / STRESS_WIDTH
     both = float(np.hypot(STRESS_WIDTH, KERNEL_WIDTH))
     problem = DivisionProblem(
-        grid, A * unit_gaussian(grid.radius, both), unit_gaussian(grid.radius, STRESS_WIDTH),
-        A * float(np.exp(-((k * both) ** 2) / 2)), weakest,
-    )  # fmt: skip
+        grid,
+        A * unit_gaussian(grid.radius, both),
+        unit_gaussian(grid.radius, STRESS_WIDTH),
+        A * float(np.exp(-((k * both) ** 2) / 2)),
+        weakest,
+    )
     widths = (STRESS_WIDTH, KERNEL_WIDTH)
     transforms = [np.exp(-((grid.wavenumber * width) ** 2) / 2) for width in widths]
     return Gaussians(problem, unit_gaussian(centred.radius, KERNEL_WIDTH), *transforms)

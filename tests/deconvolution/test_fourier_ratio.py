@@ -8,8 +8,11 @@ from memscal.deconvolution.division import Tikhonov
 from memscal.errors import FitError, InputError
 
 R = np.linspace(0.0, 7e-3, 281)
-SPACING, EXTENT = 0.1e-3, 8e-3
-STRESS_WIDTH, WIDTH, CONVERSION = 0.5e-3, 0.561e-3, 1e-7
+SPACING = 0.1e-3
+EXTENT = 8e-3
+STRESS_WIDTH = 0.5e-3
+WIDTH = 0.561e-3
+CONVERSION = 1e-7
 
 
 def gaussian(width: float) -> memscal.Field:
@@ -85,11 +88,14 @@ def test_fields_on_different_grids_are_not_divided() -> None:
         memscal.reconvolve(1.0, gaussian(WIDTH), stress)
 
 
-@pytest.mark.parametrize(("options", "message"), [
-    ({"weakest": 0.0}, "weakest relevant component"),
-    ({"weakest": float("nan")}, "weakest relevant component"),
-    ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"weakest": 0.0}, "weakest relevant component"),
+        ({"weakest": float("nan")}, "weakest relevant component"),
+        ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
+    ],
+)
 def test_a_division_without_a_noise_or_with_idle_options_is_refused(options, message) -> None:
     with pytest.raises(InputError, match=message):
         memscal.divide(*voltage_and_stress(), **options)

@@ -47,10 +47,14 @@ def test_the_units_of_voltage_and_stress_do_not_matter(regulariser, volts, stres
     # Powers of two: the unsupervised filter takes the rounding of noise-free data for noise.
     problem = gaussians("lattice").problem
     scaled = DivisionProblem(
-        problem.grid, volts * problem.voltage, stress * problem.reference,
-        volts * problem.weakest_voltage, stress * problem.weakest_reference,
-    )  # fmt: skip
-    once, again = regulariser.divide(problem).field, regulariser.divide(scaled).field
+        problem.grid,
+        volts * problem.voltage,
+        stress * problem.reference,
+        volts * problem.weakest_voltage,
+        stress * problem.weakest_reference,
+    )
+    once = regulariser.divide(problem).field
+    again = regulariser.divide(scaled).field
     np.testing.assert_allclose(again * stress / volts, once, atol=1e-9 * np.abs(once).max())
 
 

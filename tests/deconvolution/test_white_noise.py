@@ -48,7 +48,8 @@ def test_the_window_is_the_mean_reciprocal_over_circular_noise(ratio: float, see
     delta[0, 0] = ratio / grid.cell_area
     window = WhiteNoise().divide(DivisionProblem(grid, delta, delta, 1.0, 10.0)).window
     rng = np.random.default_rng(seed)
-    count, cut = 2_000_000, 0.02
+    count = 2_000_000
+    cut = 0.02
     noise = (rng.normal(size=count) + 1j * rng.normal(size=count)) / np.sqrt(2)
     phase = np.exp(2j * np.pi * rng.random())
     total = ratio * phase + noise
@@ -121,9 +122,12 @@ def test_without_noise_the_quotient_is_the_kernel_up_to_what_the_window_takes(
 def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed: int):
     # One period for the quotient, another for the convolution: ripples that reach the edge, as all
     # of a draw's do, would leak into the band by half a percent.
-    narrow, wide, weakest = 0.9e-3, 1.06e-3, 1e-3
+    narrow = 0.9e-3
+    wide = 1.06e-3
+    weakest = 1e-3
     k = np.sqrt(-2 * np.log(weakest)) / narrow
-    grid, least = EvenGrid(129, 1e-4), float(np.exp(-0.5 * (k * wide) ** 2))
+    grid = EvenGrid(129, 1e-4)
+    least = float(np.exp(-0.5 * (k * wide) ** 2))
     fields = (unit_gaussian(grid.radius, width) for width in (wide, narrow))
     problem = DivisionProblem(grid, *fields, least, weakest)
     back = grid.convolve(WhiteNoiseDraw(seed=seed).divide(problem).field, problem.reference)

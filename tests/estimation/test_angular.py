@@ -17,7 +17,8 @@ ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
 
 
 def test_kernels_are_blurred_rings_of_their_order() -> None:
-    blur, axis = 0.25e-3, np.arange(-60, 61) * 0.05e-3
+    blur = 0.25e-3
+    axis = np.arange(-60, 61) * 0.05e-3
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
     departures = AngularDepartures(AngularRings(RADII, blur), ONE_EACH)
     kernels = departures.at(x, y, np.eye(departures.count))
@@ -34,7 +35,8 @@ def test_kernels_are_blurred_rings_of_their_order() -> None:
 
 def test_signals_are_the_convolutions_of_the_kernels() -> None:
     scan = simulated(raster=True, points=17, half_range=4e-3)
-    model, step = estimated(scan).model, 0.05e-3
+    model = estimated(scan).model
+    step = 0.05e-3
     axis = step * np.arange(-240, 241)
     stress = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(
         np.hypot.outer(axis, axis)
@@ -71,9 +73,12 @@ def test_noise_by_repeats_is_that_within_each_place() -> None:
     x, y = (np.tile(a.ravel(), 2) for a in scan.positions)
     again = tailed_raster(seed=2, side=33)
     both = replace(
-        scan, x=x, y=y, u_zz=np.append(scan.u_zz, again.u_zz),
+        scan,
+        x=x,
+        y=y,
+        u_zz=np.append(scan.u_zz, again.u_zz),
         repeat=np.repeat([0, 1], scan.u_zz.size),
-    )  # fmt: skip
+    )
     # A gradient that third differences would not see either, and steps, which they would.
     points = measured_points(both)
     steps = np.where(points.x > 0, 1.0, 0.0) * points.u.max()
@@ -93,7 +98,8 @@ def test_a_spike_is_an_outlier_and_asymmetry_is_none() -> None:
 
 def test_a_round_sensor_keeps_its_profile_and_its_centre() -> None:
     scan = simulated(raster=True, points=33, half_range=6e-3, noise=0.005, seed=4)
-    round_, any_ = estimated(scan), estimated(scan, angular=True)
+    round_ = estimated(scan)
+    any_ = estimated(scan, angular=True)
     np.testing.assert_allclose(any_.centre, round_.centre, atol=2e-6)
     assert any_.conversion_constant == pytest.approx(round_.conversion_constant, rel=1e-3)
     assert np.abs(any_.oval).max() < 0.01 * any_.largest_signal

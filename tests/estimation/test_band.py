@@ -57,7 +57,8 @@ def test_within_the_band_the_transfer_function_is_known_to_a_third_and_beyond_it
 
 def test_the_uncertainty_of_the_transfer_function_is_that_of_draws_of_the_posterior() -> None:
     estimate = estimated(simulated(noise=0.005))
-    basis, k = estimate.basis, estimate.model.k
+    basis = estimate.basis
+    k = estimate.model.k
     values, vectors = np.linalg.eigh(estimate.covariance)
     rng = np.random.default_rng()
     draws = rng.normal(size=(4000, values.size)) * np.sqrt(np.maximum(values, 0))

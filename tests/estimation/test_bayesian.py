@@ -31,7 +31,9 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
     scan = simulated(noise=0.01, kernel=TAILS, repeats=2)
     # Stated larger than it is, so that it is the noise of every hypothesis.
     estimate = estimated(replace(scan, u_zz_errors=1.5 * scan.u_zz_errors))
-    fit, basis, model = estimate.gaussian, estimate.departures, estimate.model
+    fit = estimate.gaussian
+    basis = estimate.departures
+    model = estimate.model
     root = np.sqrt(estimate.weights)[:, None]
     kernels = basis.kernels(model.k)
     voltages = root * model.signal(fit.geometry, kernels)
@@ -43,10 +45,13 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
     for h in (HYPOTHESES[i] for i in likely):
         data = root[:, 0] * (estimate.points.u - fit.predicted)
         of_a = voltages[:, 0] * basis.conversion_constant
-        of_width, spread = voltages[:, 1] * basis.sigma, np.zeros((data.size, 0))
+        of_width = voltages[:, 1] * basis.sigma
+        spread = np.zeros((data.size, 0))
         if h.family is not None:
             off, of_width, last = voltages[:, blocks[h.family]].T
-            data, of_a, spread = data - off, of_a + off, last[:, None]
+            data = data - off
+            of_a = of_a + off
+            spread = last[:, None]
         flat = np.column_stack([of_a, of_width, voltages[:, 2 : basis.flat]])
         covariance = np.eye(data.size) + spread @ spread.T
         if h.shape is not None:
@@ -101,7 +106,8 @@ def test_a_constrained_profile_meets_its_constraint_and_moves_little(monotone) -
     for seed in range(6):
         estimate = estimated(simulated(noise=0.003, repeats=2, seed=seed, kernel=TAILS))
         profile = constrained_profile(estimate, nonnegative=not monotone, monotone=monotone)
-        found, free = profile.radial(R), estimate.radial(R)
+        found = profile.radial(R)
+        free = estimate.radial(R)
         least = np.diff(found).max() if monotone else -found.min()
         assert least < 2e-3 * found[0]
         moved.append(plane_error(R, found, free))

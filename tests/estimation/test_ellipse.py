@@ -53,7 +53,8 @@ def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian() -> None:
 
 def test_the_columns_are_the_derivatives_of_the_response() -> None:
     estimate = estimated(simulated(raster=True, points=13))
-    geometry, here = estimate.model.geometry(estimate.centres), np.array([0.2, -0.1])
+    geometry = estimate.model.geometry(estimate.centres)
+    here = np.array([0.2, -0.1])
     columns, shift = elliptic_columns(estimate.model, geometry, SIGMA, here)
     for i, step in ((2, np.array([1e-3, 0.0])), (3, np.array([0.0, 1e-3]))):
         above = elliptic_columns(estimate.model, geometry, SIGMA, here + step)[0][:, 0]
@@ -72,7 +73,8 @@ def test_the_columns_are_the_derivatives_of_the_response() -> None:
 
 
 def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
-    truth, rows = (0.25, -0.15), []
+    truth = (0.25, -0.15)
+    rows = []
     for seed in range(SEEDS):
         estimate = estimated(elliptic_scan(truth, 0.01, seed))
         fit = estimate.gaussian

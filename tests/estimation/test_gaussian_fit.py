@@ -37,9 +37,12 @@ def fit(scan: Scan):
 )
 def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, drift) -> None:
     scan = simulated(
-        kernel=memscal.GaussianMixture((1.0,), (sigma,)), centre=(centre, 0.0), baseline=baseline,
-        drift=drift, noise=0.0,
-    )  # fmt: skip
+        kernel=memscal.GaussianMixture((1.0,), (sigma,)),
+        centre=(centre, 0.0),
+        baseline=baseline,
+        drift=drift,
+        noise=0.0,
+    )
     found = fit(scan)
     # The film passes no more than exp(-kh): a width is known to what the fit converges to.
     assert found.sigma == pytest.approx(sigma, rel=1e-5)
@@ -63,7 +66,8 @@ def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
         plane = 2 if raster else 1
 
         def predict(shift, found=found, model=model, plane=plane):
-            a, s = found.conversion_constant + shift[0], found.sigma + shift[1]
+            a = found.conversion_constant + shift[0]
+            s = found.sigma + shift[1]
             centre = found.centre.copy()
             centre[0, :plane] += shift[2 : 2 + plane]
             signal = model.signal(model.geometry(centre), a * gaussian_transfer(model.k, s))

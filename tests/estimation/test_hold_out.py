@@ -13,15 +13,18 @@ from memscal.estimation.residuals import free_model
 
 def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covariance() -> None:
     estimate = estimated(simulated(repeats=2, points=33))
-    model, group = free_model(estimate, clip_outliers=True), estimate.points.repeat
+    model = free_model(estimate, clip_outliers=True)
+    group = estimate.points.repeat
     found = hold_out(estimate, group)
     out = group == found.worst
-    x, z = model.design, model.data
+    x = model.design
+    z = model.data
     known = np.linalg.inv(x[~out].T @ x[~out])
     beta = known @ x[~out].T @ z[~out]
     covariance = np.eye(33) + x[out] @ known @ x[out].T
     # The held-out part's own centre, baseline and drift, by generalised least squares.
-    own, distance = x[out][:, 2:5], z[out] - x[out] @ beta
+    own = x[out][:, 2:5]
+    distance = z[out] - x[out] @ beta
     weight = np.linalg.inv(covariance)
     left = distance - (own @ np.linalg.solve(own.T @ weight @ own, own.T @ weight @ distance))
     assert found.value == pytest.approx(left @ weight @ left / 30, rel=1e-5)
@@ -36,7 +39,8 @@ def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covarian
     {"repeats": 14, "points": 21},
 ])  # fmt: skip
 def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options) -> None:
-    scans, level = 60, 0.1
+    scans = 60
+    level = 0.1
     p_values = []
     for seed in range(scans):
         estimate = estimated(simulated(seed=seed, **options))

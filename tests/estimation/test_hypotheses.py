@@ -20,12 +20,15 @@ from memscal.model.scan import Scan
 BOTH = {"repeats": 2, "points": 33, "branch": ["approach", "retreat"]}
 
 
-@pytest.mark.parametrize(("test", "options"), [
-    (symmetry_test, {}),
-    (linearity_test, {"load": [0.5, 1.5], "points": 33}),
-    (hysteresis_test, BOTH),
-    (hysteresis_test, BOTH | {"state_noise": False}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("test", "options"),
+    [
+        (symmetry_test, {}),
+        (linearity_test, {"load": [0.5, 1.5], "points": 33}),
+        (hysteresis_test, BOTH),
+        (hysteresis_test, BOTH | {"state_noise": False}),
+    ],
+)
 def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options) -> None:
     scans = 80
     extra = [test(estimated(simulated(seed=seed, **options))) for seed in range(scans)]
@@ -53,12 +56,15 @@ def hysteretic(seed: int, conversion: float = 0.0, play: float = 0.0, step: floa
     """Two scans, of sensors that differ in A and centre, as approach and retreat of one."""
     rows = [
         simulated(
-            seed=2 * seed + i, noise=0.002, baseline=0.0, drift=0.0,
+            seed=2 * seed + i,
+            noise=0.002,
+            baseline=0.0,
+            drift=0.0,
             conversion_constant=CONVERSION * (1 + side * conversion),
             centre=(CENTRE + side * play, 0.0),
         )
         for i, side in enumerate((0.5, -0.5))
-    ]  # fmt: skip
+    ]
     u, errors = (np.stack([getattr(row, name) for row in rows]) for name in ("u_zz", "u_zz_errors"))
     u += np.array([[0.5], [-0.5]]) * step
     return replace(rows[0], u_zz=u, u_zz_errors=errors, branch=BOTH["branch"])
@@ -99,7 +105,8 @@ def test_a_round_sensor_passes_and_an_elliptic_one_is_found() -> None:
     scan = simulated(raster=True, points=17, noise=0.003)
     even = axisymmetry_test(estimated(scan))
     assert even.fall < chi2.isf(1e-6, even.count)
-    dx, dy = scan.x[None, :] - 0.14e-3, scan.y[:, None]
+    dx = scan.x[None, :] - 0.14e-3
+    dy = scan.y[:, None]
     lobes = (dx**2 - dy**2) / 1e-6 * np.exp(-(dx**2 + dy**2) / 3e-6)
     oval = replace(scan, u_zz=scan.u_zz + 0.02 * scan.u_zz.max() * lobes)
     uneven = axisymmetry_test(estimated(oval))

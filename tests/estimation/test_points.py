@@ -12,8 +12,10 @@ from memscal.estimation.points import measured_points, scans_by_load
 
 def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
     scan = simulated(load=[0.5, 1.0], points=21)
-    u, load = scan.u_zz.copy(), np.array(scan.normal_load)
-    u[0, 3], load[1, 7] = np.nan, np.nan
+    u = scan.u_zz.copy()
+    load = np.array(scan.normal_load)
+    u[0, 3] = np.nan
+    load[1, 7] = np.nan
     points = measured_points(replace(scan, u_zz=u, normal_load=load))
     assert points.missing == 2
     assert points.u.size == 2 * 21 - 2
@@ -33,13 +35,16 @@ def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings() ->
     assert split[1].load_uncertainty == pytest.approx(0.01 * 0.3 / several.load)
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, "missing"),
-    (lambda s: {"u_zz": -s.u_zz}, "positive in compression"),
-    (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, "Every voltage"),
-    (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, "zero"),
-    (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, "above zero"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, "missing"),
+        (lambda s: {"u_zz": -s.u_zz}, "positive in compression"),
+        (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, "Every voltage"),
+        (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, "zero"),
+        (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, "above zero"),
+    ],
+)
 def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, words) -> None:
     scan = simulated()
     with pytest.raises(InputError, match=words):

@@ -17,7 +17,8 @@ from memscal.estimation.profile import point_messages
 
 def test_the_noise_is_found_from_the_scatter_alone() -> None:
     # 40 scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
-    degrees, seeds = 60, range(40)
+    degrees = 60
+    seeds = range(40)
     ratios = []
     for seed in seeds:
         scan = simulated(noise=0.01, state_noise=False, seed=seed)
@@ -51,7 +52,8 @@ def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> No
 
 def test_ten_outliers_are_listed_the_largest_first_and_the_others_counted() -> None:
     scan = simulated(noise=0.002, repeats=9)
-    u, sizes = scan.u_zz.copy(), np.linspace(0.4, 1.6, 13)
+    u = scan.u_zz.copy()
+    sizes = np.linspace(0.4, 1.6, 13)
     u[:, ::16].flat[: sizes.size] -= sizes * u.max()
     listed = [m.text for m in point_messages(estimated(replace(scan, u_zz=u)))]
     assert len(listed) == 11
@@ -64,7 +66,8 @@ def test_ten_outliers_are_listed_the_largest_first_and_the_others_counted() -> N
 def test_gross_outliers_leave_the_noise_as_it_is() -> None:
     ratios = []
     for seed in range(24):
-        scan, rng = simulated(noise=0.005, seed=seed), np.random.default_rng(seed)
+        scan = simulated(noise=0.005, seed=seed)
+        rng = np.random.default_rng(seed)
         chosen = rng.choice(scan.u_zz.size, 3, replace=False)
         off = np.zeros_like(scan.u_zz)
         off[chosen] = rng.choice([-1, 1], 3) * rng.uniform(0.1, 0.6, 3) * scan.u_zz.max()
@@ -76,7 +79,8 @@ def test_gross_outliers_leave_the_noise_as_it_is() -> None:
 
 
 def test_repeats_narrow_the_uncertainty_as_their_square_root() -> None:
-    one, nine = estimated(simulated(seed=5)), estimated(simulated(seed=5, repeats=9))
+    one = estimated(simulated(seed=5))
+    nine = estimated(simulated(seed=5, repeats=9))
     variances = [
         np.diag(estimate.gaussian.covariance(estimate.weights, estimate.noise_scale))
         for estimate in (one, nine)

@@ -57,35 +57,51 @@ def test_a_table_in_tension_is_refused_with_its_cure() -> None:
 
 
 FILM = replace(SCAN.film, law="")
-TABLE, RUBBER = CONTACT.profile(), {"law": "neo-hookean"}
+TABLE = CONTACT.profile()
+RUBBER = {"law": "neo-hookean"}
 EXACTLY = {"thickness_uncertainty": None}
 LOADS = replace(SCAN, normal_load=np.geomspace(0.998, 1.001, SCAN.u_zz.size))
 
 
-@pytest.mark.parametrize(("scan", "table", "words"), [
-    # Thicknesses of 0.02 mm each: twice the uncertainty of the difference is 0.057 mm.
-    ({"thickness": 2.056e-3}, {}, None),
-    ({"thickness": 2.058e-3}, {}, r"film thickness 2\.058 mm \(u 0\.02\) in the scan, 2 mm \(u 0"),
-    ({"thickness": 2.000001e-3, **EXACTLY}, EXACTLY, None),
-    ({"thickness": 2.00001e-3, **EXACTLY}, EXACTLY, r"2\.00001 mm \(u not stated\)"),
-    ({"poisson_ratio": 0.48}, {}, r"film Poisson's ratio 0\.48 \(u 0\.005\)"),
-    ({"young_modulus": 9e6}, {"law": "linear"}, None),
-    ({"young_modulus": 9e6}, RUBBER, r"film Young's modulus 9 MPa .*, 2\.2 MPa"),
-    ({}, RUBBER, None),
-    ({"law": "linear"}, RUBBER, 'film law "linear" in the scan, "neo-hookean" in the reference'),
-    ({"radius": 0.255e-3}, {}, None),
-    ({"radius": 0.26e-3}, {}, r"rod radius 0\.26 mm"),
-    ({"rod_friction": np.inf}, {"friction_coefficient": 0.0}, None),
-    ({"rod_friction": np.inf}, {"friction_coefficient": 0.0, **RUBBER}, "friction of the rod inf"),
-    ({"load": 0.5}, {"law": "linear"}, None),
-    ({"load": 0.5}, {"law": ""}, r"load 0\.5 N \(u not stated\) in .* law is not stated"),
-    ({"load": 0.5}, RUBBER, "whose law is neo-hookean"),
-    ({"load": 0.97, "load_uncertainty": 0.02}, RUBBER, None),
-    ({"normal_load": LOADS.normal_load}, {"law": "linear"}, None),
-    ({"normal_load": LOADS.normal_load}, RUBBER, r"load 0\.998 N"),
-    ({"normal_load": LOADS.normal_load, "load_uncertainty": 2e-3}, RUBBER, None),
-    ({}, {"film": None, "load": 1.01}, "load 1 N"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("scan", "table", "words"),
+    [
+        # Thicknesses of 0.02 mm each: twice the uncertainty of the difference is 0.057 mm.
+        ({"thickness": 2.056e-3}, {}, None),
+        (
+            {"thickness": 2.058e-3},
+            {},
+            r"film thickness 2\.058 mm \(u 0\.02\) in the scan, 2 mm \(u 0",
+        ),
+        ({"thickness": 2.000001e-3, **EXACTLY}, EXACTLY, None),
+        ({"thickness": 2.00001e-3, **EXACTLY}, EXACTLY, r"2\.00001 mm \(u not stated\)"),
+        ({"poisson_ratio": 0.48}, {}, r"film Poisson's ratio 0\.48 \(u 0\.005\)"),
+        ({"young_modulus": 9e6}, {"law": "linear"}, None),
+        ({"young_modulus": 9e6}, RUBBER, r"film Young's modulus 9 MPa .*, 2\.2 MPa"),
+        ({}, RUBBER, None),
+        (
+            {"law": "linear"},
+            RUBBER,
+            'film law "linear" in the scan, "neo-hookean" in the reference',
+        ),
+        ({"radius": 0.255e-3}, {}, None),
+        ({"radius": 0.26e-3}, {}, r"rod radius 0\.26 mm"),
+        ({"rod_friction": np.inf}, {"friction_coefficient": 0.0}, None),
+        (
+            {"rod_friction": np.inf},
+            {"friction_coefficient": 0.0, **RUBBER},
+            "friction of the rod inf",
+        ),
+        ({"load": 0.5}, {"law": "linear"}, None),
+        ({"load": 0.5}, {"law": ""}, r"load 0\.5 N \(u not stated\) in .* law is not stated"),
+        ({"load": 0.5}, RUBBER, "whose law is neo-hookean"),
+        ({"load": 0.97, "load_uncertainty": 0.02}, RUBBER, None),
+        ({"normal_load": LOADS.normal_load}, {"law": "linear"}, None),
+        ({"normal_load": LOADS.normal_load}, RUBBER, r"load 0\.998 N"),
+        ({"normal_load": LOADS.normal_load, "load_uncertainty": 2e-3}, RUBBER, None),
+        ({}, {"film": None, "load": 1.01}, "load 1 N"),
+    ],
+)
 def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table, words) -> None:
     made = []
     for whole, values in ((SCAN, dict(scan)), (TABLE, dict(table))):
@@ -104,7 +120,8 @@ def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table
 
 
 def test_an_alternative_may_have_another_law_and_no_other_thickness() -> None:
-    scan, film = replace(SCAN, film=replace(FILM, law="linear")), replace(FILM, **RUBBER)
+    scan = replace(SCAN, film=replace(FILM, law="linear"))
+    film = replace(FILM, **RUBBER)
     other = replace(TABLE, film=film, friction_coefficient=np.inf)
     assert require_same_set_up([scan], [None], [other], override=False) == []
     with pytest.raises(InputError, match=r"film thickness .* in the alternative"):

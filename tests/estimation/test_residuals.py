@@ -40,7 +40,8 @@ def rejected_share_bounds(scans: int, level: float) -> tuple[float, float]:
 )
 def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) -> None:
     estimate = estimated(simulated(**options))
-    model, residuals = free_model(estimate), residuals_of(estimate)
+    model = free_model(estimate)
+    residuals = residuals_of(estimate)
     misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
     assert residuals.values @ residuals.values == pytest.approx(misfit @ misfit, rel=1e-6)
     assert residuals.degrees == model.data.size - model.design.shape[1]
@@ -148,7 +149,8 @@ def pure_error(scan: Scan) -> TestOutcome | None:
 @pytest.mark.parametrize("scatter", [0.0, 5e-6])
 def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
     """Where the stage comes to rest elsewhere each time, as well."""
-    scans, level = 150, 0.1
+    scans = 150
+    level = 0.1
     p_values = []
     fine = simulated(points=2001, noise=0.0)
     for seed in range(scans):
@@ -181,7 +183,8 @@ def test_the_pure_error_is_the_scatter_of_repeats() -> None:
 def disturbed(cause: str, noise: float = 0.003) -> Scan:
     """A scan with a fault that happens."""
     scan = simulated(noise=noise, points=97)
-    largest, place = scan.u_zz.max(), scan.x / scan.x.max()
+    largest = scan.u_zz.max()
+    place = scan.x / scan.x.max()
     if cause == "a bent baseline":
         return replace(scan, u_zz=scan.u_zz + 0.02 * largest * np.sin(4 * place))
     if cause == "a step of the baseline":

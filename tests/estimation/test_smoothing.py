@@ -17,7 +17,8 @@ DISC = memscal.SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
 
 def test_the_division_is_linear_in_the_voltages() -> None:
     smoothed = smooth_profile(estimated(simulated(noise=0.005)))
-    estimate, signal = smoothed.estimate, smoothed.signal
+    estimate = smoothed.estimate
+    signal = smoothed.signal
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
     weakest = (band.weakest_reference, band.weakest_voltage)
@@ -73,7 +74,8 @@ def test_a_scan_without_noise_is_its_own_profile(kernel: memscal.RadialKernel) -
     )
     # Beyond the scan the profile decays as the reference does, from 8 to 13 mm to a fraction.
     r = np.linspace(smoothed.estimate.distance.max(), 13e-3, 20)
-    profile, reference = smoothed.spectrum.at(r), smoothed.estimate.model.reference.at(r)
+    profile = smoothed.spectrum.at(r)
+    reference = smoothed.estimate.model.reference.at(r)
     assert abs(reference[-1]) < 0.5 * abs(reference[0])
     np.testing.assert_allclose(profile * reference[0] / profile[0], reference, rtol=0.05)
 
@@ -84,7 +86,8 @@ def test_repeats_and_both_sides_count_by_their_weights() -> None:
     errors = np.stack([scan.u_zz_errors] * 2)
     gain = smooth_profile(estimated(replace(scan, u_zz=mirrored, u_zz_errors=errors))).gain.dense()
     # At one distance, with one noise, every reading counts alike: repeats as well as sides.
-    left_and_right, readings = gain[:, :65], gain[:, 65:]
+    left_and_right = gain[:, :65]
+    readings = gain[:, 65:]
     atol = 1e-6 * np.abs(gain).max()
     np.testing.assert_allclose(left_and_right[:, ::-1], left_and_right, atol=atol)
     np.testing.assert_allclose(readings, left_and_right, atol=atol)

@@ -22,10 +22,19 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
     """Points anywhere on the plane, at a load of 2 N."""
     n = x.size
     return ScanPoints(
-        x=x, y=y, u=np.zeros(n), load=np.full(n, 2.0), u_errors=None, x_errors=np.zeros(n),
-        repeat=np.zeros(n, np.intp), branch=np.zeros(n, np.int64), scan=np.zeros(n, np.intp),
-        free=np.array([[True, True]]), missing=0, channel=channel,
-    )  # fmt: skip
+        x=x,
+        y=y,
+        u=np.zeros(n),
+        load=np.full(n, 2.0),
+        u_errors=None,
+        x_errors=np.zeros(n),
+        repeat=np.zeros(n, np.intp),
+        branch=np.zeros(n, np.int64),
+        scan=np.zeros(n, np.intp),
+        free=np.array([[True, True]]),
+        missing=0,
+        channel=channel,
+    )
 
 
 def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
@@ -82,10 +91,16 @@ def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
     # Away from the centre along the way to it: every distance grows in proportion to itself.
     slope = model.radial_derivative(model.geometry(centre), kernel) * model.geometry(centre).radius
     scaled = [
-        replace(model, points=replace(model.points, x=centre[0, 0] + s * (x - centre[0, 0]),
-                                      y=centre[0, 1] + s * (y - centre[0, 1])))
+        replace(
+            model,
+            points=replace(
+                model.points,
+                x=centre[0, 0] + s * (x - centre[0, 0]),
+                y=centre[0, 1] + s * (y - centre[0, 1]),
+            ),
+        )
         for s in (1 + 1e-4, 1 - 1e-4)
-    ]  # fmt: skip
+    ]
     wide, narrow = (m.signal(m.geometry(centre), kernel) for m in scaled)
     np.testing.assert_allclose(slope, (wide - narrow) / 2e-4, atol=1e-5 * np.abs(slope).max())
 

@@ -25,7 +25,8 @@ _WIDTH = 0.9e-3  # of the reference stress
 _PARTS = ((0.85, 0.50e-3), (0.15, 0.85e-3))  # G: two Gaussians, so that no single one is right
 _SIGMA = 0.561e-3
 _CONSTANT = 3.0e-8  # V/Pa
-_CENTRE, _BASELINE = 0.14e-3, 4.0e-5
+_CENTRE = 0.14e-3
+_BASELINE = 4.0e-5
 
 
 def voltage(r: Any, parts: tuple[tuple[float, float], ...]) -> Any:
@@ -43,7 +44,8 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
         xx, yy = np.meshgrid(x, x)
         r = np.hypot(xx - _CENTRE, yy).ravel()
         x = r if kind == "radii" else xx.ravel()
-    clean, single = voltage(r, _PARTS), voltage(r, ((1.0, _SIGMA),))
+    clean = voltage(r, _PARTS)
+    single = voltage(r, ((1.0, _SIGMA),))
     spread = noise * float(np.max(clean))
     u = clean + rng.normal(0.0, spread, r.size)
     plane: dict[str, Any] = {}
@@ -51,9 +53,14 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
         plane = {"offset_x": xx.ravel() - _CENTRE, "offset_y": yy.ravel()}
         plane |= {"load": np.full(r.size, _LOAD), "background": np.full(r.size, _BASELINE)}
     return Reconvolution(
-        x=x, u_zz=u, u_zz_errors=np.full(r.size, spread), u_zz_predicted=clean,
-        u_zz_gaussian=single, residual=u - clean, **plane,
-    )  # fmt: skip
+        x=x,
+        u_zz=u,
+        u_zz_errors=np.full(r.size, spread),
+        u_zz_predicted=clean,
+        u_zz_gaussian=single,
+        residual=u - clean,
+        **plane,
+    )
 
 
 def at_loads(scan: Reconvolution, loads: Sequence[float]) -> Reconvolution:
@@ -85,20 +92,30 @@ def transfer_function(resolved: float) -> TransferFunction:
 
 
 def build(
-    kind: str = "line", points: int = 65, *, noise: float = 0.005, seed: int = 1,
-    error: float = 0.03, ripple: float = 0.0, failed: int = 0, sensor: StressSensor | None = None,
+    kind: str = "line",
+    points: int = 65,
+    *,
+    noise: float = 0.005,
+    seed: int = 1,
+    error: float = 0.03,
+    ripple: float = 0.0,
+    failed: int = 0,
+    sensor: StressSensor | None = None,
     meaning: str = "The scan is not explained to within its noise.",
-    message: str = "1 outlier was down-weighted at x = 2.25 mm.", loads: Sequence[float] = (),
-) -> ApparatusData:  # fmt: skip
+    message: str = "1 outlier was down-weighted at x = 2.25 mm.",
+    loads: Sequence[float] = (),
+) -> ApparatusData:
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
     g = sum(w * unit_gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
     names = ("reconvolution", "symmetry", "tail_share", "resolved_band", "gaussian_misfit")
     values = {
-        "conversion_constant": (_CONSTANT, 1.3e-10), "gaussian_sigma": (_SIGMA, 3.4e-6),
-        "gaussian_sigma_deconvolved": (0.544e-3, 5.1e-6), "centre": (_CENTRE, 4.2e-6),
+        "conversion_constant": (_CONSTANT, 1.3e-10),
+        "gaussian_sigma": (_SIGMA, 3.4e-6),
+        "gaussian_sigma_deconvolved": (0.544e-3, 5.1e-6),
+        "centre": (_CENTRE, 4.2e-6),
         "baseline": (_BASELINE, 1.1e-6),
-    }  # fmt: skip
+    }
     if kind != "line":
         values["centre_y"] = (0.0, 4.4e-6)
     numbers, spreads = np.array(list(values.values())).T

@@ -113,7 +113,8 @@ def test_each_point_is_a_value_or_an_upper_limit_on_the_logarithmic_axis(make_ap
 
 def test_a_drift_is_taken_off_before_the_logarithm(make_apparatus, drawn):
     data = make_apparatus()
-    scan, known = data.reconvolution, data.parameters
+    scan = data.reconvolution
+    known = data.parameters
     tilt = 5e-4 * scan.x / 8e-3  # V: a tenth of the maximum at the scan's end
     names = ("u_zz", "u_zz_predicted", "u_zz_gaussian")
     scan = replace(scan, **{name: getattr(scan, name) + tilt for name in names})
@@ -121,7 +122,8 @@ def test_a_drift_is_taken_off_before_the_logarithm(make_apparatus, drawn):
         (*known.names, "drift"), np.append(known.values, 1e-3), np.diag(np.full(6, 1e-12))
     )
     figure = calibration_figure(replace(data, reconvolution=scan, parameters=more))
-    tilted, level = panels(figure)["scan_log"], panels(drawn())["scan_log"]
+    tilted = panels(figure)["scan_log"]
+    level = panels(drawn())["scan_log"]
     for label in ("reconvolved, G", "less than 2u"):
         np.testing.assert_allclose(line(tilted, label)[1], line(level, label)[1], rtol=1e-6)
 
@@ -184,7 +186,8 @@ def test_g_and_its_gaussian_differ_in_more_than_colour(make_apparatus, drawn):
         inside = radial.r <= r[-1] * 1e-3
         drawn = np.interp(radial.r[inside] * 1e3, r, g)
         np.testing.assert_allclose(drawn, samples[inside] / 1e6, atol=1e-4 * g.max())
-    deconvolved, fitted = curve(axes, "deconvolved G"), curve(axes, "Gaussian fit")
+    deconvolved = curve(axes, "deconvolved G")
+    fitted = curve(axes, "Gaussian fit")
     assert deconvolved.get_linestyle() != fitted.get_linestyle()
 
 

@@ -39,8 +39,11 @@ def test_one_contact_shows_its_tractions_and_its_base():
     normal = curve(base, colour, "-")
     r = np.asarray(normal.get_xdata()) * 1e-3
     np.testing.assert_allclose(normal.get_ydata(), contact.base_stress(r) * 1e-3)
-    places = {float(np.atleast_1d(line.get_xdata())[0]) for line in interface.lines if
-              np.size(line.get_xdata()) == 1}  # fmt: skip
+    places = {
+        float(np.atleast_1d(line.get_xdata())[0])
+        for line in interface.lines
+        if np.size(line.get_xdata()) == 1
+    }
     assert places >= {contact.contact_radius * 1e3, contact.stick_radius * 1e3}
 
 
@@ -91,7 +94,8 @@ def test_curves_are_the_designs_own(planned: Design):
 def test_less_noise_is_less_uncertainty_along_every_axis(planned: Design, vary):
     axes = design_figure(planned, vary=vary).axes[2]
     (sigma,) = (line for line in axes.lines if line.get_label() == "σ")
-    first, last = sigma.get_ydata()[0], sigma.get_ydata()[-1]
+    first = sigma.get_ydata()[0]
+    last = sigma.get_ydata()[-1]
     assert (last > first) == (vary == "step")
 
 

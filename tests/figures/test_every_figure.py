@@ -36,11 +36,17 @@ def fleet() -> FleetResults:
     values = 1e-4 * (1 + 0.01 * np.random.default_rng(1).normal(size=60))
     x, y = np.divmod(np.arange(60.0), 8)
     return FleetResults(
-        paths=[f"{i}.h5" for i in range(60)], conversion_constant=values, unit="mV/Pa",
-        conversion_constant_errors=0.01 * values, gaussian_sigma=5e3 * values,
-        gaussian_sigma_errors=50 * values, wafer_x=x, wafer_y=y,
-        failed={3: ("symmetry",)}, errors={7: ("InputError", "The scan has no point.")},
-    )  # fmt: skip
+        paths=[f"{i}.h5" for i in range(60)],
+        conversion_constant=values,
+        unit="mV/Pa",
+        conversion_constant_errors=0.01 * values,
+        gaussian_sigma=5e3 * values,
+        gaussian_sigma_errors=50 * values,
+        wafer_x=x,
+        wafer_y=y,
+        failed={3: ("symmetry",)},
+        errors={7: ("InputError", "The scan has no point.")},
+    )
 
 
 FIGURES: dict[str, Callable[..., Figure]] = {
@@ -60,7 +66,7 @@ FIGURES: dict[str, Callable[..., Figure]] = {
 } | {
     f"comparison {name}".strip(): lambda _, name=name: compared().plot(name=name)
     for name in OF_A_COMPARISON
-}  # fmt: skip
+}
 
 
 def contacts() -> list[memscal.Contact]:

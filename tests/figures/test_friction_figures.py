@@ -190,7 +190,8 @@ def test_an_open_interval_is_an_arrow_to_infinity_without_a_value():
 def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionComparison):
     axes = likelihood_figure(found).axes[0]
     curves = {line.get_label(): line for line in axes.lines}
-    one, joint = found.loads["incremental"][0], found.joint["dry"]["incremental"]
+    one = found.loads["incremental"][0]
+    joint = found.joint["dry"]["incremental"]
     for label, reading in (("0.34 N", one.by_profile), ("all loads", joint)):
         t, rise = (np.asarray(values) for values in curves[label].get_data())
         np.testing.assert_allclose(rise, reading.deviance - reading.least, atol=1e-9)

@@ -143,9 +143,11 @@ def test_every_table_has_a_caption_and_headers_with_a_scope(page):
 
 def test_hostile_strings_are_text_and_nothing_else(make_apparatus):
     data = make_apparatus(
-        sensor=StressSensor(name=_HOSTILE, model=_HOSTILE, channel=_HOSTILE), meaning=_HOSTILE,
-        failed=1, message=_HOSTILE,
-    )  # fmt: skip
+        sensor=StressSensor(name=_HOSTILE, model=_HOSTILE, channel=_HOSTILE),
+        meaning=_HOSTILE,
+        failed=1,
+        message=_HOSTILE,
+    )
     object.__setattr__(data.process, "configuration", {_HOSTILE: _HOSTILE})
     page = page_of(data)
     assert page.open == []

@@ -19,11 +19,14 @@ def test_a_png_has_its_signature_and_at_least_150_dots_per_inch(drawn):
     assert height >= 150 * figure.get_figheight()
 
 
-@pytest.mark.parametrize(("file_format", "start", "end"), [
-    ("png", b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"),
-    ("svg", b"<?xml", b"</svg>\n"),
-    ("pdf", b"%PDF-", b"%%EOF\n"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("file_format", "start", "end"),
+    [
+        ("png", b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"),
+        ("svg", b"<?xml", b"</svg>\n"),
+        ("pdf", b"%PDF-", b"%%EOF\n"),
+    ],
+)
 def test_a_file_begins_and_ends_as_its_kind_and_holds_no_date(drawn, file_format, start, end):
     data = render_figure(drawn(), file_format)
     assert data.startswith(start)

@@ -38,7 +38,8 @@ def test_the_median_of_the_draws_is_drawn_and_every_draw_is_a_dot():
 
 @pytest.mark.parametrize("tail", [1e6, 50.0, -1e6])
 def test_a_wild_draw_goes_to_the_edge_is_counted_and_leaves_the_axis_alone(tail):
-    calm, figure = sweep_figure(make_sweep()).axes[0], sweep_figure(make_sweep(tail=tail))
+    calm = sweep_figure(make_sweep()).axes[0]
+    figure = sweep_figure(make_sweep(tail=tail))
     wild = figure.axes[0]
     assert np.ptp(wild.get_ylim()) < 3 * np.ptp(calm.get_ylim())
     note = wild.get_title(loc="right")

@@ -57,10 +57,17 @@ def test_a_new_file_holds_the_bytes_and_nothing_else_is_left(
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "open", "replace"])
-@pytest.mark.parametrize(("code", "cure"), [
-    (errno.ENOSPC, "Free some space"), (errno.EROFS, "read-only"), (errno.EACCES, "may write"),
-    (errno.EDQUOT, "quota"), (errno.EIO, "another folder"),
-], ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("code", "cure"),
+    [
+        (errno.ENOSPC, "Free some space"),
+        (errno.EROFS, "read-only"),
+        (errno.EACCES, "may write"),
+        (errno.EDQUOT, "quota"),
+        (errno.EIO, "another folder"),
+    ],
+    ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"],
+)
 def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
     target: Path, monkeypatch: pytest.MonkeyPatch, call, code, cure
 ):
@@ -144,10 +151,15 @@ def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path: Path):
         assert_refused(path, "not a regular file")
 
 
-@pytest.mark.parametrize(("name", "words"), [
-    ("missing/out.h5", "Create the folder"), ("file/out.h5", "a file, not a folder"),
-    ("a" * 300, "shorter name"), ("", "not the name"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("missing/out.h5", "Create the folder"),
+        ("file/out.h5", "a file, not a folder"),
+        ("a" * 300, "shorter name"),
+        ("", "not the name"),
+    ],
+)
 def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path: Path, name, words):
     (tmp_path / "file").write_bytes(b"")
     assert_refused(str(tmp_path / name) if name else "", words)
@@ -159,10 +171,14 @@ def test_a_folder_in_which_nothing_can_be_made_is_refused_before_the_work():
     assert caught.value.exit_code == 4
 
 
-@pytest.mark.parametrize(("call", "code", "cure"), [
-    ("write", errno.ENOSPC, "Free some space"), ("fsync", errno.ENOSPC, "Free some space"),
-    ("open", errno.EROFS, "read-only"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "code", "cure"),
+    [
+        ("write", errno.ENOSPC, "Free some space"),
+        ("fsync", errno.ENOSPC, "Free some space"),
+        ("open", errno.EROFS, "read-only"),
+    ],
+)
 def test_a_disk_that_refuses_is_found_before_the_work(target: Path, monkeypatch, call, code, cure):
     with monkeypatch.context() as patch:
         patch.setattr(os, call, fail_with(code))
@@ -201,7 +217,8 @@ def test_files_that_are_written_together_are_all_new_or_all_as_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hard_links, failing
 ):
     """Every rename in turn fails; without hard links the message says which file is new."""
-    paths, rename = three(tmp_path), os.replace
+    paths = three(tmp_path)
+    rename = os.replace
 
     def replace(source: Path, target: Path) -> None:
         if Path(target).name == failing:

@@ -24,14 +24,20 @@ KEY = table_key({"load": 0.34})
 
 def table(values: int = 3) -> dict[str, FloatArray]:
     rng = np.random.default_rng(1)
-    whole, part = (values, 2, 64), (values, 2)
+    whole = (values, 2, 64)
+    part = (values, 2)
     return {
-        "value": np.append(np.arange(values - 1) / 3, np.inf), "load": np.array([0.34, 2.75]),
-        "k": np.linspace(1.0, 1e4, 64), "spectra": rng.normal(size=whole),
-        "by_load": rng.normal(size=whole), "change_thickness": rng.normal(size=whole),
-        "change_poisson_ratio": rng.normal(size=whole), "depths": np.full(part, np.nan),
-        "contact_radii": rng.normal(size=part), "convergence": rng.normal(size=part),
-    }  # fmt: skip
+        "value": np.append(np.arange(values - 1) / 3, np.inf),
+        "load": np.array([0.34, 2.75]),
+        "k": np.linspace(1.0, 1e4, 64),
+        "spectra": rng.normal(size=whole),
+        "by_load": rng.normal(size=whole),
+        "change_thickness": rng.normal(size=whole),
+        "change_poisson_ratio": rng.normal(size=whole),
+        "depths": np.full(part, np.nan),
+        "contact_radii": rng.normal(size=part),
+        "convergence": rng.normal(size=part),
+    }
 
 
 def entry(folder: Path, key: str = KEY) -> Path:
@@ -64,7 +70,8 @@ def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, sh
 
 def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path):
     keep_contact_table(tmp_path, KEY, table())
-    data, one = entry(tmp_path).read_bytes(), table()
+    data = entry(tmp_path).read_bytes()
+    one = table()
     for place in np.linspace(0, len(data) - 1, 60).astype(int):
         changed = bytearray(data)
         changed[place] ^= 0xFF

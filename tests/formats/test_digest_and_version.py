@@ -94,8 +94,10 @@ ADDITIONS = {
     "artifact": ["sample/film/roughness_rms", "instrument/stress_sensor/serial_number"],
 }
 READERS: dict[str, Any] = {
-    "scan": read_scan, "reference": read_reference, "artifact": load_apparatus,
-}  # fmt: skip
+    "scan": read_scan,
+    "reference": read_reference,
+    "artifact": load_apparatus,
+}
 
 
 @pytest.mark.parametrize(("kind", "path"), [(k, p) for k, of in ADDITIONS.items() for p in of])
@@ -176,10 +178,13 @@ def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, vers
     assert versioned(version).load == 1.0
 
 
-@pytest.mark.parametrize(("path", "change", "message"), [
-    ("/entry/radial_covariance/r", lambda r: 1.5 * r, "differs from /entry/radial_profile/r"),
-    ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("path", "change", "message"),
+    [
+        ("/entry/radial_covariance/r", lambda r: 1.5 * r, "differs from /entry/radial_profile/r"),
+        ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
+    ],
+)
 def test_arrays_that_do_not_fit_each_other_are_refused(artifact: Path, path, change, message):
     with h5py.File(artifact, "r+") as file:
         values = change(file[path][()])

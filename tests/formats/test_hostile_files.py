@@ -73,9 +73,12 @@ def edited(path: Path) -> Edit:
 def run_sweep(path: Path, sweep: str) -> tuple[int, int]:
     """Run a sweep over damaged copies; return how many were read and how many refused."""
     done = subprocess.run(
-        [sys.executable, "-c", sweep, str(path)], capture_output=True, text=True, timeout=300,
+        [sys.executable, "-c", sweep, str(path)],
+        capture_output=True,
+        text=True,
+        timeout=300,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     read, refused = map(int, done.stdout.split())
     return read, refused
@@ -121,29 +124,51 @@ def test_external_storage_is_refused_and_the_other_file_stays_unread(edited: Edi
     assert secret.stat().st_atime_ns == before
 
 
-@pytest.mark.parametrize(("make", "words"), [
-    (lambda g: g.__setitem__("u_zz", h5py.SoftLink("/entry/data/x")), "link"),
-    (lambda g: g.create_dataset("u_zz", (2**45,), "f8", chunks=(1024,)),
-     "claims 281,474,976,710,656 bytes"),
-    (lambda g: g.create_dataset("u_zz", (2**40, 2**22), "f8", chunks=(1, 1024)), "claims"),
-    (lambda g: g.create_dataset("u_zz", (1,), "f8", maxshape=(None,), chunks=(2**26,)),
-     "chunks of 536,870,912 bytes"),
-    (lambda g: g.create_dataset("u_zz", (2**23,), "f8", chunks=(1,)), "8,388,608 chunks"),
-    (lambda g: g.create_dataset("u_zz", (33,), "f8"), "never written"),
-    (lambda g: g.create_dataset("u_zz", (33,), "f8", chunks=(11,)), "never written"),
-    (lambda g: g.create_dataset("u_zz", data=[g.ref] * 3, dtype=h5py.ref_dtype), "references"),
-    (lambda g: g.create_dataset("u_zz", data=h5py.Empty("f8")), "null dataspace"),
-], ids=["link", "256 TiB", "overflow", "huge chunk", "many chunks", "unwritten", "unwritten chunks",
-        "references", "null"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda g: g.__setitem__("u_zz", h5py.SoftLink("/entry/data/x")), "link"),
+        (
+            lambda g: g.create_dataset("u_zz", (2**45,), "f8", chunks=(1024,)),
+            "claims 281,474,976,710,656 bytes",
+        ),
+        (lambda g: g.create_dataset("u_zz", (2**40, 2**22), "f8", chunks=(1, 1024)), "claims"),
+        (
+            lambda g: g.create_dataset("u_zz", (1,), "f8", maxshape=(None,), chunks=(2**26,)),
+            "chunks of 536,870,912 bytes",
+        ),
+        (lambda g: g.create_dataset("u_zz", (2**23,), "f8", chunks=(1,)), "8,388,608 chunks"),
+        (lambda g: g.create_dataset("u_zz", (33,), "f8"), "never written"),
+        (lambda g: g.create_dataset("u_zz", (33,), "f8", chunks=(11,)), "never written"),
+        (lambda g: g.create_dataset("u_zz", data=[g.ref] * 3, dtype=h5py.ref_dtype), "references"),
+        (lambda g: g.create_dataset("u_zz", data=h5py.Empty("f8")), "null dataspace"),
+    ],
+    ids=[
+        "link",
+        "256 TiB",
+        "overflow",
+        "huge chunk",
+        "many chunks",
+        "unwritten",
+        "unwritten chunks",
+        "references",
+        "null",
+    ],
+)
 def test_a_dataset_that_cannot_be_read_safely_is_refused(edited: Edit, make, words):
     path = edited(make)
     assert path.stat().st_size < 2**20
     assert_refused_cheaply(path, words)
 
 
-@pytest.mark.parametrize("filters", [
-    {"compression": "gzip"}, {"compression": "gzip", "shuffle": True, "fletcher32": True},
-], ids=["gzip", "all"])  # fmt: skip
+@pytest.mark.parametrize(
+    "filters",
+    [
+        {"compression": "gzip"},
+        {"compression": "gzip", "shuffle": True, "fletcher32": True},
+    ],
+    ids=["gzip", "all"],
+)
 @pytest.mark.parametrize("number", [2**25, 1023, 0])
 def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited: Edit, filters, number):
     """HDF5 unpacks all of it: of half a megabyte 562 MB were held, and the file passed."""
@@ -168,7 +193,8 @@ def test_a_packed_chunk_is_read_whatever_the_order_of_its_filters(edited: Edit, 
         for name, code in codes.items():
             options = {"deflate": (6,), "shuffle": (8,)}.get(name, ())
             plist.set_filter(code, h5py.h5z.FLAG_MANDATORY, options)
-        space, kind = h5py.h5s.create_simple((33,)), h5py.h5t.NATIVE_DOUBLE
+        space = h5py.h5s.create_simple((33,))
+        kind = h5py.h5t.NATIVE_DOUBLE
         dataset = h5py.Dataset(h5py.h5d.create(group.id, b"u_zz", kind, space, plist))
         dataset[:] = np.arange(33.0)
         return dataset
@@ -188,7 +214,8 @@ def test_numbers_of_one_byte_count_as_they_are_held(edited: Edit):
 
 def test_chunks_that_are_larger_than_their_array_are_refused_in_sum(edited: Edit):
     def make(group: h5py.Group) -> h5py.Dataset:
-        shape, chunks = (4096, 1), (1, 2**17)
+        shape = (4096, 1)
+        chunks = (1, 2**17)
         return group.create_dataset("u_zz", shape, "f8", chunks=chunks, maxshape=(None, None))
 
     assert_refused_cheaply(edited(make), "chunks of 4,294,967,296 bytes")
@@ -203,7 +230,8 @@ def test_records_of_attributes_that_are_forged_by_the_thousand_are_not_all_follo
             file.attrs[f"further_{i}"] = "y"
         for name, value in ours.attrs.items():
             file.attrs[name] = value
-    good, forged = copy.read_bytes(), b"\3\0\17\0\x10\0\x10\0\0memscal_schema\0"
+    good = copy.read_bytes()
+    forged = b"\3\0\17\0\x10\0\x10\0\0memscal_schema\0"
     path.write_bytes(good + forged * 10_000)
     with pytest.raises(FormatError, match="more namesakes than can be checked"):
         read_scan(path)
@@ -217,10 +245,14 @@ def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):
     assert_refused_cheaply(edited(lambda g: g.create_virtual_dataset("u_zz", layout)), "virtual")
 
 
-@pytest.mark.parametrize(("code", "options", "times", "words"), [
-    (h5py.h5z.FILTER_DEFLATE, (9,), 2, "gzip more than once"),
-    (h5py.h5z.FILTER_LZF, (), 1, f"filter {h5py.h5z.FILTER_LZF}"), (32015, (), 1, "filter 32015"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("code", "options", "times", "words"),
+    [
+        (h5py.h5z.FILTER_DEFLATE, (9,), 2, "gzip more than once"),
+        (h5py.h5z.FILTER_LZF, (), 1, f"filter {h5py.h5z.FILTER_LZF}"),
+        (32015, (), 1, "filter 32015"),
+    ],
+)
 def test_filters_that_expand_twice_or_load_foreign_code_are_refused(
     edited: Edit, code, options, times, words
 ):
@@ -230,17 +262,26 @@ def test_filters_that_expand_twice_or_load_foreign_code_are_refused(
         plist.set_chunk((2**20,))
         for _ in range(times):
             plist.set_filter(code, h5py.h5z.FLAG_OPTIONAL, options)
-        space, kind = h5py.h5s.create_simple((2**20,)), h5py.h5t.NATIVE_DOUBLE
+        space = h5py.h5s.create_simple((2**20,))
+        kind = h5py.h5t.NATIVE_DOUBLE
         return h5py.Dataset(h5py.h5d.create(group.id, b"u_zz", kind, space, plist))
 
     assert_refused_cheaply(edited(low_level), words)
 
 
-@pytest.mark.parametrize(("dtype", "value"), [
-    (h5py.vlen_dtype(np.float64), np.zeros(2**10)), (h5py.string_dtype(), "text"),
-    (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)), (np.dtype("c16"), 1j),
-    (np.dtype("S8"), b"text"), (np.dtype("V8"), b"12345678"), (h5py.enum_dtype({"a": 1}), 1),
-], ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("dtype", "value"),
+    [
+        (h5py.vlen_dtype(np.float64), np.zeros(2**10)),
+        (h5py.string_dtype(), "text"),
+        (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)),
+        (np.dtype("c16"), 1j),
+        (np.dtype("S8"), b"text"),
+        (np.dtype("V8"), b"12345678"),
+        (h5py.enum_dtype({"a": 1}), 1),
+    ],
+    ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"],
+)
 def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype, value):
     def make(group: h5py.Group) -> Any:
         dataset = group.create_dataset("u_zz", (2**16,), dtype)  # a bomb, were it to be expanded
@@ -271,10 +312,17 @@ def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
         read_scan(edited(make))
 
 
-@pytest.mark.parametrize("value", [
-    h5py.Empty("f8"), np.array([b"mm"] * 100), np.array([[b"m", b"V"], [b"m", b"V"]]),
-    np.array([h5py.Reference()], dtype=h5py.ref_dtype), b"m" * 60_000,
-], ids=["null", "many", "table", "reference", "long"])  # fmt: skip
+@pytest.mark.parametrize(
+    "value",
+    [
+        h5py.Empty("f8"),
+        np.array([b"mm"] * 100),
+        np.array([[b"m", b"V"], [b"m", b"V"]]),
+        np.array([h5py.Reference()], dtype=h5py.ref_dtype),
+        b"m" * 60_000,
+    ],
+    ids=["null", "many", "table", "reference", "long"],
+)
 def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value):
     path = edited(lambda g: g.create_dataset("u_zz", data=np.zeros(33)))
     with h5py.File(path, "r+") as file:

@@ -64,12 +64,17 @@ def refused(path: Path, words="cannot be read", kind: type[MemscalError] = Forma
     return str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "document_type"), [
-    ("film.vtu", f"<!DOCTYPE a [{BOMB}]>"), ("film.xdmf", f"<!DOCTYPE a [{BOMB}]>"),
-    ("film.vtu", '<!DOCTYPE a [<!ENTITY e11 SYSTEM "{}">]>'),
-    ("film.xdmf", '<!DOCTYPE a [<!ENTITY % e SYSTEM "{}"> %e;]>'),
-    ("film.vtu", '<!DOCTYPE a SYSTEM "{}">'),
-], ids=["laughs", "laughs", "file", "parameter", "document type"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "document_type"),
+    [
+        ("film.vtu", f"<!DOCTYPE a [{BOMB}]>"),
+        ("film.xdmf", f"<!DOCTYPE a [{BOMB}]>"),
+        ("film.vtu", '<!DOCTYPE a [<!ENTITY e11 SYSTEM "{}">]>'),
+        ("film.xdmf", '<!DOCTYPE a [<!ENTITY % e SYSTEM "{}"> %e;]>'),
+        ("film.vtu", '<!DOCTYPE a SYSTEM "{}">'),
+    ],
+    ids=["laughs", "laughs", "file", "parameter", "document type"],
+)
 def test_entities_neither_grow_nor_open_a_file(tmp_path: Path, name, document_type):
     (tmp_path / "other").write_text('<!ENTITY e11 "a secret">')
     path = tmp_path / name
@@ -114,7 +119,8 @@ def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path: Path
 def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    path, folder = small(tmp_path / "film.vtk"), tmp_path / "temporary"
+    path = small(tmp_path / "film.vtk")
+    folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     run = subprocess.run
@@ -134,13 +140,16 @@ def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
         read_mesh(path)
 
 
-@pytest.mark.parametrize(("section_name", "options"), [
-    ("POINTS", {"binary": True, "fmt_version": "5.1"}),
-    ("POINTS", {"binary": False, "fmt_version": "4.2"}),
-    ("CELLS", {"binary": True, "fmt_version": "5.1"}),
-    ("CELLS", {"binary": False, "fmt_version": "5.1"}),
-    ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("section_name", "options"),
+    [
+        ("POINTS", {"binary": True, "fmt_version": "5.1"}),
+        ("POINTS", {"binary": False, "fmt_version": "4.2"}),
+        ("CELLS", {"binary": True, "fmt_version": "5.1"}),
+        ("CELLS", {"binary": False, "fmt_version": "5.1"}),
+        ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
+    ],
+)
 def test_a_count_beyond_the_files_size_is_refused(tmp_path: Path, section_name, options):
     path = small(tmp_path / "film.vtk", **options)
     head, name, rest = path.read_bytes().partition(section_name.encode() + b" ")
@@ -179,10 +188,17 @@ def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets):
     refused(path, "cannot be read|a cell without nodes")
 
 
-@pytest.mark.parametrize("address", [
-    "/etc/passwd:/data1", "../film.h5:/data1", "other.h5:/data1", "film.xdmf:/data1",
-    "<!-- -->other.h5:/data1", "<![CDATA[/other/film.h5:/data9]]>",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "address",
+    [
+        "/etc/passwd:/data1",
+        "../film.h5:/data1",
+        "other.h5:/data1",
+        "film.xdmf:/data1",
+        "<!-- -->other.h5:/data1",
+        "<![CDATA[/other/film.h5:/data9]]>",
+    ],
+)
 def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path: Path, address):
     path = edited(small(tmp_path / "film.xdmf"), "film.h5:/data1", address)
     with h5py.File(tmp_path / "film.h5", "r") as file, h5py.File(tmp_path / "other.h5", "w") as to:
@@ -355,14 +371,22 @@ def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
     secret.write_text("a secret")
     monkeypatch.setenv("A_SECRET", "a secret")
     actions = [
-        f"open({str(secret)!r})", f"os.open({str(secret)!r}, os.O_RDONLY)",
-        f"np.fromfile({str(secret)!r}, np.uint8)", f"os.remove({str(secret)!r})",
-        "open('more', 'w')", "open(os.path.join(np.__path__[0], 'version.py'), 'a')",
-        "socket.socket().connect(('127.0.0.1', 9))", "subprocess.run(['true'])",
-        "os.system('true')", "os.fork()", "os.execv('/bin/true', ['true'])",
-        "os.kill(os.getppid(), 0)", "ctypes.CDLL(None)", "pickle.loads(b'cos\\nsystem\\n.')",
+        f"open({str(secret)!r})",
+        f"os.open({str(secret)!r}, os.O_RDONLY)",
+        f"np.fromfile({str(secret)!r}, np.uint8)",
+        f"os.remove({str(secret)!r})",
+        "open('more', 'w')",
+        "open(os.path.join(np.__path__[0], 'version.py'), 'a')",
+        "socket.socket().connect(('127.0.0.1', 9))",
+        "subprocess.run(['true'])",
+        "os.system('true')",
+        "os.fork()",
+        "os.execv('/bin/true', ['true'])",
+        "os.kill(os.getppid(), 0)",
+        "ctypes.CDLL(None)",
+        "pickle.loads(b'cos\\nsystem\\n.')",
         "os.environ['A_SECRET']",
-    ]  # fmt: skip
+    ]
     path = hostile(
         f"for action in {actions!r}:\n"
         "    try:\n        exec(action)\n"

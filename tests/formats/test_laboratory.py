@@ -30,29 +30,33 @@ def test_the_shipped_file_has_every_mandatory_key_and_says_that_names_are_placeh
     assert len(read_laboratory(SHIPPED).equipment) == 3
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("[laboratories]\nname = 'a'", "Did you mean laboratory?"),
-    ("[sensor]\nserial_number = '1'", "Did you mean serial?"),
-    ("[decision]\ngaussian_sigm = {lower = 1, unit = 'mm'}", "Did you mean gaussian_sigma?"),
-    ("[laboratory]\nname = 5", "[laboratory] name is 5, but should be text"),
-    ("[laboratory]\nname = ' '", "should be text"),
-    ("[laboratory]\ncountry = 'France'", "two capital letters"),
-    ("[laboratory]\nprefix = 'a\"<b'", "up to 40 letters"),
-    ("[decision]\nrule = 'lenient'", '"guarded acceptance"'),
-    ("[decision]\ncentre = {lower = 2, upper = 1, unit = 'mm'}", "lower below the upper"),
-    ("[decision]\ncentre = {unit = 'mm'}", "should be limits"),
-    ("[decision]\nguard_band = '1'", "should be a number"), ("customer = 1", "as a table"),
-    ("[conditions]\ntemperature = 23.0", "a table of value, unit, uncertainty"),
-    ("[conditions]\ntemperature = {value = 23.0, unit = 'mm'}", "must be a temperature"),
-    ("[conditions]\ntemperature = {value = 23.0, unit = 'degC', u = 1}", "uncertainty"),
-    ("[conditions]\nhumidity = {value = 45, unit = '%', uncertainty = -1}", "u not negative"),
-    ("[conditions]\nhumidity = {value = nan, unit = '%'}", "should be a number"),
-    ("[conditions]\nstart_time = 'noon'", "2026-11-20T09:30:00+01:00"),
-    ("[[equipment]]\nname = 'a'\ndate = 2026-01-01T10:00:00", "be a date"),
-    ("[[equipment]]\nkind = 'stage'\n[[equipment]]\nkind = 'stage'", "more than one stage"),
-    ("[equipment]\nname = 'a'", "[[equipment]]"),
-    ("[sensor\n", "no TOML"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[laboratories]\nname = 'a'", "Did you mean laboratory?"),
+        ("[sensor]\nserial_number = '1'", "Did you mean serial?"),
+        ("[decision]\ngaussian_sigm = {lower = 1, unit = 'mm'}", "Did you mean gaussian_sigma?"),
+        ("[laboratory]\nname = 5", "[laboratory] name is 5, but should be text"),
+        ("[laboratory]\nname = ' '", "should be text"),
+        ("[laboratory]\ncountry = 'France'", "two capital letters"),
+        ("[laboratory]\nprefix = 'a\"<b'", "up to 40 letters"),
+        ("[decision]\nrule = 'lenient'", '"guarded acceptance"'),
+        ("[decision]\ncentre = {lower = 2, upper = 1, unit = 'mm'}", "lower below the upper"),
+        ("[decision]\ncentre = {unit = 'mm'}", "should be limits"),
+        ("[decision]\nguard_band = '1'", "should be a number"),
+        ("customer = 1", "as a table"),
+        ("[conditions]\ntemperature = 23.0", "a table of value, unit, uncertainty"),
+        ("[conditions]\ntemperature = {value = 23.0, unit = 'mm'}", "must be a temperature"),
+        ("[conditions]\ntemperature = {value = 23.0, unit = 'degC', u = 1}", "uncertainty"),
+        ("[conditions]\nhumidity = {value = 45, unit = '%', uncertainty = -1}", "u not negative"),
+        ("[conditions]\nhumidity = {value = nan, unit = '%'}", "should be a number"),
+        ("[conditions]\nstart_time = 'noon'", "2026-11-20T09:30:00+01:00"),
+        ("[[equipment]]\nname = 'a'\ndate = 2026-01-01T10:00:00", "be a date"),
+        ("[[equipment]]\nkind = 'stage'\n[[equipment]]\nkind = 'stage'", "more than one stage"),
+        ("[equipment]\nname = 'a'", "[[equipment]]"),
+        ("[sensor\n", "no TOML"),
+    ],
+)
 def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path: Path, text: str, words: str):
     with pytest.raises(MemscalError) as refusal:
         read_laboratory(written(tmp_path, text))
@@ -75,7 +79,8 @@ IMPORT = [
 
 def imported(folder: Path, *options: str) -> int:
     """Import a simulated scan from a table with the shipped file; return the exit code."""
-    scan, table = memscal.simulate(seed=1), folder / "scan.csv"
+    scan = memscal.simulate(seed=1)
+    table = folder / "scan.csv"
     lines = [f"{x * 1e3},{u * 1e3}" for x, u in zip(scan.x, scan.u_zz, strict=True)]
     table.write_text("\n".join(["x,U", *lines]), encoding="utf-8")
     given = [*IMPORT, "-o", str(folder / "scan.h5"), "--lab", str(SHIPPED), *options]
@@ -84,7 +89,8 @@ def imported(folder: Path, *options: str) -> int:
 
 def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_path: Path):
     assert imported(tmp_path) == 0
-    scan, artifact = tmp_path / "scan.h5", tmp_path / "artifact.h5"
+    scan = tmp_path / "scan.h5"
+    artifact = tmp_path / "artifact.h5"
     memscal.calibrate(scan).apparatus.save(artifact)
     for held in (memscal.read_scan(scan), memscal.load_apparatus(artifact)):
         assert held.sensor.serial_number == "SN-PLACEHOLDER-1"

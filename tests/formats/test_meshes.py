@@ -159,7 +159,8 @@ def test_a_film_hanging_from_its_base_has_its_shear_turned(tmp_path: Path):
 
 def test_what_lies_below_the_base_of_the_film_is_left_out(tmp_path: Path):
     """Film and substrate share no nodes where the radial stress jumps, as programs save it."""
-    film, substrate = section(), section(heights=np.linspace(-1.0, 0.0, 3))
+    film = section()
+    substrate = section(heights=np.linspace(-1.0, 0.0, 3))
     count = len(film.points)
     mesh = meshio.Mesh(
         np.concatenate([film.points, substrate.points]),
@@ -203,11 +204,15 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Pa
     assert any("39 nodes repeat a radius" in note.text for note in found.notes)
 
 
-@pytest.mark.parametrize(("x", "y", "centre"), [
-    (np.linspace(0, 8, 41), np.linspace(0, 8, 41), (0.0, 0.0)),
-    (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
-    (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
-], ids=["quarter", "whole", "half, off the centre"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("x", "y", "centre"),
+    [
+        (np.linspace(0, 8, 41), np.linspace(0, 8, 41), (0.0, 0.0)),
+        (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
+        (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
+    ],
+    ids=["quarter", "whole", "half, off the centre"],
+)
 def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x, y, centre):
     """Linear interpolation on squares of 0.2 mm costs at most 0.2² / 4 of the curvature."""
     place = (1e-3 * centre[0], 1e-3 * centre[1]) if any(centre) else None
@@ -232,20 +237,24 @@ def test_circles_about_a_wrong_centre_are_seen_in_the_notes(tmp_path: Path):
 def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
     """Quadratic triangles, which meshio writes and another reader of ours finds."""
     fine = np.linspace(0.0, 8.0, 21)
-    flat, quads = np.array(np.meshgrid(fine, HEIGHTS, indexing="ij")).reshape(2, -1).T, []
+    flat = np.array(np.meshgrid(fine, HEIGHTS, indexing="ij")).reshape(2, -1).T
+    quads = []
     for i in range(20):
         for j in range(3):
-            a, b = 4 * i + j, 4 * i + j + 1
+            a = 4 * i + j
+            b = 4 * i + j + 1
             quads += [(a, a + 4, b + 4), (a, b + 4, b)]
     corners = np.array(quads)
     middles = [(flat[corners[:, a]] + flat[corners[:, b]]) / 2 for a, b in QUADRATIC]
     nodes = np.round(np.concatenate([flat[corners.T.ravel()], *middles]), 12)
     points, index = np.unique(nodes, axis=0, return_inverse=True)
     mesh = FieldMesh(
-        points=1e-3 * points, triangles=index.reshape(6, -1).T, displacement=1e-6 * points,
+        points=1e-3 * points,
+        triangles=index.reshape(6, -1).T,
+        displacement=1e-6 * points,
         stress=1e6 * tensor(*points.T),
         notes="A film -- with a -->comment<!-- in its notes, E = 2.2 MPa ---",
-    )  # fmt: skip
+    )
     write_mesh(mesh, tmp_path / "film.vtu")
     assert_is_the_section(imported(tmp_path / "film.vtu", "stress_Pa", sigma_unit="Pa"))
     again = meshio.vtu.read(tmp_path / "film.vtu")
@@ -258,7 +267,8 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
 
 def test_what_was_taken_for_what_stays_with_the_profile(tmp_path: Path):
     path = saved(section(), tmp_path / "film.vtu")
-    film, rod = make_film(), Rod(radius=0.25e-3)
+    film = make_film()
+    rod = Rod(radius=0.25e-3)
     found = imported(path, film=film, indenter=rod, solver="a program")
     write_reference(found.profile, tmp_path / "rod.h5")
     again = read_reference(tmp_path / "rod.h5")
@@ -310,17 +320,20 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path: Path):
         imported(path, "S33", shear="C33")
 
 
-@pytest.mark.parametrize(("mesh", "options", "words"), [
-    (section(), {"base": 0.1e-3}, "nearest node is at 0 mm"),
-    (section(heights=[0.0, 1.0]), {"vertical": "x"}, "Only 2 nodes"),
-    (section(), {"centre": (0.0, 0.0)}, "--centre"),
-    (section(radii=np.linspace(-8, 8, 41)), {}, "negative radius"),
-    (block(RADII, RADII), {"shear": "S33"}, "sections only"),
-    (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
-    (section(radii=RADII[:3]), {}, "Only 3 nodes"),
-    (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
-    (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("mesh", "options", "words"),
+    [
+        (section(), {"base": 0.1e-3}, "nearest node is at 0 mm"),
+        (section(heights=[0.0, 1.0]), {"vertical": "x"}, "Only 2 nodes"),
+        (section(), {"centre": (0.0, 0.0)}, "--centre"),
+        (section(radii=np.linspace(-8, 8, 41)), {}, "negative radius"),
+        (block(RADII, RADII), {"shear": "S33"}, "sections only"),
+        (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
+        (section(radii=RADII[:3]), {}, "Only 3 nodes"),
+        (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
+        (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
+    ],
+)
 def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path: Path, mesh, options, words):
     path = saved(mesh, tmp_path / "film.vtk")
     with pytest.raises(InputError, match=words) as caught:

@@ -43,7 +43,8 @@ def path(kind: str, tmp_path: Path) -> Path:
 
 def items(path: Path) -> tuple[list[str], dict[str, Any]]:
     """Return the paths of all groups, and of all datasets with shape and attributes."""
-    groups, datasets = ["/"], {}
+    groups = ["/"]
+    datasets = {}
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Group):

@@ -30,21 +30,28 @@ from memscal.model.stress import StressProfile
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 @pytest.mark.parametrize("direction", ["x", "y"])
 def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
-    path, plain = tmp_path / "scan.h5", make_scan(kind)
+    path = tmp_path / "scan.h5"
+    plain = make_scan(kind)
     film = dataclasses.replace(plain.film, name="film A")
     count = np.arange(plain.u_zz.size).reshape(plain.u_zz.shape)
     errors = np.where(count % 33 == 4, np.nan, 0.02 * plain.normal_load * (1 + count))
     order = np.arange(count.size if kind == "raster" else 33)
     scan = dataclasses.replace(
-        plain, x_errors=np.linspace(1e-6, 2e-6, 33), position_scale_uncertainty=2e-3,
-        u_zz_correlation=0.5 ** np.abs(np.subtract.outer(order, order)), branch=count % 3,
-        film=film, normal_load_errors=errors, lubrication="lubricated", lubricant="glycerol, 99 %",
+        plain,
+        x_errors=np.linspace(1e-6, 2e-6, 33),
+        position_scale_uncertainty=2e-3,
+        u_zz_correlation=0.5 ** np.abs(np.subtract.outer(order, order)),
+        branch=count % 3,
+        film=film,
+        normal_load_errors=errors,
+        lubrication="lubricated",
+        lubricant="glycerol, 99 %",
         direction="x" if kind == "raster" else direction,
         # Points of direction y are a line, the repeats of which are numbered.
         y=None if (kind, direction) == ("points", "y") else plain.y,
         # The reference's own film has no name of its own: it is the scan's.
         reference=dataclasses.replace(plain.reference, film=film),
-    )  # fmt: skip
+    )
     write_scan(scan, path)
     found = read_scan(path)
     assert_same(found, scan, but=("source",))
@@ -64,10 +71,14 @@ SPHERE = Sphere(radius=128.8e-3, radius_uncertainty=1e-5)
 ABSENT = "sigma_rz depth contact_radius stick_radius friction_coefficient film indenter convergence"
 
 
-@pytest.mark.parametrize("profile", [
-    make_profile(indenter=SPHERE, notes="Two\nlines, é"),
-    make_profile(**dict.fromkeys(ABSENT.split()), loading="", solver="", discretisation=""),
-], ids=["whole", "only a table"])  # fmt: skip
+@pytest.mark.parametrize(
+    "profile",
+    [
+        make_profile(indenter=SPHERE, notes="Two\nlines, é"),
+        make_profile(**dict.fromkeys(ABSENT.split()), loading="", solver="", discretisation=""),
+    ],
+    ids=["whole", "only a table"],
+)
 def test_a_reference_comes_back(tmp_path: Path, profile: StressProfile):
     write_reference(profile, tmp_path / "a.h5")
     assert_same(read_reference(tmp_path / "a.h5"), profile, but=("source",))
@@ -105,7 +116,8 @@ def test_a_covariance_between_different_units_comes_back(tmp_path: Path):
 
 
 def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path: Path):
-    values, covariance = np.array([2.0]), np.eye(1)
+    values = np.array([2.0])
+    covariance = np.eye(1)
     unnamed = make_artifact(parameters=ParameterSet(("tilt",), values, covariance), budget={})
     with pytest.raises(InputError, match=r"unit of tilt(.|\n)*units="):
         write_artifact(unnamed, tmp_path / "a.h5")
@@ -150,15 +162,22 @@ def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp
 
 
 MESH = FieldMesh(
-    points=[[0, 0], [1, 0], [0, 1]], triangles=[[0, 1, 2]], displacement=np.zeros((3, 2)),
+    points=[[0, 0], [1, 0], [0, 1]],
+    triangles=[[0, 1, 2]],
+    displacement=np.zeros((3, 2)),
     stress=np.zeros((3, 4)),
-)  # fmt: skip
+)
 
 
-@pytest.mark.parametrize(("write", "thing"), [
-    (write_scan, make_scan()), (write_reference, make_profile()), (write_artifact, make_artifact()),
-    (write_mesh, MESH),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("write", "thing"),
+    [
+        (write_scan, make_scan()),
+        (write_reference, make_profile()),
+        (write_artifact, make_artifact()),
+        (write_mesh, MESH),
+    ],
+)
 def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path: Path, write, thing):
     path = tmp_path / "a.h5"
     path.write_bytes(b"years of work")
@@ -239,29 +258,56 @@ def test_a_scan_of_another_program_is_read_in_its_own_units(tmp_path: Path):
 FILM = "/entry/sample/film"
 
 
-@pytest.mark.parametrize(("path", "value", "units", "error", "words"), [
-    *((path, None, None, FormatError, f": {path} is missing") for path in (
-        "/entry/data/x", "/entry/data/u_zz", "/entry/indenter/radius",
-        "/entry/indenter/shape", f"{FILM}/young_modulus", f"{FILM}/poisson_ratio",
-        f"{FILM}/thickness",
-    )),
-    *((path, ..., units, UnitError, f": {path}(.|\n)*{words}") for path, units, words in (
-        ("/entry/data/x", "mV", "length"), ("/entry/data/x", "parsnip", "unknown"),
-        ("/entry/data/u_zz", "parsnip", "unknown"), ("/entry/indenter/load", "kg", "force"),
-        (f"{FILM}/young_modulus", "N", "stress"), (f"{FILM}/poisson_ratio", "mm", "dimensionless"),
-        ("/entry/data/x", None, "has no unit"), ("/entry/indenter/load", None, "has no unit"),
-    )),
-    (f"{FILM}/law", "rubber", None, InputError,
-     f": {FILM}: .*rubber(.|\n)*linear, neo-hookean, mooney-rivlin"),
-    ("/entry/indenter/friction_coefficient", 0.3, None, InputError,
-     ": /entry/indenter/friction_coefficient: .*0.3(.|\n)*Give 0 or inf"),
-    ("/entry/indenter/load", 0.0, "N", InputError, ".*load"),
-    (f"{FILM}/thickness", -1.0, "mm", InputError, ".*thickness"),
-    ("/entry/data/x", [0.0, 1.0], "mm", InputError, ".*u_zz has shape"),
-    ("/entry/data/x", [0.0, np.nan, 1.0], "mm", InputError, ".*finite"),
-    ("/entry/data/branch", [0, 1, 7], "1", InputError, ".*/entry/data/branch holds 7"),
-    ("/entry/indenter/shape", "cone", "1", InputError, '.*/entry/indenter/shape is "cone"'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("path", "value", "units", "error", "words"),
+    [
+        *(
+            (path, None, None, FormatError, f": {path} is missing")
+            for path in (
+                "/entry/data/x",
+                "/entry/data/u_zz",
+                "/entry/indenter/radius",
+                "/entry/indenter/shape",
+                f"{FILM}/young_modulus",
+                f"{FILM}/poisson_ratio",
+                f"{FILM}/thickness",
+            )
+        ),
+        *(
+            (path, ..., units, UnitError, f": {path}(.|\n)*{words}")
+            for path, units, words in (
+                ("/entry/data/x", "mV", "length"),
+                ("/entry/data/x", "parsnip", "unknown"),
+                ("/entry/data/u_zz", "parsnip", "unknown"),
+                ("/entry/indenter/load", "kg", "force"),
+                (f"{FILM}/young_modulus", "N", "stress"),
+                (f"{FILM}/poisson_ratio", "mm", "dimensionless"),
+                ("/entry/data/x", None, "has no unit"),
+                ("/entry/indenter/load", None, "has no unit"),
+            )
+        ),
+        (
+            f"{FILM}/law",
+            "rubber",
+            None,
+            InputError,
+            f": {FILM}: .*rubber(.|\n)*linear, neo-hookean, mooney-rivlin",
+        ),
+        (
+            "/entry/indenter/friction_coefficient",
+            0.3,
+            None,
+            InputError,
+            ": /entry/indenter/friction_coefficient: .*0.3(.|\n)*Give 0 or inf",
+        ),
+        ("/entry/indenter/load", 0.0, "N", InputError, ".*load"),
+        (f"{FILM}/thickness", -1.0, "mm", InputError, ".*thickness"),
+        ("/entry/data/x", [0.0, 1.0], "mm", InputError, ".*u_zz has shape"),
+        ("/entry/data/x", [0.0, np.nan, 1.0], "mm", InputError, ".*finite"),
+        ("/entry/data/branch", [0, 1, 7], "1", InputError, ".*/entry/data/branch holds 7"),
+        ("/entry/indenter/shape", "cone", "1", InputError, '.*/entry/indenter/shape is "cone"'),
+    ],
+)
 def test_what_is_missing_or_wrong_is_named_by_file_and_path(
     tmp_path: Path, path, value, units, error, words
 ):

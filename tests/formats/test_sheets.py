@@ -18,7 +18,8 @@ import memscal
 from memscal.errors import FormatError, InputError
 from memscal.formats.tables import sheets
 
-X, U = [-8.0, 0.0, 8.0], [0.1, 2.0, 0.2]
+X = [-8.0, 0.0, 8.0]
+U = [0.1, 2.0, 0.2]
 
 
 def workbook(path: Path) -> Path:
@@ -61,21 +62,28 @@ FAR = b'<row r="1"><c r="A1"><v>1</v></c></row><row r="999999999"><c r="A1"><v>1
 DOCTYPE = b'<!DOCTYPE a [<!ENTITY b "bb">]>' + SHEET % b"&b;"
 
 
-@pytest.mark.parametrize(("xml", "words"), [
-    (SHEET % (b" " * 2**20), "1,0.* bytes when it is unpacked"),
-    (SHEET % (b"<c/>" * 1001), "tags of XML in its sheets"),
-    (SHEET % FAR, "has 1,001 cells"),
-    (SHEET % b"".join(b'<row><c r="XFD%d"/></row>' % i for i in range(9)), "cells"),
-    (DOCTYPE, "declarations"), ((SHEET % b"").decode().encode("utf-16"), "encoding"),
-    (b'<?xml version="1.0" encoding="cp037"?>' + SHEET % b"", "encoding"), (b"<a", "cannot be"),
-], ids=["size", "tags", "rows", "columns", "entities", "utf-16", "ebcdic", "damaged"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("xml", "words"),
+    [
+        (SHEET % (b" " * 2**20), "1,0.* bytes when it is unpacked"),
+        (SHEET % (b"<c/>" * 1001), "tags of XML in its sheets"),
+        (SHEET % FAR, "has 1,001 cells"),
+        (SHEET % b"".join(b'<row><c r="XFD%d"/></row>' % i for i in range(9)), "cells"),
+        (DOCTYPE, "declarations"),
+        ((SHEET % b"").decode().encode("utf-16"), "encoding"),
+        (b'<?xml version="1.0" encoding="cp037"?>' + SHEET % b"", "encoding"),
+        (b"<a", "cannot be"),
+    ],
+    ids=["size", "tags", "rows", "columns", "entities", "utf-16", "ebcdic", "damaged"],
+)
 def test_a_hostile_workbook_is_refused_before_it_takes_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, xml, words
 ):
     limits = {"MOST_TAGS": 1000, "MOST_OTHER_TAGS": 1000, "MOST_FILE_BYTES": 2**20}
     for name, limit in limits.items():
         monkeypatch.setattr(sheets, name, limit)
-    plain, book = io.BytesIO(), openpyxl.Workbook()
+    plain = io.BytesIO()
+    book = openpyxl.Workbook()
     book.save(plain)
     path = tmp_path / "hostile.xlsx"
     with zipfile.ZipFile(plain) as source, zipfile.ZipFile(path, "w") as target:
@@ -103,10 +111,15 @@ def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
         memscal.import_table(tmp_path / "no.parquet", x="x", u="u")
 
 
-@pytest.mark.parametrize("frame", [
-    pd.DataFrame({"x/mm": X, "U (mV)": U}), {"x [mm]": X, "U [mV]": np.array(U)},
-    pd.DataFrame({"x/mm": ["-8,0", "0", "8"], "U (mV)": ["0,1", "2", "0,2"]}),
-], ids=["data frame", "mapping", "text with decimal commas"])  # fmt: skip
+@pytest.mark.parametrize(
+    "frame",
+    [
+        pd.DataFrame({"x/mm": X, "U (mV)": U}),
+        {"x [mm]": X, "U [mV]": np.array(U)},
+        pd.DataFrame({"x/mm": ["-8,0", "0", "8"], "U (mV)": ["0,1", "2", "0,2"]}),
+    ],
+    ids=["data frame", "mapping", "text with decimal commas"],
+)
 def test_columns_in_memory_are_a_table(frame: Any):
     scan = memscal.import_table(frame, x="x", u="U", load=1.0)
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3], rtol=1e-15)
@@ -134,11 +147,15 @@ def test_scans_are_made_of_arrays_in_any_units():
         memscal.Scan.from_arrays(X, U, repeat=[1, 2])
 
 
-@pytest.mark.parametrize(("name", "options", "words"), [
-    ("a.xlsx", {"delimiter": ";"}, "delimiter.* no effect on a workbook"),
-    ("a.parquet", {"skip_rows": 2}, "--skip-rows.* no effect on a Parquet"),
-    ("a.csv", {"sheet": "A"}, "--sheet.* no effect on a text"), ("a.ods", {}, r"\.xlsx or as CSV"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("a.xlsx", {"delimiter": ";"}, "delimiter.* no effect on a workbook"),
+        ("a.parquet", {"skip_rows": 2}, "--skip-rows.* no effect on a Parquet"),
+        ("a.csv", {"sheet": "A"}, "--sheet.* no effect on a text"),
+        ("a.ods", {}, r"\.xlsx or as CSV"),
+    ],
+)
 def test_an_option_that_a_kind_of_table_has_no_use_for_is_refused(name, options, words):
     with pytest.raises(InputError, match=words):
         memscal.import_table(name, x="x", u="u", **options)

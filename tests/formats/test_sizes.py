@@ -56,10 +56,13 @@ ROWS = st.one_of(
 
 @settings(max_examples=200)
 @given(
-    table=st.lists(ROWS, max_size=30), delimiter=st.sampled_from(";,\t| "),
-    decimal=st.sampled_from(".,"), end=st.sampled_from(["\n", "\r\n", "\r"]),
-    encoding=st.sampled_from(["utf-8", "latin-1"]), names=st.sampled_from(["xun", "u"]),
-)  # fmt: skip
+    table=st.lists(ROWS, max_size=30),
+    delimiter=st.sampled_from(";,\t| "),
+    decimal=st.sampled_from(".,"),
+    end=st.sampled_from(["\n", "\r\n", "\r"]),
+    encoding=st.sampled_from(["utf-8", "latin-1"]),
+    names=st.sampled_from(["xun", "u"]),
+)
 def test_blocks_give_what_the_whole_table_gives(
     tmp_path_factory: pytest.TempPathFactory, table, delimiter, decimal, end, encoding, names
 ):
@@ -129,16 +132,22 @@ def test_places_along_a_line_are_those_along_the_same_line_in_the_plane(monkeypa
     passes = np.repeat(np.arange(30), 40)
     along = np.tile(np.arange(40) * 1e-4, 30) + rng.normal(0, 1e-6, passes.size)
     shuffled = rng.permutation(passes.size)
-    along, passes = along[shuffled], passes[shuffled]
+    along = along[shuffled]
+    passes = passes[shuffled]
     line = places_of(along, np.zeros_like(along), passes)
     plane = places_of(0.6 * along, 0.8 * along, passes)
     assert line.count == 40
     np.testing.assert_array_equal(line.index, plane.index)
 
 
-@pytest.mark.parametrize(("line", "words"), [
-    (";,\t|" * 900_000, "900,001 columns"), ("# a comment", "holds no table"),
-], ids=["endless lines", "comments"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (";,\t|" * 900_000, "900,001 columns"),
+        ("# a comment", "holds no table"),
+    ],
+    ids=["endless lines", "comments"],
+)
 def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line, words):
     """Of 40 MB of endless lines 838 MB were held: all of them were cut into cells at once."""
     path = tmp_path / "t.csv"
@@ -173,11 +182,13 @@ def test_a_contact_of_too_many_points_does_nothing():
     scan = memscal.simulate(points=2001)
     band = np.outer(np.ones(2001), [1.0, 0.2])
     band[-1, 1] = 0
-    correlated, large = replace(scan, u_zz_correlation=band), memscal.simulate(points=100_001)
+    correlated = replace(scan, u_zz_correlation=band)
+    large = memscal.simulate(points=100_001)
     for measured, wrong in (
-        (memscal.measure_stress, large), (memscal.restore, large),
+        (memscal.measure_stress, large),
+        (memscal.restore, large),
         (memscal.measure_stress, correlated),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InputError, match=rf"{wrong.x.size:,} points of one load(.|\n)*Average"):
             measured(wrong, apparatus)
     assert memscal.restore(correlated, apparatus).points.u.size == 2001
@@ -188,14 +199,16 @@ def went_on(*_: Any, **__: Any) -> None:
 
 
 def test_a_comparison_of_too_many_points_does_nothing(monkeypatch: pytest.MonkeyPatch):
-    apparatus, ones = made.known_apparatus(), np.ones(len(made.LOADS))
+    apparatus = made.known_apparatus()
+    ones = np.ones(len(made.LOADS))
     none = dict.fromkeys(("u_zz_errors", "x_errors", "normal_load_errors"))
     plain: Any = replace(made.contact_scan(), **none)
     monkeypatch.setattr(compare_module, "measure_stress", went_on)
 
     def refused(count: int, words: str, **options: Any) -> None:
         x = np.linspace(-5e-3, 5e-3, count)
-        u, load = np.outer(ones, np.exp(-(x**2) / 1e-6)), np.outer(made.LOADS, np.ones(count))
+        u = np.outer(ones, np.exp(-(x**2) / 1e-6))
+        load = np.outer(made.LOADS, np.ones(count))
         correlation = np.eye(count) if options.pop("correlated", False) else None
         scan = replace(plain, x=x, u_zz=u, normal_load=load, u_zz_correlation=correlation)
         with pytest.raises(InputError, match=rf"{words}(.|\n)*Average"):
@@ -215,15 +228,19 @@ def test_a_file_of_too_many_points_is_refused_before_its_arrays_are_read(tmp_pat
         memscal.calibrate(tmp_path / "scan.h5")
 
 
-@pytest.mark.parametrize(("limit", "words"), [
-    ("MOST_OF_LINES", "130 points on lines, but at most 129"),
-    ("MOST_OF_RASTER", "1,089 points in a plane, but at most 129"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        ("MOST_OF_LINES", "130 points on lines, but at most 129"),
+        ("MOST_OF_RASTER", "1,089 points in a plane, but at most 129"),
+    ],
+)
 def test_a_calibration_of_too_many_points_does_nothing(monkeypatch, limit, words):
     scans: Any = [memscal.simulate(points=65, seed=seed) for seed in (1, 2)]
     if limit == "MOST_OF_RASTER":
         axis = np.linspace(-4e-3, 4e-3, 33)
-        film, rod = make_film(), memscal.Rod(radius=0.25e-3)
+        film = make_film()
+        rod = memscal.Rod(radius=0.25e-3)
         u = np.exp(-np.add.outer(axis**2, axis**2) / 1e-6)
         scans = memscal.Scan(x=axis, y=axis, u_zz=u, load=1.0, film=film, indenter=rod)
     monkeypatch.setattr(points, limit, 129)

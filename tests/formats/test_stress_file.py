@@ -45,11 +45,16 @@ SCANS = tuple(
 def make_points(n: int, rng: np.random.Generator, channel: str) -> MeasuredPoints:
     normal = channel == "zz"
     return MeasuredPoints(
-        x=rng.normal(0, 1e-3, n), y=np.zeros(n), u=rng.normal(0, 1e-3, n),
-        noise=rng.uniform(1e-6, 1e-5, n) if normal else None, weight=rng.uniform(0, 1, n),
-        load=rng.uniform(0.5, 1.5, n), load_errors=rng.uniform(0, 0.01, n),
-        x_errors=rng.uniform(0, 1e-5, n), correlation=np.eye(n) if normal else None,
-    )  # fmt: skip
+        x=rng.normal(0, 1e-3, n),
+        y=np.zeros(n),
+        u=rng.normal(0, 1e-3, n),
+        noise=rng.uniform(1e-6, 1e-5, n) if normal else None,
+        weight=rng.uniform(0, 1, n),
+        load=rng.uniform(0.5, 1.5, n),
+        load_errors=rng.uniform(0, 0.01, n),
+        x_errors=rng.uniform(0, 1e-5, n),
+        correlation=np.eye(n) if normal else None,
+    )
 
 
 def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfile:
@@ -58,16 +63,27 @@ def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfi
     r = np.sort(np.abs(x))
     root = rng.normal(size=(n, n))
     made: dict[str, Any] = {
-        "scan": SCANS[1], "load": load, "load_uncertainty": 0.01 * load, "r": r, "x": x, "y": 0 * x,
+        "scan": SCANS[1],
+        "load": load,
+        "load_uncertainty": 0.01 * load,
+        "r": r,
+        "x": x,
+        "y": 0 * x,
         "s_zz": 1e5 * load * np.exp(-(r**2) / 1e-6),
         "roots": {"noise": 100 * np.abs(root[0]), "centre": 10.0 * root[:, :2]},
-        "force": 1.01 * load, "force_budget": {"scan": 0.003, "apparatus": 0.004},
-        "maximum": 1e5 * load, "maximum_budget": {"noise": 120.0},
-        "centre": np.array([1.23456789e-4, 0.0]), "centre_uncertainty": np.array([1e-5 / 3, 0.0]),
-        "baseline": 1e-5 / 7, "baseline_uncertainty": 1e-7 / 3, "contact_radius": 2e-3 / 3,
-        "curve_r": np.linspace(0, r[-1], 11), "curve_s_zz": np.linspace(1e5, 0, 11) / 3,
+        "force": 1.01 * load,
+        "force_budget": {"scan": 0.003, "apparatus": 0.004},
+        "maximum": 1e5 * load,
+        "maximum_budget": {"noise": 120.0},
+        "centre": np.array([1.23456789e-4, 0.0]),
+        "centre_uncertainty": np.array([1e-5 / 3, 0.0]),
+        "baseline": 1e-5 / 7,
+        "baseline_uncertainty": 1e-7 / 3,
+        "contact_radius": 2e-3 / 3,
+        "curve_r": np.linspace(0, r[-1], 11),
+        "curve_s_zz": np.linspace(1e5, 0, 11) / 3,
         "points": {name: make_points(2 * n, rng, name) for name in ("zz", "xz")},
-    }  # fmt: skip
+    }
     return MeasuredProfile(**(made | fields))
 
 
@@ -103,10 +119,16 @@ def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path: Path):
     assert len(repr(found)) < 200
 
 
-@pytest.mark.parametrize("change", [
-    {"force": 1.0}, {"scan": replace(SCANS[1], synthetic=True)}, {"points": {}},
-    {"roots": {"noise": np.eye(9)}}, {"s_zz": np.full(9, np.nan)},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"force": 1.0},
+        {"scan": replace(SCANS[1], synthetic=True)},
+        {"points": {}},
+        {"roots": {"noise": np.eye(9)}},
+        {"s_zz": np.full(9, np.nan)},
+    ],
+)
 def test_stress_that_differs_anywhere_is_not_equal(change):
     first, second = make_stress().profiles
     other = replace(second, **change)

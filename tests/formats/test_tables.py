@@ -43,10 +43,14 @@ def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
     assert any("3 readings at 3 places" in note.text for note in found.messages)
 
 
-@pytest.mark.parametrize("text", [
-    "x,u,n\n0,1,4\n1,2,4\n3,4,4\n3,4.4,7\n1,2.2,7\n0,1.1,7\n",
-    "x,u,n\n3,4.4,7\n0,1,4\n1,2.2,7\n1,2,4\n0,1.1,7\n3,4,4\n",
-], ids=["forth and back", "mixed"])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x,u,n\n0,1,4\n1,2,4\n3,4,4\n3,4.4,7\n1,2.2,7\n0,1.1,7\n",
+        "x,u,n\n3,4.4,7\n0,1,4\n1,2.2,7\n1,2,4\n0,1.1,7\n3,4,4\n",
+    ],
+    ids=["forth and back", "mixed"],
+)
 def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
     found = scan_table(tmp_path, text, repeat="n")
     assert found.kind == "repeats"
@@ -57,11 +61,15 @@ def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
     assert any("6 readings in 2 repeats at 3 places" in note.text for note in found.messages)
 
 
-@pytest.mark.parametrize("text", [
-    "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n",
-    "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n",
-    "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n0,4.4,2\n",
-], ids=["scattered positions", "a row that is missing", "a position read twice"])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n",
+        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n",
+        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n0,4.4,2\n",
+    ],
+    ids=["scattered positions", "a row that is missing", "a position read twice"],
+)
 def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text):
     found = scan_table(tmp_path, text, repeat="n")
     stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
@@ -123,14 +131,17 @@ TWO_ROWS = "x,u\n0,1\n1,2\n"
 NO_TABLES = ("", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0")
 
 
-@pytest.mark.parametrize(("text", "options", "words"), [
-    *((TWO_ROWS, {"u": column}, r"columns are: x, u\.") for column in ("volts", "0", "3", -1)),
-    *((TWO_ROWS, {"u_unit": unit}, f'"{unit}"') for unit in ("parsnip", "degC", "9/")),
-    (TWO_ROWS, {"u_unit": None}, r"column 'u' states no unit(.|\n)*--u-unit"),
-    (TWO_ROWS, {"load": None, "load_scatter": 0.1}, "no load"),
-    *((text, {}, r"table\.csv") for text in NO_TABLES),
-    ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        *((TWO_ROWS, {"u": column}, r"columns are: x, u\.") for column in ("volts", "0", "3", -1)),
+        *((TWO_ROWS, {"u_unit": unit}, f'"{unit}"') for unit in ("parsnip", "degC", "9/")),
+        (TWO_ROWS, {"u_unit": None}, r"column 'u' states no unit(.|\n)*--u-unit"),
+        (TWO_ROWS, {"load": None, "load_scatter": 0.1}, "no load"),
+        *((text, {}, r"table\.csv") for text in NO_TABLES),
+        ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
+    ],
+)
 def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
     with pytest.raises(InputError, match=words):
         scan_table(tmp_path, text, **options)
@@ -228,22 +239,29 @@ def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, enco
     np.testing.assert_allclose(scan.x, [-8e-3, -7e-3, 0, 8e-3])
     np.testing.assert_allclose(scan.u_zz, [100.5e-6, np.nan, np.nan, 200e-6])
     for words in (
-        "The table says: Last;1,0;N\n", "header is line 5, a row of units below it",
-        "u_zz in µV, x in um", "u_zz is missing (NaN) in lines 8, 10.",
+        "The table says: Last;1,0;N\n",
+        "header is line 5, a row of units below it",
+        "u_zz in µV, x in um",
+        "u_zz is missing (NaN) in lines 8, 10.",
         "Left out, for they have no position: line 9.",
-    ):  # fmt: skip
+    ):
         assert words in scan.notes, scan.notes
     if mark:
         assert scan.source.sha256 == hashlib.sha256(mark + content).hexdigest()
 
 
-@pytest.mark.parametrize(("text", "options"), [
-    ("Rate;10\nLoad;1,0\nx;u\n0,5;1,25\n1,5;2,5\n", {}), ("x u\n0,5 1,25\n1,5 2,5\n", {}),
-    ("# rod\n# x/mm u/mV\n0.5 1.25\n1.5 2.5\n", {"x_unit": None, "u_unit": None}),
-    ("7,8\n9,9\nx,u\n0.5,1.25\n1.5,2.5\n", {"skip_rows": 2}),
-    ("t,x,u\n12:01,0.5,1.25\n12:02,1.5,2.5\n", {}),
-    ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
-], ids=["pairs", "decimal comma", "savetxt", "skip", "time", "units"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("Rate;10\nLoad;1,0\nx;u\n0,5;1,25\n1,5;2,5\n", {}),
+        ("x u\n0,5 1,25\n1,5 2,5\n", {}),
+        ("# rod\n# x/mm u/mV\n0.5 1.25\n1.5 2.5\n", {"x_unit": None, "u_unit": None}),
+        ("7,8\n9,9\nx,u\n0.5,1.25\n1.5,2.5\n", {"skip_rows": 2}),
+        ("t,x,u\n12:01,0.5,1.25\n12:02,1.5,2.5\n", {}),
+        ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
+    ],
+    ids=["pairs", "decimal comma", "savetxt", "skip", "time", "units"],
+)
 def test_the_header_is_found_below_what_stands_above_it(tmp_path: Path, text, options):
     scan = scan_table(tmp_path, text, film=None, **options)
     np.testing.assert_allclose(scan.x, [0.5e-3, 1.5e-3])
@@ -296,9 +314,14 @@ def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tm
     np.testing.assert_allclose(scan_table(tmp_path, text, noise=0.04).u_zz_errors, np.full(3, 4e-5))
 
 
-@pytest.mark.parametrize(("options", "direction"), [
-    ({"x": "b", "y": "a"}, "y"), ({"x": "a", "y": "b"}, "x"), ({"x": None, "y": "a"}, "y"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "direction"),
+    [
+        ({"x": "b", "y": "a"}, "y"),
+        ({"x": "a", "y": "b"}, "x"),
+        ({"x": None, "y": "a"}, "y"),
+    ],
+)
 def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path: Path, options, direction):
     scan = scan_table(tmp_path, "a,b,u\n-2,5.001,1\n0,5,2\n3,4.999,1\n", **options)
     assert (scan.kind, scan.direction) == ("line", direction)
@@ -317,10 +340,14 @@ def test_positions_are_held_against_film_and_rod_and_the_unit_is_named(tmp_path:
     assert "Young's modulus (2.20 ± 0.10) MPa" in scan.notes
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"thickness": 1.5}, "1.5 m. Probably 1.5 mm was meant"), ({"thickness": 2e3}, "2000 um"),
-    ({"young_modulus": 1.8}, "Young's modulus is 1.8 Pa. Probably 1.8 MPa was meant"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"thickness": 1.5}, "1.5 m. Probably 1.5 mm was meant"),
+        ({"thickness": 2e3}, "2000 um"),
+        ({"young_modulus": 1.8}, "Young's modulus is 1.8 Pa. Probably 1.8 MPa was meant"),
+    ],
+)
 def test_a_film_that_none_has_is_warned_of_with_the_unit_that_was_meant(changes, words):
     with pytest.warns(UnitWarning, match=words):
         Scan(x=[0, 1e-3], u_zz=[0, 1], film=make_film(**changes))

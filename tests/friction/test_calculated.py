@@ -45,13 +45,17 @@ def normal(law: str) -> Build:
     )
 
 
-@pytest.mark.parametrize(("build", "grid", "between"), [
-    (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
-    (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
-    (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
-    (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-    (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-], ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("build", "grid", "between"),
+    [
+        (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
+        (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
+        (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
+        (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+        (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+    ],
+    ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
+)
 def test_interpolated_profiles_are_those_of_contacts_solved_between(build, grid, between) -> None:
     family = build(FILM, SPHERE, list(LOADS), list(grid))
     solved = build(FILM, SPHERE, list(LOADS), between)
@@ -80,9 +84,11 @@ CASES = {
     "greenwood-tripp": (normal("greenwood-tripp"), list(LENGTHS), 3.64e-6),
 }
 UNCERTAIN_FILM = replace(
-    FILM, young_modulus_uncertainty=0.01 * FILM.young_modulus,
-    thickness_uncertainty=0.01 * FILM.thickness, poisson_ratio_uncertainty=0.01,
-)  # fmt: skip
+    FILM,
+    young_modulus_uncertainty=0.01 * FILM.young_modulus,
+    thickness_uncertainty=0.01 * FILM.thickness,
+    poisson_ratio_uncertainty=0.01,
+)
 UNCERTAIN_SPHERE = replace(SPHERE, radius_uncertainty=0.01 * SPHERE.radius)
 
 
@@ -99,7 +105,9 @@ def with_a_changed(source: str, share: float) -> tuple[ElasticFilm, Sphere]:
 
 @pytest.mark.parametrize("case", CASES)
 def test_sensitivities_are_the_differences_of_contacts_with_other_properties(case: str) -> None:
-    (build, grid, value), load, step = CASES[case], 1.37, 0.004
+    (build, grid, value) = CASES[case]
+    load = 1.37
+    step = 0.004
     family = build(UNCERTAIN_FILM, UNCERTAIN_SPHERE, [load], grid)
     member = family.at(value)
     for source in ("young_modulus", "thickness", "indenter_radius"):
@@ -110,7 +118,8 @@ def test_sensitivities_are_the_differences_of_contacts_with_other_properties(cas
         found = stress(family, member.changes[source][0])
         assert np.max(np.abs(found - truth)) < 0.03 * np.max(np.abs(truth)), source
     expected = UNCERTAIN_FILM.expected
-    nu, u = expected.poisson_ratio, expected.poisson_ratio_uncertainty or 0.0
+    nu = expected.poisson_ratio
+    u = expected.poisson_ratio_uncertainty or 0.0
     softer, at, stiffer = (
         build(replace(FILM, poisson_ratio=nu + d), SPHERE, [load], [value]).spectra[0]
         for d in (-u, 0.0, u)
@@ -122,7 +131,9 @@ def test_sensitivities_are_the_differences_of_contacts_with_other_properties(cas
 
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_by_the_load_are_those_of_nearer_neighbours(case: str) -> None:
-    (build, _, value), load, step = CASES[case], 1.37, 0.005
+    (build, _, value) = CASES[case]
+    load = 1.37
+    step = 0.005
     family = build(FILM, SPHERE, [load], [value])
     near = build(FILM, SPHERE, [load * (1 - step), load * (1 + step)], [value]).spectra[0]
     truth = (near[1:] - near[:1]) / math.log((1 + step) / (1 - step))

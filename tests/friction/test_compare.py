@@ -41,9 +41,13 @@ def found(
     made: Experiment, apparatus: memscal.ApparatusFunction, kept: Path
 ) -> memscal.FrictionComparison:
     return memscal.compare(
-        [made.dry, made.lubricated], apparatus, friction=FRICTION, macroscopic=1.6,
-        macroscopic_uncertainty=0.1, cache=kept,
-    )  # fmt: skip
+        [made.dry, made.lubricated],
+        apparatus,
+        friction=FRICTION,
+        macroscopic=1.6,
+        macroscopic_uncertainty=0.1,
+        cache=kept,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -186,13 +190,17 @@ def test_scans_of_different_films_or_spheres_are_refused(made, apparatus) -> Non
         memscal.compare([made.lubricated, replace(made.dry, film=film)], apparatus)
 
 
-@pytest.mark.parametrize(("options", "words"), [
-    ({"friction": [0.2]}, "nothing to choose from"), ({"loading": ()}, "No loading"),
-    ({"loading": "sideways"}, "sideways"),
-    ({"interface": True}, "macroscopic friction coefficient is not given"),
-    ({"macroscopic_uncertainty": 0.1}, "macroscopic friction coefficient is not given"),
-    ({"macroscopic": -0.1}, "macroscopic"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"friction": [0.2]}, "nothing to choose from"),
+        ({"loading": ()}, "No loading"),
+        ({"loading": "sideways"}, "sideways"),
+        ({"interface": True}, "macroscopic friction coefficient is not given"),
+        ({"macroscopic_uncertainty": 0.1}, "macroscopic friction coefficient is not given"),
+        ({"macroscopic": -0.1}, "macroscopic"),
+    ],
+)
 def test_options_that_make_no_sense_are_refused(made, apparatus, options, words) -> None:
     with pytest.raises(InputError, match=words):
         memscal.compare(made.lubricated, apparatus, **options)
@@ -236,7 +244,8 @@ def test_an_error_of_the_film_that_sensor_and_contact_share_counts_once(
     made, apparatus, families
 ) -> None:
     # A film that is thicker than stated: the calibration's A G and the contacts err together.
-    family, film = families["incremental"], made.dry.film
+    family = families["incremental"]
+    film = made.dry.film
     sensor = sensor_of(apparatus, family, 8e-3, [made.dry])
     assert set(sensor.shared) == {"young_modulus", "thickness", "poisson_ratio"}
     points = load_points(memscal.measure_stress(made.dry, apparatus).profiles[0])

@@ -78,9 +78,13 @@ def test_more_freedom_is_charged_by_occams_factor() -> None:
     assert lost[0] < lost[1] < 0
 
 
-@pytest.mark.parametrize(("compared", "bound"), [
-    (lambda: weighed("rigid", math.inf), 5e-6), (lambda: normal(yielding(), 0.0), math.inf),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("compared", "bound"),
+    [
+        (lambda: weighed("rigid", math.inf), 5e-6),
+        (lambda: normal(yielding(), 0.0), math.inf),
+    ],
+)
 def test_a_rigid_interface_gives_an_upper_bound_of_the_length(compared, bound) -> None:
     found = compared()
     assert not found.yielding_preferred
@@ -116,7 +120,8 @@ def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load(
 
 def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() -> None:
     found = weighed("slipping", 16e-6)
-    implied, length = found.implied, found.length.value
+    implied = found.implied
+    length = found.length.value
     radii = [
         float(np.interp(slipping().coordinate(length), slipping().coordinates, r))
         for r in slipping().contact_radii.T
@@ -126,10 +131,16 @@ def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() ->
     assert implied.stiffnesses[:, 1] == pytest.approx(MACROSCOPIC * pressure / length)
 
 
-@pytest.mark.parametrize(("length", "precision", "expected"), [
-    (4e-6, PAPER, 0.63), (16e-6, PAPER, 0.47), (4e-6, PRECISE, 0.20), (16e-6, PRECISE, 0.095),
-    (40e-6, PRECISE, 0.083),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("length", "precision", "expected"),
+    [
+        (4e-6, PAPER, 0.63),
+        (16e-6, PAPER, 0.47),
+        (4e-6, PRECISE, 0.20),
+        (16e-6, PRECISE, 0.095),
+        (40e-6, PRECISE, 0.083),
+    ],
+)
 def test_how_well_a_slip_length_can_be_known_is_what_the_documentation_says(
     length: float, precision: Precision, expected: float
 ) -> None:

@@ -23,11 +23,17 @@ def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     stress = points.u / CONVERSION
     noise = points.noise / CONVERSION
     return SimpleNamespace(
-        lubrication=lubrication, load=load, x=points.offset, y=0 * stress, axis=0, s_zz=stress,
+        lubrication=lubrication,
+        load=load,
+        x=points.offset,
+        y=0 * stress,
+        axis=0,
+        s_zz=stress,
         roots={"noise": noise, "conversion_constant": 1e-2 * stress[:, None]},
         errors_by=lambda source: {"noise": noise}[source],
-        maximum=float(stress.max()), maximum_budget={"noise": 100.0, "apparatus": 500.0},
-    )  # fmt: skip
+        maximum=float(stress.max()),
+        maximum_budget={"noise": 100.0, "apparatus": 500.0},
+    )
 
 
 def compared(
@@ -42,9 +48,13 @@ def compared(
         moved = after - before
         wet = replace(there, u=wet.u + moved[0])
     return dry_against_lubricated(
-        (profile(dry, "dry"), profile(wet, "lubricated")), (dry, wet), laboratory.sensor,
-        laboratory.family.at(0.0), (LOAD, LOAD), conversion_share=0.01,
-    )  # fmt: skip
+        (profile(dry, "dry"), profile(wet, "lubricated")),
+        (dry, wet),
+        laboratory.sensor,
+        laboratory.family.at(0.0),
+        (LOAD, LOAD),
+        conversion_share=0.01,
+    )
 
 
 def every(friction: float, **options: float) -> list[DryAgainstLubricated]:
@@ -82,7 +92,9 @@ def test_scans_without_common_places_are_not_compared() -> None:
 def test_pairs_are_of_one_load_dry_and_lubricated() -> None:
     points = bare_points()
     profiles = [
-        profile(points, "dry", 0.5), profile(points, "dry", 2.0),
-        profile(points, "lubricated", 2.02), profile(points, "", 0.5),
-    ]  # fmt: skip
+        profile(points, "dry", 0.5),
+        profile(points, "dry", 2.0),
+        profile(points, "lubricated", 2.02),
+        profile(points, "", 0.5),
+    ]
     assert lubricated_pairs(profiles) == [(1, 2)]

@@ -68,14 +68,16 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
 
 def test_all_loads_together_tell_more_than_each() -> None:
     confronted = laboratory().drawn(0.1, seed=1)
-    joint, single = confronted.effective([0, 1]), confronted.effective([0])
+    joint = confronted.effective([0, 1])
+    single = confronted.effective([0])
     width = joint.interval.high - joint.interval.low
     assert single.interval.high is None or single.interval.high - single.interval.low > width
     assert joint.degrees == 2 * (33 - 3) - 1
 
 
 def test_the_other_loading_adds_a_rectangle() -> None:
-    first, second = found(0.1)[0], found(0.2)[0]
+    first = found(0.1)[0]
+    second = found(0.2)[0]
     expected = abs(first.value - second.value) / np.sqrt(12)
     assert with_loading(first, second).budget["loading"] == pytest.approx(expected)
     assert "loading" not in with_loading(first, None).budget

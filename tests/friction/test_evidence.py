@@ -21,17 +21,21 @@ LOG_2PI = float(np.log(2 * np.pi))
 
 def tables(residual: np.ndarray, systematic: np.ndarray, noise: np.ndarray) -> Tables:
     """Return what one group tells at one value: residual (n,), columns (n, q), noise (n,)."""
-    r, d = residual / noise, systematic / noise[:, None]
+    r = residual / noise
+    d = systematic / noise[:, None]
     return Tables(
-        np.array([[r @ r]]), (d.T @ r)[None, None], (d.T @ d)[None, None],
+        np.array([[r @ r]]),
+        (d.T @ r)[None, None],
+        (d.T @ d)[None, None],
         np.array([[2 * np.log(noise).sum()]]),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(seed) -> None:
     rng = np.random.default_rng(seed)
-    residual, systematic = rng.normal(size=12), rng.normal(size=(12, 3))
+    residual = rng.normal(size=12)
+    systematic = rng.normal(size=(12, 3))
     noise = rng.uniform(0.3, 2.0, 12)
     found, chi_square = log_likelihood(tables(residual, systematic, noise))
     covariance = np.diag(noise**2) + systematic @ systematic.T
@@ -43,7 +47,8 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncert
 def test_a_law_that_makes_data_less_certain_pays_for_it() -> None:
     # Data as the noise alone has them: the larger systematic change has the smaller chi-square,
     # and the smaller likelihood.
-    residual, noise = np.array([1.0, -1.0, 1.0, -1.0, 1.0]), np.ones(5)
+    residual = np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    noise = np.ones(5)
     sizes = [log_likelihood(tables(residual, np.full((5, 1), s), noise)) for s in (0.1, 10.0)]
     (narrow, narrow_square), (wide, wide_square) = sizes
     assert wide_square.item() < narrow_square.item()
@@ -78,7 +83,8 @@ class Linear:
         design = np.zeros((n * len(self.shapes), len(self.shapes)))
         for j, shape in enumerate(self.shapes):
             design[j * n : (j + 1) * n, j] = shape
-        columns, data = np.vstack(self.columns), np.concatenate(self.data)
+        columns = np.vstack(self.columns)
+        data = np.concatenate(self.data)
         covariance = self.noise**2 * np.eye(data.size) + columns @ columns.T
         information = design.T @ np.linalg.solve(covariance, design)
         best = np.linalg.solve(information, design.T @ np.linalg.solve(covariance, data))
@@ -100,7 +106,8 @@ def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, lo
     # The systematic changes correlate the parameters: alone each is known ten times worse.
     model = Linear(seed, loads)
     exact, best, errors = model.exact()
-    along, weights = [], []
+    along = []
+    weights = []
     for load in range(loads):
         nodes = np.linspace(best[load] - 6 * errors[load], best[load] + 6 * errors[load], 241)
         along.append(model.along(load, nodes))
@@ -139,10 +146,17 @@ def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior) -> N
     assert weights.sum() == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("factor", "words"), [
-    (2.5, "not worth more than a bare mention"), (3.0, "positive"), (19.0, "positive"),
-    (21.0, "strong"), (140.0, "strong"), (151.0, "very strong"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (2.5, "not worth more than a bare mention"),
+        (3.0, "positive"),
+        (19.0, "positive"),
+        (21.0, "strong"),
+        (140.0, "strong"),
+        (151.0, "very strong"),
+    ],
+)
 def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor: float, words: str) -> None:
     # Their table: 1 to 3, 3 to 20, 20 to 150, above 150.
     assert BayesFactor("one", "other", float(np.log(factor))).words == words

@@ -26,10 +26,19 @@ def family() -> ProfileFamily:
     spectra = (1 + 0.2 * rise)[:, None, None] * LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2))
     number = np.ones((VALUES.size, LOADS.size))
     return ProfileFamily(
-        name="amontons", loading="incremental", wavenumbers=NODES, loads=LOADS, values=VALUES,
-        scale=0.3, spectra=spectra, by_load=spectra / 2, changes={"thickness": spectra / 100},
-        depths=number, contact_radii=number, convergence=number * 1e-4,
-    )  # fmt: skip
+        name="amontons",
+        loading="incremental",
+        wavenumbers=NODES,
+        loads=LOADS,
+        values=VALUES,
+        scale=0.3,
+        spectra=spectra,
+        by_load=spectra / 2,
+        changes={"thickness": spectra / 100},
+        depths=number,
+        contact_radii=number,
+        convergence=number * 1e-4,
+    )
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-3, 0.3, 7.0, math.inf])

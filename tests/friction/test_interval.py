@@ -16,10 +16,13 @@ def value_at(t: float) -> float:
 
 def estimate(chi_square: FloatArray, last: float = np.inf) -> BoundedEstimate:
     return profile_estimate(
-        np.array([value_at(t) for t in COORDINATES]), COORDINATES, chi_square, chi_square,
+        np.array([value_at(t) for t in COORDINATES]),
+        COORDINATES,
+        chi_square,
+        chi_square,
         value_at,
         reason=lambda interval: friction_reason(interval, last),
-    )  # fmt: skip
+    )
 
 
 def parabola(best: float, sigma: float, last: float = np.inf) -> BoundedEstimate:

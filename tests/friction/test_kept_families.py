@@ -41,11 +41,17 @@ def test_a_kept_family_is_the_calculated_one_and_is_not_calculated_again(tmp_pat
     assert_same(second, first)
 
 
-@pytest.mark.parametrize(("changed", "count"), [
-    ({"film": replace(FILM, name="film 7")}, 1), ({"film": replace(FILM, thickness=1.999e-3)}, 2),
-    ({"film": replace(FILM, young_modulus_uncertainty=1e5)}, 2), ({"loading": "total"}, 2),
-    ({"friction": [0.0, 0.31]}, 2), ({"reach": 50e-3}, 2),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changed", "count"),
+    [
+        ({"film": replace(FILM, name="film 7")}, 1),
+        ({"film": replace(FILM, thickness=1.999e-3)}, 2),
+        ({"film": replace(FILM, young_modulus_uncertainty=1e5)}, 2),
+        ({"loading": "total"}, 2),
+        ({"friction": [0.0, 0.31]}, 2),
+        ({"reach": 50e-3}, 2),
+    ],
+)
 def test_another_request_but_not_another_name_is_calculated(tmp_path, solved, changed, count):
     calculated(tmp_path)
     calculated(tmp_path, **changed)

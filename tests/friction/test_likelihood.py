@@ -28,7 +28,8 @@ def dense(found: Confrontation, value: float) -> tuple[np.ndarray, np.ndarray, n
         [points.u - p.signal[0] for points, p in zip(found.points, predicted, strict=True)]
     )
     sizes = [points.u.size for points in found.points]
-    noise, flat = np.zeros((sum(sizes),) * 2), np.zeros((sum(sizes), 3 * len(sizes)))
+    noise = np.zeros((sum(sizes),) * 2)
+    flat = np.zeros((sum(sizes), 3 * len(sizes)))
     for i, (points, p) in enumerate(zip(found.points, predicted, strict=True)):
         rows = slice(sum(sizes[:i]), sum(sizes[: i + 1]))
         inner = np.eye(points.u.size) if points.correlation is None else points.correlation
@@ -86,7 +87,8 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
         replace(points, u=laboratory.predicted(0.15, load).signal[0])
         for load, points in enumerate(laboratory.points)
     ]
-    at, step = laboratory.family.coordinate(0.15), 2e-3
+    at = laboratory.family.coordinate(0.15)
+    step = 2e-3
     values = np.array([laboratory.family.value_at(at + shift) for shift in (-step, 0, step)])
     found = likelihood(points, laboratory.sensor, laboratory.family.at(values), [0, 1])
     curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
@@ -117,7 +119,8 @@ def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
 
 
 def test_chi_square_is_that_of_the_whole_covariance(laboratory: Laboratory) -> None:
-    whole, i = laboratory.drawn(0.1, seed=7).whole, 30
+    whole = laboratory.drawn(0.1, seed=7).whole
+    i = 30
     rest = np.concatenate([load.residual[i] for load in whole.loads])
     columns = [np.hstack([c[i] for c in load.columns.values()]) for load in whole.loads]
     root = np.vstack(columns)
@@ -155,7 +158,8 @@ def predicted_of(found: Confrontation, value: float) -> list[Predicted]:
 @pytest.mark.parametrize("friction", [0.1, 0.2])
 def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> None:
     # By chi-square alone it is half a standard deviation too large: larger noise fits better.
-    laboratory, errors = Laboratory.of(), []
+    laboratory = Laboratory.of()
+    errors = []
     t = laboratory.family.coordinate(friction)
     for seed in range(100):
         along = laboratory.drawn(friction, seed).whole

@@ -32,9 +32,15 @@ OFFSETS = np.linspace(-6e-3, 6e-3, 25)
 def experiment(seed: int) -> Experiment:
     """Scans of one load cell, whose error is drawn with everything else."""
     return memscal.simulate_experiment(
-        film=FILM, loads=LOADS, lubricated_loads=LOADS[:1], friction=FRICTION, seed=seed,
-        load_uncertainty=SHARE, draw_inputs=True, one_load_cell=True,
-    )  # fmt: skip
+        film=FILM,
+        loads=LOADS,
+        lubricated_loads=LOADS[:1],
+        friction=FRICTION,
+        seed=seed,
+        load_uncertainty=SHARE,
+        draw_inputs=True,
+        one_load_cell=True,
+    )
 
 
 @lru_cache
@@ -80,9 +86,12 @@ def force_of(rod_scale: float, sphere_scale: float, seed: int) -> tuple[float, f
     rod = memscal.simulate(film=FILM, load=rod_scale, load_uncertainty=SHARE, seed=seed)
     sensor = memscal.calibrate(replace(rod, load=1.0, **cell), method="evidence").apparatus
     contact = simulate_contacts(
-        film=FILM, load=LOADS[1], load_scale=sphere_scale, load_uncertainty=SHARE,
+        film=FILM,
+        load=LOADS[1],
+        load_scale=sphere_scale,
+        load_uncertainty=SHARE,
         seed=seed,
-    )  # fmt: skip
+    )
     measured = memscal.measure_stress(replace(contact, **cell), sensor)
     off = measured.profiles[0].force - LOADS[1]
     return off, abs(off) / measured.checks[0].value
@@ -111,7 +120,8 @@ def test_the_checks_do_not_allow_for_what_cancels(seed: int) -> None:
         squares.append(np.square(allowed))
     # Force over load: u_A^2 + u_P^2 of two load cells, (u_A - u_P)^2 of one.
     np.testing.assert_allclose(squares[1] - squares[0], 2 * SHARE**2, rtol=0.05)
-    same, apart = measured(seed)[0].profiles, measured(seed, OTHER)[0].profiles
+    same = measured(seed)[0].profiles
+    apart = measured(seed, OTHER)[0].profiles
     for mine, theirs in zip(same, apart, strict=True):
         assert mine.force_uncertainty == pytest.approx(theirs.force_uncertainty, rel=1e-3)
         assert mine.maximum_uncertainty == pytest.approx(theirs.maximum_uncertainty, rel=1e-3)
@@ -137,10 +147,12 @@ def predicted(other: LoadCell | None = None) -> Predicted:
 
 
 def test_its_error_changes_a_and_the_contact_as_one() -> None:
-    one, two = predicted(), predicted(OTHER)
+    one = predicted()
+    two = predicted(OTHER)
     assert set(one.columns) == set(two.columns)
     # A ~ 1/P of the rod: the column of both is u (dU/d ln P - U), which is that of a softer film.
-    signal, by_load = one.signal[0], one.by_load[0]
+    signal = one.signal[0]
+    by_load = one.by_load[0]
     np.testing.assert_allclose(
         one.columns["load"][0, :, 0], SHARE * (by_load - signal), atol=1e-3 * signal.max() * SHARE
     )

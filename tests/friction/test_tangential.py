@@ -45,9 +45,14 @@ def width(interval: Interval) -> float:
 
 def experiment(friction: float, seed: int) -> Experiment:
     return memscal.simulate_experiment(
-        friction=friction, loads=LOADS, lubricated_loads=LOADS[:1], channels=("zz", "xz"),
-        shear_kernel=KERNEL, draw_inputs=True, seed=seed,
-    )  # fmt: skip
+        friction=friction,
+        loads=LOADS,
+        lubricated_loads=LOADS[:1],
+        channels=("zz", "xz"),
+        shear_kernel=KERNEL,
+        draw_inputs=True,
+        seed=seed,
+    )
 
 
 def calibrated(made: Experiment) -> tuple[ApparatusFunction, ApparatusFunction]:
@@ -106,7 +111,8 @@ def test_a_thicker_film_and_a_larger_load_change_the_shear_as_the_family_says() 
 def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None:
     made = experiment(0.1, seed=0)
     _, shear = measured_with(made)
-    film, sphere = made.dry.film, made.dry.indenter
+    film = made.dry.film
+    sphere = made.dry.indenter
     family = amontons_family(film, sphere, LOADS, reach=24e-3, cache=cache, order=1)
     sensor = sensor_of(shear, family, 8e-3, [made.dry])
     members = family.at(0.1)
@@ -132,7 +138,9 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
 
 
 def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(cache) -> None:
-    held, held_by_both, bounded = [], [], 0
+    held = []
+    held_by_both = []
+    bounded = 0
     for seed in range(EXPERIMENTS):
         friction = TRUTHS[seed % len(TRUTHS)]
         made = experiment(friction, seed)
@@ -168,7 +176,8 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
     made = experiment(0.1, seed=3)
     apparatus = calibrated(made)
     measured = memscal.measure_stress(made.dry, apparatus[0])
-    film, sphere = made.dry.film, made.dry.indenter
+    film = made.dry.film
+    sphere = made.dry.indenter
     common = common_inputs(*apparatus)
     assert {"load", "rod_radius"} <= set(common)
     assert not common_inputs(apparatus[0], replace(apparatus[1], load=2.0))
@@ -191,11 +200,15 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
     same = np.abs(np.subtract.outer(place, place)) < 1e-9
     away = np.sign(place)
     by_load, slope, noise, load_u, x_u, rest = (
-        np.concatenate(values) for values in zip(*(
-            (of.by_load[0], of.slope[0], p.noise, p.load_errors, p.x_errors, p.u - of.signal[0])
-            for p, of in sides
-        ), strict=True)
-    )  # fmt: skip
+        np.concatenate(values)
+        for values in zip(
+            *(
+                (of.by_load[0], of.slope[0], p.noise, p.load_errors, p.x_errors, p.u - of.signal[0])
+                for p, of in sides
+            ),
+            strict=True,
+        )
+    )
     covariance = np.diag(noise**2)
     for root in (by_load * load_u, slope * away * x_u):
         covariance += same * np.outer(root, root)
@@ -205,10 +218,12 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
             continue
         own = [of.columns.get(name) for _, of in sides]
         alone = name == "apparatus"
-        column = np.concatenate([
-            np.zeros((z.size, own[i].shape[-1])) if c is None or (alone and j != i) else c[0]
-            for j, (c, z) in enumerate(zip(own, zeros, strict=True))
-        ])  # fmt: skip
+        column = np.concatenate(
+            [
+                np.zeros((z.size, own[i].shape[-1])) if c is None or (alone and j != i) else c[0]
+                for j, (c, z) in enumerate(zip(own, zeros, strict=True))
+            ]
+        )
         covariance += column @ column.T
     flat = np.column_stack([block_diag(*(p.flat for p, _ in sides)), slope * away])
     root = np.linalg.cholesky(covariance)

@@ -25,9 +25,12 @@ _UNITS = {
 # Groups that no record declares by its class; a NXnote holds text, a NXcollection anything.
 _CLASSES = {"instrument": "NXinstrument", "process": "NXprocess", "numerics": "NXparameters"}
 _MEASURED_ON = {
-    "indenter": records.INDENTER, "sample": records.SAMPLE, "sample/film": records.FILM,
-    "instrument/stress_sensor": records.SENSOR, "instrument/load_cell": records.LOAD_CELL,
-}  # fmt: skip
+    "indenter": records.INDENTER,
+    "sample": records.SAMPLE,
+    "sample/film": records.FILM,
+    "instrument/stress_sensor": records.SENSOR,
+    "instrument/load_cell": records.LOAD_CELL,
+}
 _SCANNED = {**_MEASURED_ON, "instrument/stage": records.STAGE, "user": records.USER}
 _ANYTHING = record("NXcollection")
 _NOTE = record("NXnote")
@@ -38,17 +41,23 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
     writer.SCAN_SCHEMA: (
         "A sensor's readings against the position of the indenter that is pressed on its film.",
         {
-            "data": records.SCAN_DATA, **_SCANNED, "reference": records.REFERENCE_DATA,
-            "synthetic": _ANYTHING, "notes": _NOTE,
+            "data": records.SCAN_DATA,
+            **_SCANNED,
+            "reference": records.REFERENCE_DATA,
+            "synthetic": _ANYTHING,
+            "notes": _NOTE,
         },
         ("data",),
     ),
     writer.REFERENCE_SCHEMA: (
         "The calculated stress at the base of a film under an indenter.",
         {
-            "reference": records.REFERENCE_DATA, "parameters": records.CONTACT,
-            "parameters/film": records.FILM, "parameters/indenter": records.INDENTER,
-            "process": records.SOLVER, "process/numerics": records.NUMERICS,
+            "reference": records.REFERENCE_DATA,
+            "parameters": records.CONTACT,
+            "parameters/film": records.FILM,
+            "parameters/indenter": records.INDENTER,
+            "process": records.SOLVER,
+            "process/numerics": records.NUMERICS,
         },
         # An ideal reference is a NXcollection in its place.
         ("parameters",),
@@ -56,12 +65,17 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
     writer.ARTIFACT_SCHEMA: (
         "The apparatus function of a stress sensor under a film, with all that it rests on.",
         {
-            "apparatus_function": records.FIELD, "radial_profile": records.RADIAL,
+            "apparatus_function": records.FIELD,
+            "radial_profile": records.RADIAL,
             "radial_covariance": records.RADIAL_COVARIANCE,
             "kernel_changes": records.KERNEL_CHANGES,
-            "transfer_function": records.TRANSFER, "reconvolution": records.RECONVOLUTION,
-            "parameters": _ANYTHING, "quality": _ANYTHING, **_SCANNED,
-            "reference": records.REFERENCE_DATA, "process": records.PROCESS,
+            "transfer_function": records.TRANSFER,
+            "reconvolution": records.RECONVOLUTION,
+            "parameters": _ANYTHING,
+            "quality": _ANYTHING,
+            **_SCANNED,
+            "reference": records.REFERENCE_DATA,
+            "process": records.PROCESS,
             **{f"radial_profile_{route}": records.RADIAL for route in ("bayesian", "division")},
             **{
                 f"radial_covariance_{route}": records.RADIAL_COVARIANCE
@@ -69,8 +83,13 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             },
         },
         (
-            "radial_profile", "radial_covariance", "transfer_function", "reconvolution",
-            "parameters", "quality", "process",
+            "radial_profile",
+            "radial_covariance",
+            "transfer_function",
+            "reconvolution",
+            "parameters",
+            "quality",
+            "process",
         ),
     ),
     writer.STRESS_SCHEMA: (
@@ -82,22 +101,34 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             ),
             **dict.fromkeys(("roots", "budgets", "curves"), _ANYTHING),
             **dict.fromkeys(("points_zz", "points_xz", "points_yz"), _ANYTHING),
-            "sensor": records.CONVERSION, "scans": _ANYTHING, "inputs": _ANYTHING,
-            "quality": _ANYTHING, **_MEASURED_ON, "process": records.PROCESS,
+            "sensor": records.CONVERSION,
+            "scans": _ANYTHING,
+            "inputs": _ANYTHING,
+            "quality": _ANYTHING,
+            **_MEASURED_ON,
+            "process": records.PROCESS,
         },
         ("", "sensor", "scans", "inputs", "quality", "process"),
     ),
-}  # fmt: skip
+}
 
 
 def definition(schema: str) -> str:
     """Return the application definition of a kind of file, as XML."""
     words, groups, required = DEFINITIONS[schema]
     name = f"NX{schema.replace('-', '_')}"
-    root = ET.Element("definition", {
-        "xmlns": _NXDL, "xmlns:xsi": _XSI, "xsi:schemaLocation": f"{_NXDL} ../nxdl.xsd",
-        "name": name, "extends": "NXobject", "type": "group", "category": "application",
-    })  # fmt: skip
+    root = ET.Element(
+        "definition",
+        {
+            "xmlns": _NXDL,
+            "xmlns:xsi": _XSI,
+            "xsi:schemaLocation": f"{_NXDL} ../nxdl.xsd",
+            "name": name,
+            "extends": "NXobject",
+            "type": "group",
+            "category": "application",
+        },
+    )
     _doc(root, f"{words} Written by memscal, version {writer.SCHEMA_VERSION} of its files.")
     entry = ET.SubElement(root, "group", {"type": "NXentry"})
     stated = _field(entry, "definition", "NX_CHAR")

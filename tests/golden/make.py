@@ -65,7 +65,8 @@ class Runs:
         return self._results[name]
 
     def _run(self, name: str) -> dict[str, Any]:
-        out, err = io.StringIO(), io.StringIO()
+        out = io.StringIO()
+        err = io.StringIO()
         streams = contextlib.redirect_stdout(out), contextlib.redirect_stderr(err)
         with contextlib.chdir(self.folder), streams[0], streams[1]:
             code = run_memscal([*shlex.split(COMMANDS[name]), "--json"])
@@ -119,12 +120,15 @@ def reduced(value: Any) -> Any:
 
 def _summary(numbers: list[float | None]) -> dict[str, Any]:
     finite = [float(number) for number in numbers if number is not None]
-    step, count = math.ceil(len(numbers) / 5), max(len(finite), 1)
+    step = math.ceil(len(numbers) / 5)
+    count = max(len(finite), 1)
     return {
-        "length": len(numbers), "missing": len(numbers) - len(finite),
-        "some": reduced(numbers[step // 2 :: step]), "mean": reduced(math.fsum(finite) / count),
+        "length": len(numbers),
+        "missing": len(numbers) - len(finite),
+        "some": reduced(numbers[step // 2 :: step]),
+        "mean": reduced(math.fsum(finite) / count),
         "root_mean_square": reduced(math.sqrt(math.fsum(x**2 for x in finite) / count)),
-    }  # fmt: skip
+    }
 
 
 OF_ONE_KIND = {"value", "some", "maximum"}

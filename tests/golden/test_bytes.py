@@ -26,10 +26,13 @@ def digests(folder: Path, hash_seed: str) -> dict[str, str]:
     for name, target in LINKS.items():
         (folder / name).symlink_to(target)
     run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *COMMANDS], cwd=folder,
+        [sys.executable, "-c", PROGRAM, *COMMANDS],
+        cwd=folder,
         env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000", "PYTHONHASHSEED": hash_seed},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert run.returncode == 0, run.stderr
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()

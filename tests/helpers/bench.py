@@ -27,12 +27,14 @@ class Bench:
     """A rod over a simulated sensor: readings lie on a scan, with noise (V), where it rests."""
 
     def __init__(self, scan: memscal.Scan, *, noise: float, seed: int) -> None:
-        self.scan, self.noise = scan, noise
+        self.scan = scan
+        self.noise = noise
         self.random = np.random.default_rng(seed)
         self.position = {"1": 0.0, "2": 1.0}  # mm, across and up
         self.enabled: set[str] = set()
         self.readings = self.dragged = 0
-        self.stage, self.voltmeter = Answers(self.move), Answers(self.read)
+        self.stage = Answers(self.move)
+        self.voltmeter = Answers(self.read)
 
     def move(self, command: str) -> str | None:
         """Newport ESP 300: MO and MF enable and disable, PA moves, TP and MD? answer."""
@@ -50,6 +52,7 @@ class Bench:
         if command != ":READ?":
             return None
         self.readings += 1
-        x, resting = 1e-3 * self.position["1"], self.position["2"] <= 0
+        x = 1e-3 * self.position["1"]
+        resting = self.position["2"] <= 0
         volts = np.interp(x, self.scan.x, self.scan.u_zz) if resting else 0.0
         return f"{volts + self.noise * self.random.standard_normal():.9e}"

@@ -28,9 +28,13 @@ def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
 
 @lru_cache
 def cramer_rao(
-    noise: float, kernel: memscal.GaussianMixture = GAUSSIAN, *,
-    centre: tuple[float, float] = (CENTRE, 0.0), inexact: bool = False, **setting: Any,
-) -> dict[str, float]:  # fmt: skip
+    noise: float,
+    kernel: memscal.GaussianMixture = GAUSSIAN,
+    *,
+    centre: tuple[float, float] = (CENTRE, 0.0),
+    inexact: bool = False,
+    **setting: Any,
+) -> dict[str, float]:
     """Cramer-Rao bounds of A, sigma, centre and baseline, all unknown, in SI units.
 
     By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.
@@ -44,9 +48,14 @@ def cramer_rao(
         a, s, x, y = np.array([CONVERSION, width, *centre]) + change * (np.array(names) == name)
         sigmas = tuple(sigma * s / width for sigma in kernel.sigmas)
         return simulated(
-            conversion_constant=a, kernel=memscal.GaussianMixture(kernel.weights, sigmas),
-            centre=(x, y), noise=0.0, baseline=0.0, drift=0.0, **(setting | other),
-        ).u_zz.ravel()  # fmt: skip
+            conversion_constant=a,
+            kernel=memscal.GaussianMixture(kernel.weights, sigmas),
+            centre=(x, y),
+            noise=0.0,
+            baseline=0.0,
+            drift=0.0,
+            **(setting | other),
+        ).u_zz.ravel()
 
     if not setting.get("raster"):
         del steps["centre_y"]

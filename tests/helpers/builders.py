@@ -35,10 +35,15 @@ BARE: dict[str, Any] = {
 def make_film(**changes: Any) -> ElasticFilm:
     """The paper's film."""
     film = ElasticFilm(
-        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, roughness_rms=1.82e-6,
-        young_modulus_uncertainty=0.1e6, thickness_uncertainty=20e-6,
-        law="mooney-rivlin", mooney_rivlin_ratio=0.2,
-    )  # fmt: skip
+        young_modulus=2.2e6,
+        poisson_ratio=0.5,
+        thickness=2e-3,
+        roughness_rms=1.82e-6,
+        young_modulus_uncertainty=0.1e6,
+        thickness_uncertainty=20e-6,
+        law="mooney-rivlin",
+        mooney_rivlin_ratio=0.2,
+    )
     return replace(film, **changes)
 
 
@@ -48,11 +53,21 @@ def make_profile(**changes: Any) -> StressProfile:
     width = 1.0e-3
     sigma = np.exp(-(r**2) / (2 * width**2)) / (2 * np.pi * width**2)
     profile = StressProfile(
-        r=r, sigma_zz=sigma, sigma_rz=sigma * r / width * 0.1, load=1.0, depth=0.587e-3,
-        contact_radius=0.25e-3, stick_radius=0.0, friction_coefficient=0.0, loading="incremental",
-        film=make_film(), indenter=Rod(radius=0.25e-3), solver="closed form", discretisation="none",
+        r=r,
+        sigma_zz=sigma,
+        sigma_rz=sigma * r / width * 0.1,
+        load=1.0,
+        depth=0.587e-3,
+        contact_radius=0.25e-3,
+        stick_radius=0.0,
+        friction_coefficient=0.0,
+        loading="incremental",
+        film=make_film(),
+        indenter=Rod(radius=0.25e-3),
+        solver="closed form",
+        discretisation="none",
         convergence=1e-9,
-    )  # fmt: skip
+    )
     return replace(profile, **changes)
 
 
@@ -71,24 +86,37 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
     u = u.copy()
     u[..., 5] = np.nan
     scan = Scan(
-        x=x, y=y if kind in ("raster", "points") else None,
-        repeat=np.arange(33) % 3 + 1 if kind == "points" else None, u_zz=u,
-        u_zz_errors=np.full(u.shape, 1e-5), normal_load=np.full(u.shape, 1.01),
-        channels={"u_xz": 0.1 * u}, load=1.0, load_uncertainty=0.01,
-        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), rod_friction=np.inf,
+        x=x,
+        y=y if kind in ("raster", "points") else None,
+        repeat=np.arange(33) % 3 + 1 if kind == "points" else None,
+        u_zz=u,
+        u_zz_errors=np.full(u.shape, 1e-5),
+        normal_load=np.full(u.shape, 1.01),
+        channels={"u_xz": 0.1 * u},
+        load=1.0,
+        load_uncertainty=0.01,
+        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6),
+        rod_friction=np.inf,
         film=make_film(),
         sensor=StressSensor(
-            name="S1", model="MEMS", channel="zz", serial_number="17", manufacturer="a foundry",
-            temperature=296.2, temperature_uncertainty=0.3,
+            name="S1",
+            model="MEMS",
+            channel="zz",
+            serial_number="17",
+            manufacturer="a foundry",
+            temperature=296.2,
+            temperature_uncertainty=0.3,
         ),
         title="A scan",
         stage=memscal.Equipment(name="stage", serial_number="8", certificate_date="2024-01-31"),
         user=memscal.User(name="who measured", affiliation="a laboratory"),
         load_cell=memscal.LoadCell(name="balance", serial_number="7", certificate="2024-11"),
-        start_time="2024-01-02T03:04:05+00:00", end_time="2024-01-02T04:04:05+00:00",
-        notes="Two lines\nof notes, with an é.", reference=make_profile(),
+        start_time="2024-01-02T03:04:05+00:00",
+        end_time="2024-01-02T04:04:05+00:00",
+        notes="Two lines\nof notes, with an é.",
+        reference=make_profile(),
         synthetic={"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "shape": "gaussian"},
-    )  # fmt: skip
+    )
     return replace(scan, **changes)
 
 
@@ -103,11 +131,15 @@ def make_artifact(**changes: Any) -> ApparatusData:
     radial = np.exp(-(r**2) / (2 * SIGMA**2)) / (2 * np.pi * SIGMA**2)
     errors = 0.01 * radial.max() * np.ones_like(r)
     k = np.linspace(0.0, 6e3, 31)
-    modulus, window = np.exp(-(k**2) * SIGMA**2 / 2), np.where(k < 3.7e3, 1.0, 0.1)
+    modulus = np.exp(-(k**2) * SIGMA**2 / 2)
+    window = np.where(k < 3.7e3, 1.0, 0.1)
     values = {
-        "conversion_constant": CONVERSION, "gaussian_sigma": SIGMA,
-        "gaussian_sigma_deconvolved": 1.01 * SIGMA, "centre": 1e-5, "baseline": 2e-6,
-    }  # fmt: skip
+        "conversion_constant": CONVERSION,
+        "gaussian_sigma": SIGMA,
+        "gaussian_sigma_deconvolved": 1.01 * SIGMA,
+        "centre": 1e-5,
+        "baseline": 2e-6,
+    }
     covariance = np.diag([1e-20, 1e-12, 4e-12, 1e-12, 1e-14])
     stamp = {"program": "memscal", "version": "0.1.0", "date": "2024-01-02T03:04:05+00:00"}
     of_a = {"noise": 1e-10, "load": 3e-10}
@@ -168,7 +200,11 @@ def make_sweep(seeds: int = 12, tail: float = 1.0) -> Sweep:
         return values[:, None] * spread
 
     return Sweep(
-        amplitude=amplitude, conversion_constant=constant, gaussian_sigma_deconvolved=sigma,
-        relative_rms=misfit, seed_conversion_constant=draws(constant),
-        seed_gaussian_sigma=draws(sigma), seed_relative_rms=draws(misfit),
-    )  # fmt: skip
+        amplitude=amplitude,
+        conversion_constant=constant,
+        gaussian_sigma_deconvolved=sigma,
+        relative_rms=misfit,
+        seed_conversion_constant=draws(constant),
+        seed_gaussian_sigma=draws(sigma),
+        seed_relative_rms=draws(misfit),
+    )

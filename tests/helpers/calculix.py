@@ -93,10 +93,18 @@ def press_rod(
     mesh = rod_mesh(radius, film.thickness, halvings)
     deck = [
         *_film_deck(film, mesh),
-        *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]), "*STEP",
-        "*STATIC", "*BOUNDARY", f"ROD, 2, 2, {-depth}", *(["ROD, 1, 1"] if sticking else []),
-        "*NODE PRINT, NSET=ROD", "RF", "*NODE PRINT, NSET=BASE", "RF", "*END STEP",
-    ]  # fmt: skip
+        *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]),
+        "*STEP",
+        "*STATIC",
+        "*BOUNDARY",
+        f"ROD, 2, 2, {-depth}",
+        *(["ROD, 1, 1"] if sticking else []),
+        "*NODE PRINT, NSET=ROD",
+        "RF",
+        "*NODE PRINT, NSET=BASE",
+        "RF",
+        "*END STEP",
+    ]
     tables = run(deck, folder)
     load = -SECTORS * sum(force[1] for force in tables["ROD", 1.0].values())
     return PressedRod(load / depth, mesh.r[:, 0], _base_stress(mesh, tables["BASE", 1.0]) / load)
@@ -113,7 +121,8 @@ def press_sphere(
     """
     r, z = np.meshgrid(*grid(step, layers, 4.2, film.thickness), indexing="ij")
     mesh = Mesh.of_corners(r, z)
-    top, r = mesh.nodes[:, -1], mesh.r[:, -1]
+    top = mesh.nodes[:, -1]
+    r = mesh.r[:, -1]
     # On the axis itself a consistent force is zero.
     touchable = (r > 0) & (r < 4.2)
     deck = _film_deck(film, mesh)
@@ -165,7 +174,8 @@ def rod_mesh(radius: float, thickness: float, halvings: int) -> Mesh:
     above = np.append(np.minimum(above, far)[:-1], REACH)
     depth = np.append(radius * toward_edge, 0.0)[::-1]
     depth = np.append(depth, np.linspace(radius, thickness, 9)[1:])[::-1]
-    surface, base = np.append(surface, above), np.append(base, far)
+    surface = np.append(surface, above)
+    base = np.append(base, far)
     for _ in range(halvings):
         surface, base, depth = (_with_middles(part) for part in (surface, base, depth))
     fan = 1 / (1 + (depth / (0.2 * thickness)) ** 2)
@@ -192,9 +202,13 @@ def run(deck: list[str], folder: Path) -> dict[tuple[str, float], dict[int, Floa
     program = shutil.which("ccx")
     assert program is not None
     done = subprocess.run(
-        [program, "film"], cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [program, "film"],
+        cwd=folder,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert "Job finished" in done.stdout, done.stdout[-2000:]
     return parse((folder / "film.dat").read_text(encoding="ascii"))
 
@@ -216,22 +230,31 @@ def _with_middles(corners: FloatArray) -> FloatArray:
     for axis in range(corners.ndim):
         ends = np.moveaxis(corners, axis, 0)
         both = np.empty((2 * len(ends) - 1, *ends.shape[1:]))
-        both[::2], both[1::2] = ends, (ends[1:] + ends[:-1]) / 2
+        both[::2] = ends
+        both[1::2] = (ends[1:] + ends[:-1]) / 2
         corners = np.moveaxis(both, 0, axis)
     return corners
 
 
 def _film_deck(film: Film, mesh: Mesh) -> list[str]:
-    nodes, exists = mesh.nodes, mesh.nodes > 0
+    exists = mesh.nodes > 0
+    nodes = mesh.nodes
     points = zip(nodes[exists], mesh.r[exists], mesh.z[exists], strict=True)
     return [
-        "*NODE", *(f"{node}, {r:.13g}, {z:.13g}, 0" for node, r, z in points),
+        "*NODE",
+        *(f"{node}, {r:.13g}, {z:.13g}, 0" for node, r, z in points),
         "*ELEMENT, TYPE=CAX8R, ELSET=FILM",
         *(f"{i}, {', '.join(map(str, e))}" for i, e in enumerate(mesh.elements, start=1)),
-        "*MATERIAL, NAME=ELASTIC", "*ELASTIC", f"{film.young_modulus}, {film.poisson_ratio}",
-        "*SOLID SECTION, ELSET=FILM, MATERIAL=ELASTIC", *_node_set("BASE", nodes[:, 0]),
-        *_node_set("AXIS", nodes[0]), "*BOUNDARY", "BASE, 1, 2", "AXIS, 1, 1",
-    ]  # fmt: skip
+        "*MATERIAL, NAME=ELASTIC",
+        "*ELASTIC",
+        f"{film.young_modulus}, {film.poisson_ratio}",
+        "*SOLID SECTION, ELSET=FILM, MATERIAL=ELASTIC",
+        *_node_set("BASE", nodes[:, 0]),
+        *_node_set("AXIS", nodes[0]),
+        "*BOUNDARY",
+        "BASE, 1, 2",
+        "AXIS, 1, 1",
+    ]
 
 
 def _node_set(name: str, nodes: NDArray[np.int64]) -> list[str]:
@@ -248,10 +271,16 @@ def _to_make_it_iterate(node: int, element: int) -> list[str]:
         "*NODE, NSET=HELD",
         *(f"{node + i}, {100 + x}, {y}, {z}" for i, (x, y, z) in enumerate(corners)),
         "*ELEMENT, TYPE=C3D8, ELSET=BRICK",
-        f"{element}, {', '.join(str(node + i) for i in range(8))}", "*MATERIAL, NAME=YIELDING",
-        "*ELASTIC", "1., 0.", "*PLASTIC", "1e6, 0.",
-        "*SOLID SECTION, ELSET=BRICK, MATERIAL=YIELDING", "*BOUNDARY", "HELD, 1, 3",
-    ]  # fmt: skip
+        f"{element}, {', '.join(str(node + i) for i in range(8))}",
+        "*MATERIAL, NAME=YIELDING",
+        "*ELASTIC",
+        "1., 0.",
+        "*PLASTIC",
+        "1e6, 0.",
+        "*SOLID SECTION, ELSET=BRICK, MATERIAL=YIELDING",
+        "*BOUNDARY",
+        "HELD, 1, 3",
+    ]
 
 
 def _base_stress(mesh: Mesh, base: dict[int, FloatArray]) -> FloatArray:

@@ -52,7 +52,13 @@ def run_program(
 ) -> subprocess.CompletedProcess[str]:
     """Run the program, with a limit to the size of every file, which holds for root too."""
     return subprocess.run(
-        [sys.executable, "-m", "memscal", *arguments], cwd=cwd, env={**os.environ, **env},
-        stdout=stdout, stderr=subprocess.PIPE, text=True, encoding="utf-8", check=False,
+        [sys.executable, "-m", "memscal", *arguments],
+        cwd=cwd,
+        env={**os.environ, **env},
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        check=False,
         preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))),
-    )  # fmt: skip
+    )

@@ -22,10 +22,13 @@ import memscal
 from memscal.model.arrays import FloatArray
 
 HALF_RANGE = 8e-3
-PANEL, NODES, OUTERMOST = 0.05e-3, 8, 10e-3
+PANEL = 0.05e-3
+NODES = 8
+OUTERMOST = 10e-3
 """Panels of the radius of G and where it ends, in m; Gauss nodes of each."""
 ANGLES = 96
-LOADS, RATIO = (0.1, 0.3, 1.0), 0.5
+LOADS = (0.1, 0.3, 1.0)
+RATIO = 0.5
 """Loads at which base stresses are solved, in N; C2/C1 of Mooney-Rivlin films."""
 TABLE = np.arange(0.0, 20e-3, 25e-6)
 
@@ -59,7 +62,8 @@ def quadrature() -> tuple[FloatArray, FloatArray]:
 def base_stresses(radius: float, law: str) -> dict[float, FloatArray]:
     """Base stress (Pa) along TABLE at each of LOADS, on a film whose mesh is of its own radius."""
     other = {"mooney_rivlin_ratio": RATIO} if law == "mooney-rivlin" else {}
-    rod, film = memscal.Rod(radius=radius), replace(EXACT_FILM, law=law, **other)
+    rod = memscal.Rod(radius=radius)
+    film = replace(EXACT_FILM, law=law, **other)
     if law == "linear":
         stress = memscal.indent(film, rod, load=1.0, backend="fem").base_stress(TABLE)
         return {load: load * stress for load in LOADS}
@@ -70,10 +74,12 @@ def base_stresses(radius: float, law: str) -> dict[float, FloatArray]:
 @lru_cache
 def mean_stress(points: int, centre: float, load: float, radius: float, law: str) -> FloatArray:
     """Base stress, averaged over circles about each position of the scan, in Pa."""
-    table, stress = TABLE, base_stresses(radius, law)[load]
+    table = TABLE
+    stress = base_stresses(radius, law)[load]
     even = np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress)
     at = make_interp_spline(*even, k=5)
-    q, cosine = quadrature()[0][:, None], np.cos((np.arange(ANGLES) + 0.5) * np.pi / ANGLES)
+    q = quadrature()[0][:, None]
+    cosine = np.cos((np.arange(ANGLES) + 0.5) * np.pi / ANGLES)
     distances = np.abs(np.linspace(-HALF_RANGE, HALF_RANGE, points) - centre)
     rows = [at(np.sqrt(R**2 + q**2 - 2 * R * q * cosine)).mean(axis=1) for R in distances]
     return np.array(rows)
@@ -90,10 +96,20 @@ def voltages(kernel: Kernel, points: int, centre: float, *pressed: Any) -> Float
 
 
 def direct_scan(
-    kernel: Kernel, *, noise: float, seed: int = 0, points: int = 65, repeats: int = 1,
-    centre: float = CENTRE, baseline: float = 0.01, drift: float = 0.005, state_noise: bool = True,
-    load: float = 1.0, radius: float = EXACT_ROD.radius, law: str = "linear",
-) -> memscal.Scan:  # fmt: skip
+    kernel: Kernel,
+    *,
+    noise: float,
+    seed: int = 0,
+    points: int = 65,
+    repeats: int = 1,
+    centre: float = CENTRE,
+    baseline: float = 0.01,
+    drift: float = 0.005,
+    state_noise: bool = True,
+    load: float = 1.0,
+    radius: float = EXACT_ROD.radius,
+    law: str = "linear",
+) -> memscal.Scan:
     """Scan as ``memscal.simulate`` does, with the same noise for a seed, by direct convolution.
 
     ``noise``, ``baseline`` and ``drift`` are shares of the largest signal.
@@ -106,9 +122,13 @@ def direct_scan(
     u = clean + np.random.default_rng(seed).normal(0.0, noise * top, (repeats, points))
     shares = {"noise": noise, "baseline": baseline, "drift": drift}
     return memscal.Scan(
-        x=x, u_zz=u.reshape(shape),
+        x=x,
+        u_zz=u.reshape(shape),
         u_zz_errors=np.full(shape, noise * top) if state_noise and noise > 0 else None,
-        load=load, indenter=replace(EXACT_ROD, radius=radius), film=EXACT_FILM, sensor=SENSOR,
+        load=load,
+        indenter=replace(EXACT_ROD, radius=radius),
+        film=EXACT_FILM,
+        sensor=SENSOR,
         synthetic={"centre": centre, "conversion_constant": CONVERSION, "seed": float(seed)}
         | {name: share * top for name, share in shares.items()},
-    )  # fmt: skip
+    )

@@ -22,7 +22,8 @@ from memscal import ApparatusFunction, Scan
 from memscal.model.arrays import FloatArray
 
 METHOD = "bayesian"
-FULL_SEEDS, FEW_SEEDS = 200, 12
+FULL_SEEDS = 200
+FEW_SEEDS = 12
 SEEDS = FULL_SEEDS if FULL else FEW_SEEDS
 R = np.linspace(0.0, 3e-3, 121)
 RADII = R[::4]
@@ -67,47 +68,95 @@ TOLD = (0.0022, 0.0055, 0.021)
 """Noise of one reading every 0.25 mm that tells as much as the scan: 0.3 % twice, 0.5 %, 2 %."""
 
 GOALS = {
-    "Gaussian": Limits((0.02, 0.06, 0.15)), "disc": Limits((0.06, 0.11, 0.20)),
-    "mixture": Limits((0.09, 0.09, 0.15)), "ring": Limits((0.15, 0.24, 0.26)),
-    "sharp disc": Limits((0.15, 0.20, 0.25)), "discs at random": Limits((0.15, 0.20, 0.25)),
-    "tail": Limits((0.09, 0.09, 0.15)), "cone": Limits((0.10, 0.12, 0.20)),
+    "Gaussian": Limits((0.02, 0.06, 0.15)),
+    "disc": Limits((0.06, 0.11, 0.20)),
+    "mixture": Limits((0.09, 0.09, 0.15)),
+    "ring": Limits((0.15, 0.24, 0.26)),
+    "sharp disc": Limits((0.15, 0.20, 0.25)),
+    "discs at random": Limits((0.15, 0.20, 0.25)),
+    "tail": Limits((0.09, 0.09, 0.15)),
+    "cone": Limits((0.10, 0.12, 0.20)),
     "paraboloid": Limits((0.10, 0.12, 0.20)),
-}  # fmt: skip
+}
 """What is asked of a kind of kernel; the tables say where it does not hold."""
 
 SMOOTHED: dict[str, Any] = {
-    "error": (0.14, 0.14, 0.20), "beyond": 0.15, "bias_g": 2.3, "coverage": 0.25,
-    "ratio": (0.1, 2.3), "bias_a": 0.6, "z_fwhm": (0.15, 1.36),
-}  # fmt: skip
+    "error": (0.14, 0.14, 0.20),
+    "beyond": 0.15,
+    "bias_g": 2.3,
+    "coverage": 0.25,
+    "ratio": (0.1, 2.3),
+    "bias_a": 0.6,
+    "z_fwhm": (0.15, 1.36),
+}
 EXCEPTIONS: dict[str, dict[str, Any]] = {
     # The band counts what the scan does not exclude, and a Gaussian has none of it; in a few draws
     # the noise resembles another shape.
     "Gaussian": {"beyond": 0.10, "ratio": (0.04, 1.36), "z_a": (0.4, 1.2), "z_fwhm": (0.06, 1.36)},
     # The noise may resemble a ring, whose hole the film hides, or a Gaussian.
-    "disc": {"error": (0.08, 0.11, 0.20), "beyond": 0.12, "ratio": (0.05, 1.36),
-             "z_a": (0.45, 1.2), "z_fwhm": (0.3, 1.36)},
+    "disc": {
+        "error": (0.08, 0.11, 0.20),
+        "beyond": 0.12,
+        "ratio": (0.05, 1.36),
+        "z_a": (0.45, 1.2),
+        "z_fwhm": (0.3, 1.36),
+    },
     # A wide tail cannot be told from the baseline.
-    "mixture": {"beyond": 0.03, "bias_g": 1.2, "coverage": 0.65, "ratio": (0.15, 1.36),
-                "bias_a": 0.9, "z_a": (0.5, 1.2), "z_fwhm": (0.2, 1.36)},
-    "tail": {"bias_g": 1.5, "coverage": 0.60, "ratio": (0.12, 1.5), "bias_a": 1.1,
-             "z_a": (0.6, 1.4), "z_fwhm": (0.1, 1.36)},
+    "mixture": {
+        "beyond": 0.03,
+        "bias_g": 1.2,
+        "coverage": 0.65,
+        "ratio": (0.15, 1.36),
+        "bias_a": 0.9,
+        "z_a": (0.5, 1.2),
+        "z_fwhm": (0.2, 1.36),
+    },
+    "tail": {
+        "bias_g": 1.5,
+        "coverage": 0.60,
+        "ratio": (0.12, 1.5),
+        "bias_a": 1.1,
+        "z_a": (0.6, 1.4),
+        "z_fwhm": (0.1, 1.36),
+    },
     # The hole of a narrow ring is hidden by the film.
-    "ring": {"error": (0.165, 0.24, 0.26), "bias_g": 1.6, "coverage": 0.75, "ratio": (0.35, 1.6),
-             "bias_a": 0.6, "z_fwhm": (0.45, 1.5)},
+    "ring": {
+        "error": (0.165, 0.24, 0.26),
+        "bias_g": 1.6,
+        "coverage": 0.75,
+        "ratio": (0.35, 1.6),
+        "bias_a": 0.6,
+        "z_fwhm": (0.45, 1.5),
+    },
     # So is an edge that is sharper than the film passes, above all of a small disc and in noise.
-    "sharp disc": {"error": (0.18, 0.20, 0.25), "beyond": 0.10, "bias_g": 1.4,
-                   "ratio": (0.15, 1.4), "bias_a": 0.6, "z_a": (0.5, 1.2), "z_fwhm": (0.35, 1.36)},
+    "sharp disc": {
+        "error": (0.18, 0.20, 0.25),
+        "beyond": 0.10,
+        "bias_g": 1.4,
+        "ratio": (0.15, 1.4),
+        "bias_a": 0.6,
+        "z_a": (0.5, 1.2),
+        "z_fwhm": (0.35, 1.36),
+    },
     "sharp disc 0.6/0.05, 0.3 %, 0.25 mm x 2": {
-        "error": (0.40, 0.40, 0.40), "beyond": 0.2, "bias_g": 1.9, "coverage": 0.60,
-        "ratio": (0.04, 1.9), "bias_a": 0.7,
+        "error": (0.40, 0.40, 0.40),
+        "beyond": 0.2,
+        "bias_g": 1.9,
+        "coverage": 0.60,
+        "ratio": (0.04, 1.9),
+        "bias_a": 0.7,
     },
     "sharp disc 1.2/0.05, 1 %, 0.5 mm x 2, off": {
-        "error": (0.27, 0.27, 0.28), "bias_g": 2.3, "coverage": 0.25, "ratio": (0.2, 2.3),
+        "error": (0.27, 0.27, 0.28),
+        "bias_g": 2.3,
+        "coverage": 0.25,
+        "ratio": (0.2, 2.3),
     },
     "discs at random": {"ratio": (0.3, 1.36), "bias_a": 0.5, "z_a": (0.7, 1.2)},
     # No shape of the prior has a kink.
-    "cone": SMOOTHED, "paraboloid": SMOOTHED | {"error": (0.15, 0.19, 0.20)},
-}  # fmt: skip
+    "cone": SMOOTHED,
+    "paraboloid": SMOOTHED | {"error": (0.15, 0.19, 0.20)},
+}
 """Wider limits where a goal is known not to hold, of a kind or of a case by its name."""
 
 
@@ -180,9 +229,14 @@ class Case:
         """Return one scan; the seeds of different cases have nothing in common."""
         kernel, noise = self.drawn(seed)
         return direct_scan(
-            kernel, noise=noise, seed=crc32(self.name.encode()) + seed, **self.setting,
-            baseline=0.01 * self.off, drift=0.005 * self.off, state_noise=self.state_noise,
-        )  # fmt: skip
+            kernel,
+            noise=noise,
+            seed=crc32(self.name.encode()) + seed,
+            **self.setting,
+            baseline=0.01 * self.off,
+            drift=0.005 * self.off,
+            state_noise=self.state_noise,
+        )
 
 
 class DiscsAtRandom(Case):
@@ -223,12 +277,16 @@ def _cases() -> Iterator[Case]:
     yield Case(*middle, 0.005, 0.5e-3, 1, False)
     yield Case(*wide, 0.02, 0.5e-3, 2, True)
     others = [
-        _disc(0.8, 0.3), _sum("mixture", (0.75, 0.25), 0.5, 1.0),
-        _sum("ring", (1.3, -0.3), 0.6, 0.3), _disc(0.6, 0.25),
-        _sum("mixture", (0.6, 0.4), 0.45, 0.9), _sum("ring", (1.4, -0.4), 0.55, 0.3),
-        _disc(1.0, 0.3), _sum("mixture", (0.85, 0.15), 0.55, 1.3),
+        _disc(0.8, 0.3),
+        _sum("mixture", (0.75, 0.25), 0.5, 1.0),
+        _sum("ring", (1.3, -0.3), 0.6, 0.3),
+        _disc(0.6, 0.25),
+        _sum("mixture", (0.6, 0.4), 0.45, 0.9),
+        _sum("ring", (1.4, -0.4), 0.55, 0.3),
+        _disc(1.0, 0.3),
+        _sum("mixture", (0.85, 0.15), 0.55, 1.3),
         _sum("ring", (1.25, -0.25), 0.7, 0.35),
-    ]  # fmt: skip
+    ]
     others_scans = [(0.001, 0.25e-3, 1), (0.005, 0.25e-3, 1), (0.02, 0.25e-3, 3)]
     others_scans += [(0.003, 0.5e-3, 3), (0.005, 0.5e-3, 2), (0.001, 0.5e-3, 1)]
     for i, kernel in enumerate(others):
@@ -337,7 +395,8 @@ class Outcome:
         return [name for name, holds in self._kept(limits) if not holds]
 
     def _kept(self, limits: Limits) -> Iterator[tuple[str, bool]]:
-        seeds, luck = self.g.size, chance(self.g.size)
+        seeds = self.g.size
+        luck = chance(self.g.size)
         # One of many radii may exceed a limit by chance.
         rare = luck / RADII.size
         least, most = (root_mean_square_limit(1.0, seeds, p) for p in (1 - rare, rare))
@@ -373,20 +432,25 @@ def least_median(errors: FloatArray) -> float:
 
 def errors_of(case: Case, seed: int, apparatus: ApparatusFunction) -> dict[str, Any]:
     """Errors of one seed's estimate, by the names of an outcome."""
-    truth, a = case.drawn(seed)[0].radial(R), apparatus.parameters["conversion_constant"]
+    truth = case.drawn(seed)[0].radial(R)
+    a = apparatus.parameters["conversion_constant"]
     size = plane_norm(truth)
-    g, u = apparatus.radial(R), apparatus.radial_uncertainty(R)
+    g = apparatus.radial(R)
+    u = apparatus.radial_uncertainty(R)
     return {"error": (g - truth) / size, "u": u / size, "a": a / CONVERSION - 1}
 
 
 @lru_cache
 def study(name: str, seeds: int = SEEDS) -> Outcome:
     """Calibrate every seed's scan of a case."""
-    case, rows, z = CASES[name], [], []
+    case = CASES[name]
+    rows = []
+    z = []
     for seed in range(seeds):
         apparatus = memscal.calibrate(case.scan(seed), method=METHOD).apparatus
         rows.append(errors_of(case, seed, apparatus))
-        p, width = apparatus.parameters, half_width(case.drawn(seed)[0])
+        p = apparatus.parameters
+        width = half_width(case.drawn(seed)[0])
         truths = {"conversion_constant": CONVERSION, "fwhm": width, "gaussian_sigma": case.sigma}
         z.append([(p[n] - t) / p.uncertainty(n) for n, t in truths.items() if t is not None])
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}

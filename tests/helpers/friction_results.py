@@ -38,11 +38,18 @@ def reading(
     value = None if high is None else float(values[np.argmin(chi_square)])
     spread = None if value is None else float(np.ptp(close)) / 2 or 0.01
     return memscal.BoundedEstimate(
-        value=value, standard_uncertainty=spread, interval=memscal.Interval(float(inside[0]), high),
+        value=value,
+        standard_uncertainty=spread,
+        interval=memscal.Interval(float(inside[0]), high),
         reason="" if value is not None else "A large coefficient is not excluded: a lower bound.",
         budget={} if spread is None else {"noise": 0.8 * spread, "thickness": 0.6 * spread},
-        values=values, deviance=chi_square, degrees=degrees, least=least, p_value=0.31, **fields,
-    )  # fmt: skip
+        values=values,
+        deviance=chi_square,
+        degrees=degrees,
+        least=least,
+        p_value=0.31,
+        **fields,
+    )
 
 
 def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -> Any:
@@ -55,25 +62,37 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
     errors = np.maximum(errors * np.exp(-r / 2e-3), 2e-4 * clean.max())
     top = float(clean.max())
     return SimpleNamespace(
-        scan=_scan(lubrication), lubrication=lubrication, x=x, r=r,
-        s_zz=clean + rng.normal(0.0, errors), s_zz_errors=errors, load=load, force=load * 1.003,
-        force_uncertainty=0.01 * load, maximum=top, maximum_uncertainty=0.01 * top,
-    )  # fmt: skip
+        scan=_scan(lubrication),
+        lubrication=lubrication,
+        x=x,
+        r=r,
+        s_zz=clean + rng.normal(0.0, errors),
+        s_zz_errors=errors,
+        load=load,
+        force=load * 1.003,
+        force_uncertainty=0.01 * load,
+        maximum=top,
+        maximum_uncertainty=0.01 * top,
+    )
 
 
 def _scan(lubrication: str) -> Any:
     source = memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32)
     film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     return SimpleNamespace(
-        source=source, lubrication=lubrication, indenter=memscal.Sphere(radius=0.1288), film=film,
+        source=source,
+        lubrication=lubrication,
+        indenter=memscal.Sphere(radius=0.1288),
+        film=film,
         sensor=memscal.StressSensor(name="array 3"),
-    )  # fmt: skip
+    )
 
 
 def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.LoadComparison:
     """Compare one profile with the closed form."""
     fine = np.concatenate([np.linspace(0.0, 0.6, 301), np.geomspace(0.62, 30, 40), [math.inf]])
-    load, r = profile.load, profile.r
+    load = profile.load
+    r = profile.r
     common = _COMMON * profile.s_zz.max()
 
     def misfit(mu: float) -> float:
@@ -85,12 +104,19 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.Loa
     datum = ((profile.maximum - maxima) / math.hypot(profile.maximum_uncertainty, common)) ** 2
     calculated = np.array([stress(r, load, mu, loading) for mu in grid])
     p0 = float(stress(0.0, load, 0.0, loading))
-    low, high = calculated[0], calculated[-1]
+    low = calculated[0]
+    high = calculated[-1]
     between = np.clip(profile.s_zz, np.minimum(low, high), np.maximum(low, high))
     return memscal.LoadComparison(
-        profile=profile, loading=loading, s_max=profile.maximum,
-        s_max_uncertainty=profile.maximum_uncertainty, p0_max=p0, p0_max_uncertainty=_COMMON * p0,
-        ratio=profile.maximum / p0, ratio_uncertainty=0.012, calculated=calculated,
+        profile=profile,
+        loading=loading,
+        s_max=profile.maximum,
+        s_max_uncertainty=profile.maximum_uncertainty,
+        p0_max=p0,
+        p0_max_uncertainty=_COMMON * p0,
+        ratio=profile.maximum / p0,
+        ratio_uncertainty=0.012,
+        calculated=calculated,
         calculated_errors=_COMMON * calculated,
         p_max=np.array([float(stress(0.0, load, mu, loading)) for mu in grid]),
         chi_square=np.array([misfit(mu) for mu in grid]),
@@ -98,16 +124,22 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.Loa
         p_values=np.full(grid.size, 0.2),
         degrees=29,
         bracketed=float((np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors).mean()),
-        by_maximum=reading(fine, datum, degrees=0), by_profile=reading(fine, curve),
-    )  # fmt: skip
+        by_maximum=reading(fine, datum, degrees=0),
+        by_profile=reading(fine, curve),
+    )
 
 
 def comparison(
-    *, friction: float = 0.15, lubrications: Sequence[str] = ("dry", "lubricated"),
-    loadings: Sequence[str] = ("incremental", "total"), failed: bool = False,
+    *,
+    friction: float = 0.15,
+    lubrications: Sequence[str] = ("dry", "lubricated"),
+    loadings: Sequence[str] = ("incremental", "total"),
+    failed: bool = False,
     macroscopic: tuple[float, float | None] | None = (1.6, 0.2),
-    friction_grid: np.ndarray = FRICTION, loads: Sequence[float] = LOADS, **fields: Any,
-) -> memscal.FrictionComparison:  # fmt: skip
+    friction_grid: np.ndarray = FRICTION,
+    loads: Sequence[float] = LOADS,
+    **fields: Any,
+) -> memscal.FrictionComparison:
     """Return a comparison of every load, dry and lubricated."""
     rng = np.random.default_rng(1)
     profiles = [
@@ -128,15 +160,25 @@ def comparison(
         for name, bad in (("restored_force", False), ("bracketing", failed))
     )
     measured = SimpleNamespace(
-        profiles=tuple(profiles), scans=tuple(_scan(lubrication) for lubrication in lubrications),
-        checks=(), messages=(), overridden=(), noise_stated=True, artifact=None,
+        profiles=tuple(profiles),
+        scans=tuple(_scan(lubrication) for lubrication in lubrications),
+        checks=(),
+        messages=(),
+        overridden=(),
+        noise_stated=True,
+        artifact=None,
         process=memscal.Process(program="memscal", version="0", date=""),
-    )  # fmt: skip
+    )
     given: dict[str, Any] = {
-        "measured": measured, "friction": friction_grid, "loads": by_loading, "joint": joint,
-        "dry_against_lubricated": _differences(profiles), "macroscopic": macroscopic,
-        "checks": checks, "messages": (),
-    }  # fmt: skip
+        "measured": measured,
+        "friction": friction_grid,
+        "loads": by_loading,
+        "joint": joint,
+        "dry_against_lubricated": _differences(profiles),
+        "macroscopic": macroscopic,
+        "checks": checks,
+        "messages": (),
+    }
     return memscal.FrictionComparison(**(given | fields))
 
 
@@ -184,7 +226,8 @@ def _differences(profiles: Sequence[Any]) -> tuple[memscal.DryAgainstLubricated,
     dry_profiles = [p for p in profiles if p.lubrication == "dry"]
     lubricated = {p.load: p for p in profiles if p.lubrication == "lubricated"}
     for dry, wet in ((p, lubricated[p.load]) for p in dry_profiles if p.load in lubricated):
-        difference, errors = dry.s_zz - wet.s_zz, np.hypot(dry.s_zz_errors, wet.s_zz_errors)
+        difference = dry.s_zz - wet.s_zz
+        errors = np.hypot(dry.s_zz_errors, wet.s_zz_errors)
         top = dry.maximum - wet.maximum
         spread = math.hypot(dry.maximum_uncertainty, wet.maximum_uncertainty)
         misfit = (float(np.sum((difference / errors) ** 2)), dry.r.size, 0.02)

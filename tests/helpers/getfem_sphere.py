@@ -19,7 +19,9 @@ import time
 
 import numpy as np
 
-BASE, TOP, AXIS = 1, 2, 3
+BASE = 1
+TOP = 2
+AXIS = 3
 REACH = 25.0  # free edge of the film, mm
 
 BULK = (
@@ -55,8 +57,10 @@ def grid(step, layers, contact, thickness):
 
 def load_beyond(r, pressure):
     """Load carried outside each radius, of a pressure that is linear between them."""
-    inner, outer = r[:-1], r[1:]
-    first, last = pressure[:-1], pressure[1:]
+    inner = r[:-1]
+    outer = r[1:]
+    first = pressure[:-1]
+    last = pressure[1:]
     rings = (outer - inner) * (first * (2 * inner + outer) + last * (inner + 2 * outer)) * np.pi / 3
     return np.append(np.cumsum(rings[::-1])[::-1], 0.0)
 
@@ -91,7 +95,8 @@ class Film:
         self.integration = getfem.MeshIm(self.mesh, getfem.Integ("IM_GAUSS_PARALLELEPIPED(2,5)"))
         self.mark_boundaries(case["thickness"])
         self.model = getfem.Model("real")
-        self.nodes, self.kept = {}, []
+        self.nodes = {}
+        self.kept = []
         self.add_bulk(case)
         self.add_contact(case)
 
@@ -180,17 +185,22 @@ class Film:
             "load": self.integral("X(1)*pressure", TOP),
             "depth": float(self.model.variable("depth")[0]),
             "stick_radius": float(r[slides & (r > 0)].min(initial=self.contact)),
-            "iterations": iterations, "r": r.tolist(), "pressure": pressure.tolist(),
-            "shear": shear.tolist(), "base_r": base_r.tolist(),
-            "base_normal": (-base_normal).tolist(), "base_shear_r": shear_r.tolist(),
+            "iterations": iterations,
+            "r": r.tolist(),
+            "pressure": pressure.tolist(),
+            "shear": shear.tolist(),
+            "base_r": base_r.tolist(),
+            "base_normal": (-base_normal).tolist(),
+            "base_shear_r": shear_r.tolist(),
             "base_shear": (-base_shear).tolist(),
-        }  # fmt: skip
+        }
 
 
 def increments(loads, steps):
     """Rising loads through all those asked for, even in the square root, and where they are."""
     marks = np.sqrt([0.0, *loads])
-    pieces, reached = [], []
+    pieces = []
+    reached = []
     for low, high in itertools.pairwise(marks):
         count = max(1, round(steps * (high - low) / marks[-1]))
         pieces.extend(np.linspace(low, high, count + 1)[1:] ** 2)
@@ -209,9 +219,11 @@ def main():
         if number in reached:
             states.append(film.state(iterations))
     solution = {
-        "states": states, "steps": len(path), "unknowns": int(film.model.nbdof()),
+        "states": states,
+        "steps": len(path),
+        "unknowns": int(film.model.nbdof()),
         "seconds": time.perf_counter() - begin,
-    }  # fmt: skip
+    }
     json.dump(solution, sys.stdout)
 
 

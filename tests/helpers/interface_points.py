@@ -16,9 +16,13 @@ from memscal.friction.model_comparison import Measured
 
 MACROSCOPIC = 1.6
 FILM = ElasticFilm(
-    young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6,
-    thickness_uncertainty=0.02e-3, poisson_ratio_uncertainty=0.005,
-)  # fmt: skip
+    young_modulus=2.2e6,
+    poisson_ratio=0.5,
+    thickness=2e-3,
+    young_modulus_uncertainty=0.1e6,
+    thickness_uncertainty=0.02e-3,
+    poisson_ratio_uncertainty=0.005,
+)
 _REACH = 9e-3
 _SIGMA = 561e-6
 
@@ -40,9 +44,12 @@ PRECISE = Precision(0.001, 0.002)
 def amontons() -> ProfileFamily:
     """Return contacts of a rigid interface along the friction coefficient."""
     return calculated.amontons_family(
-        FILM, SPHERE, LOADS, reach=_REACH,
+        FILM,
+        SPHERE,
+        LOADS,
+        reach=_REACH,
         friction=(0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, math.inf),
-    )  # fmt: skip
+    )
 
 
 @lru_cache
@@ -74,7 +81,8 @@ def sensor(family: ProfileFamily, conversion: float = 0.012, width: float = 0.00
 def read_without_error(truth: ProfileFamily, value: float, stated: Precision) -> list[LoadPoints]:
     """Return 33 points 0.5 mm apart at each load of a family, and their repeats, as calculated."""
     x = np.tile(np.linspace(-8e-3, 8e-3, 33), stated.repeats)
-    ones, transfer = np.ones(x.size), sensor(truth).transfer
+    ones = np.ones(x.size)
+    transfer = sensor(truth).transfer
     voltages = [
         truth.wavenumbers.synthesise(transfer * spectrum, np.abs(x))
         for spectrum in truth.at(value).spectra[0]

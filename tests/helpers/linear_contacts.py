@@ -27,12 +27,19 @@ def gaussian_family(loads: Sequence[float] = LOADS) -> ProfileFamily:
     spectra = load[:, None] * np.exp(-0.5 * variance[..., None] * k2)
     table = variance.shape
     return ProfileFamily(
-        name="amontons", loading="incremental", wavenumbers=NODES, loads=load, values=FRICTIONS,
-        scale=0.3, spectra=spectra, by_load=spectra * (1 - variance[..., None] * k2 / 6),
+        name="amontons",
+        loading="incremental",
+        wavenumbers=NODES,
+        loads=load,
+        values=FRICTIONS,
+        scale=0.3,
+        spectra=spectra,
+        by_load=spectra * (1 - variance[..., None] * k2 / 6),
         changes={"thickness": -0.01 * variance[..., None] * k2 * spectra},
-        depths=np.full(table, np.nan), contact_radii=np.full(table, np.nan),
+        depths=np.full(table, np.nan),
+        contact_radii=np.full(table, np.nan),
         convergence=np.full(table, 1e-4),
-    )  # fmt: skip
+    )
 
 
 def gaussian_sensor() -> Sensor:
@@ -47,11 +54,16 @@ def bare_points(*, correlation: float = 0.0, repeats: int = 1) -> LoadPoints:
     x = np.tile(_POSITIONS, repeats)
     apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
     return LoadPoints(
-        u=np.zeros(x.size), offset=x, log_load=np.zeros(x.size), noise=np.full(x.size, 3e-5),
-        load_errors=np.full(x.size, 0.02), x_errors=np.full(x.size, 10e-6),
-        flat=np.stack([np.ones(x.size), x / x.max()], axis=1), load_share=0.01,
+        u=np.zeros(x.size),
+        offset=x,
+        log_load=np.zeros(x.size),
+        noise=np.full(x.size, 3e-5),
+        load_errors=np.full(x.size, 0.02),
+        x_errors=np.full(x.size, 10e-6),
+        flat=np.stack([np.ones(x.size), x / x.max()], axis=1),
+        load_share=0.01,
         correlation=correlation**apart if correlation else None,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)

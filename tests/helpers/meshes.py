@@ -32,7 +32,8 @@ def grid(*axes: Any) -> tuple[np.ndarray, np.ndarray]:
     """Points of a grid, and the corners of its quadrilaterals or hexahedra."""
     points = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")], axis=-1)
     index = np.arange(len(points)).reshape([len(axis) for axis in axes])
-    a, b = slice(None, -1), slice(1, None)
+    a = slice(None, -1)
+    b = slice(1, None)
     if len(axes) == 2:
         corners = [(a, a), (b, a), (b, b), (a, b)]
     else:
@@ -52,11 +53,14 @@ def section(plane: str = "xy", *, radii: Any = RADII, heights: Any = HEIGHTS) ->
     full = np.zeros((len(flat), 3, 3))
     i, j = across
     (k,) = {0, 1, 2} - set(across)
-    full[:, i, i], full[:, j, j], full[:, k, k] = rr, zz, hoop
+    full[:, i, i] = rr
+    full[:, j, j] = zz
+    full[:, k, k] = hoop
     full[:, i, j] = full[:, j, i] = rz
     six = np.stack([full[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], 1)
     middle = flat[cells].mean(axis=1)
-    four, nine = np.stack([rr, zz, hoop, rz], axis=1), full.reshape(-1, 9)
+    four = np.stack([rr, zz, hoop, rz], axis=1)
+    nine = full.reshape(-1, 9)
     at_points = {"S4": four, "S6": six, "S9": nine, "S33": zz, "S13": rz, "u": points}
     at_cells = {"C33": [-pressure(middle[:, 0])], "C4": [tensor(middle[:, 0], 0 * middle[:, 0])]}
     return meshio.Mesh(points, [("quad", cells)], point_data=at_points, cell_data=at_cells)
@@ -65,10 +69,12 @@ def section(plane: str = "xy", *, radii: Any = RADII, heights: Any = HEIGHTS) ->
 def block(x: Any, y: Any, *, centre: tuple[float, float] = (0.0, 0.0)) -> meshio.Mesh:
     """A film in 3-D, z across it, with the same stress about the axis through the centre."""
     points, cells = grid(x, y, np.linspace(0.0, 2.0, 3))
-    dx, dy = points[:, 0] - centre[0], points[:, 1] - centre[1]
+    dx = points[:, 0] - centre[0]
+    dy = points[:, 1] - centre[1]
     rr, zz, hoop, rz = tensor(np.hypot(dx, dy), points[:, 2]).T
     angle = np.arctan2(dy, dx)
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     plane = [rr * c**2 + hoop * s**2, rr * s**2 + hoop * c**2, zz, (rr - hoop) * c * s]
     at_points = {"S6": np.stack([*plane, rz * s, rz * c], axis=1), "S33": zz}
     return meshio.Mesh(points, [("hexahedron", cells)], point_data=at_points)

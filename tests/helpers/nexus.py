@@ -33,7 +33,9 @@ def violations(path: Path, definitions: Path) -> list[str]:
     found: list[str] = []
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: found.append(f"{record.levelname}: {record.getMessage()}")
-    handlers, logger.handlers, logger.propagate = logger.handlers, [handler], False
+    handlers = logger.handlers
+    logger.handlers = [handler]
+    logger.propagate = False
     try:
         counts = validate_application(os.fspath(path), definitions=os.fspath(definitions))
     finally:

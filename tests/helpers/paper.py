@@ -8,5 +8,7 @@ def film(nu: float = 0.5, thickness: float = 2e-3) -> ElasticFilm:
     return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=thickness)
 
 
-FILM, ROD, SPHERE = film(), Rod(radius=0.25e-3), Sphere(radius=128.8e-3)
+FILM = film()
+ROD = Rod(radius=0.25e-3)
+SPHERE = Sphere(radius=128.8e-3)
 LOADS = (0.34, 0.69, 1.37, 2.75)

@@ -28,7 +28,8 @@ RADII = np.linspace(0.0, 3e-3, 121)
 PIXEL = 0.125e-3
 """Half the step of the scans: neither a finer nor a coarser plane brings the peers nearer to G."""
 
-RING_STEP, OUTERMOST_RING = 0.05e-3, 4e-3
+RING_STEP = 0.05e-3
+OUTERMOST_RING = 4e-3
 """The rings of which G is made where a program inverts a linear model, in m."""
 
 LARGEST_KH = 20.0
@@ -125,9 +126,14 @@ def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
 
         voltage, response, ring, area = linear_model(scan)
         fit = dl.snlls(
-            voltage, response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
-            regop=dl.regoperator(ring / RING_STEP, 2), uq=False,
-        )  # fmt: skip
+            voltage,
+            response,
+            lbl=np.zeros(ring.size),
+            reg=True,
+            regparam="aic",
+            regop=dl.regoperator(ring / RING_STEP, 2),
+            uq=False,
+        )
     return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
 
 
@@ -183,7 +189,9 @@ def photutils(scan: Scan, truth: Kernel) -> FloatArray:
 
 
 PEERS: dict[str, Peer] = {
-    "deerlab": deerlab, "inference": inference_tools, "photutils": photutils,
+    "deerlab": deerlab,
+    "inference": inference_tools,
+    "photutils": photutils,
     "skimage": lambda scan, truth: tuned_wiener(scan, truth)[0],
-}  # fmt: skip
+}
 """By the name that is imported."""

@@ -37,8 +37,10 @@ class TailedEllipse:
         """G at positions from the ellipse's centre, in 1/m^2."""
         total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
         for share, dx, dy, along, across, angle in self.parts:
-            c, s = np.cos(angle), np.sin(angle)
-            u, v = c * (x - dx) + s * (y - dy), c * (y - dy) - s * (x - dx)
+            c = np.cos(angle)
+            s = np.sin(angle)
+            u = c * (x - dx) + s * (y - dy)
+            v = c * (y - dy) - s * (x - dx)
             form = (u / along) ** 2 + (v / across) ** 2
             total += share * np.exp(-0.5 * form) / (2 * np.pi * along * across)
         return total
@@ -52,7 +54,8 @@ def clean_raster(
     step = 2 * half / (side - 1) / finer
     count = 2 * int(np.ceil(reach / step)) + 1
     axis = step * (np.arange(count) - count // 2)
-    table, stress = TABLE, base_stresses(EXACT_ROD.radius, "linear")[1.0]
+    table = TABLE
+    stress = base_stresses(EXACT_ROD.radius, "linear")[1.0]
     at = make_interp_spline(np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress), k=5)
     g = kernel.at(axis[None, :] - CENTRE[0], axis[:, None] - CENTRE[1])
     size = 2 * count
@@ -65,14 +68,25 @@ def clean_raster(
 
 
 def tailed_raster(
-    *, seed: int, noise: float = 0.005, side: int = 65, half: float = 6e-3,
+    *,
+    seed: int,
+    noise: float = 0.005,
+    side: int = 65,
+    half: float = 6e-3,
     kernel: TailedEllipse = TailedEllipse(),
-) -> memscal.Scan:  # fmt: skip
+) -> memscal.Scan:
     """Raster of independent noise, a share of the largest voltage, which it does not state."""
-    clean, x = clean_raster(kernel, side, half), np.linspace(-half, half, side)
+    clean = clean_raster(kernel, side, half)
+    x = np.linspace(-half, half, side)
     top = float(clean.max())
     u = clean + np.random.default_rng(seed).normal(0.0, noise * top, clean.shape)
     return memscal.Scan(
-        x=x, y=x, u_zz=u + 0.01 * top, load=1.0, indenter=EXACT_ROD, film=EXACT_FILM,
-        sensor=SENSOR, synthetic={"noise": noise * top, "conversion_constant": CONVERSION},
-    )  # fmt: skip
+        x=x,
+        y=x,
+        u_zz=u + 0.01 * top,
+        load=1.0,
+        indenter=EXACT_ROD,
+        film=EXACT_FILM,
+        sensor=SENSOR,
+        synthetic={"noise": noise * top, "conversion_constant": CONVERSION},
+    )

@@ -13,7 +13,9 @@ H = 2e-3
 def compare_with_the_table(nu: float, radius: float, depths: list[float], sticking: bool) -> None:
     """Assert that spectra, stress and depth agree; radius and depths in thicknesses."""
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=H, law="neo-hookean")
-    rod, k, r = Rod(radius=radius * H), np.linspace(0.0, 12.0, 61) / H, np.linspace(0.1, 4, 40) * H
+    rod = Rod(radius=radius * H)
+    k = np.linspace(0.0, 12.0, 61) / H
+    r = np.linspace(0.1, 4, 40) * H
     way = np.array(depths)
     if sticking:  # what touches stays: short steps, and elements finer than the table's
         way = np.union1d(way, np.arange(1, 25 * depths[-1] / radius) * radius / 25)
@@ -23,9 +25,11 @@ def compare_with_the_table(nu: float, radius: float, depths: list[float], sticki
         tabulated = tabulated_rod(film, rod, state.load, sticking=sticking)
         largest = float(state.base_stress(0.0))
         for name, at, bound in (
-            ("base_spectrum", k, 1e-3 * state.load), ("base_shear_spectrum", k, 1e-3 * state.load),
-            ("base_stress", r, 2e-3 * largest), ("base_shear", r, 2e-3 * largest),
-        ):  # fmt: skip
+            ("base_spectrum", k, 1e-3 * state.load),
+            ("base_shear_spectrum", k, 1e-3 * state.load),
+            ("base_stress", r, 2e-3 * largest),
+            ("base_shear", r, 2e-3 * largest),
+        ):
             expected = getattr(state, name)(at)
             assert getattr(tabulated, name)(at) == pytest.approx(expected, abs=bound), name
         assert tabulated.depth == pytest.approx(state.depth, rel=2e-3)

@@ -28,9 +28,11 @@ TAILS = memscal.GaussianMixture((0.75, 0.25), (0.5e-3, 1.0e-3))
 # alone.
 LINEAR_FILM = replace(PAPER_FILM, law="linear")
 EXACT_FILM = replace(
-    LINEAR_FILM, young_modulus_uncertainty=None, poisson_ratio_uncertainty=None,
+    LINEAR_FILM,
+    young_modulus_uncertainty=None,
+    poisson_ratio_uncertainty=None,
     thickness_uncertainty=None,
-)  # fmt: skip
+)
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
 
 
@@ -105,23 +107,32 @@ def sphere_scan(
     rng = np.random.default_rng(seed)
     u = signal + top * (0.01 + 0.0025 * x / 8e-3 + rng.normal(0.0, noise, x.size))
     return Scan(
-        x=x, u_zz=u, u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
-        load=contact.load, indenter=contact.indenter, film=contact.film, sensor=SENSOR,
-    )  # fmt: skip
+        x=x,
+        u_zz=u,
+        u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
+        load=contact.load,
+        indenter=contact.indenter,
+        film=contact.film,
+        sensor=SENSOR,
+    )
 
 
 def known_apparatus(
-    kernel: RadialKernel = GAUSSIAN, *, conversion_uncertainty: float = 0.0,
+    kernel: RadialKernel = GAUSSIAN,
+    *,
+    conversion_uncertainty: float = 0.0,
     width_uncertainty: float = 0.0,
-) -> memscal.ApparatusFunction:  # fmt: skip
+) -> memscal.ApparatusFunction:
     """Return a sensor whose G is known, or wrong in one way only: wider or narrower.
 
     The uncertainties are relative.
     """
-    r, k = np.linspace(0.0, 6e-3, 301), np.linspace(0.0, 12e3, 241)
+    r = np.linspace(0.0, 6e-3, 301)
+    k = np.linspace(0.0, 12e3, 241)
     g = kernel.radial(r)
     spread = width_uncertainty * (2 * g + r * np.gradient(g, r))
-    names, values = ("conversion_constant", "gaussian_sigma"), np.array([CONVERSION, SIGMA])
+    names = ("conversion_constant", "gaussian_sigma")
+    values = np.array([CONVERSION, SIGMA])
     covariance = np.diag([(conversion_uncertainty * CONVERSION) ** 2, 0.0])
     contact = {"film": EXACT_FILM, "indenter": EXACT_ROD, "reference": pressed().profile()}
     empty = {"checks": (), "budget": {}, "process": Process(program="test", version="0", date="")}
@@ -160,9 +171,14 @@ SHEAR_SIGMA = 400e-6
 
 
 def shear_scan(
-    *, seed: int, kernel: RadialKernel | None = None, noise: float = 0.005, crosstalk: float = 0.0,
-    channel: str = "xz", **options: Any,
-) -> Scan:  # fmt: skip
+    *,
+    seed: int,
+    kernel: RadialKernel | None = None,
+    noise: float = 0.005,
+    crosstalk: float = 0.0,
+    channel: str = "xz",
+    **options: Any,
+) -> Scan:
     """A scan whose tangential channel has a G and an A of its own; its noise is stated.
 
     ``noise``, and ``crosstalk`` of the normal channel, are shares of the largest voltage.

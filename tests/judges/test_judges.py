@@ -20,13 +20,24 @@ pytestmark = pytest.mark.judges
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A file of each kind as a user writes it, with all that it may hold."""
     folder = tmp_path_factory.mktemp("written")
-    files = {name: folder / f"{name}.h5" for name in (
-        "line", "raster", "reference", "artifact", "compact", "of_raster", "stress", "named",
-    )}  # fmt: skip
+    files = {
+        name: folder / f"{name}.h5"
+        for name in (
+            "line",
+            "raster",
+            "reference",
+            "artifact",
+            "compact",
+            "of_raster",
+            "stress",
+            "named",
+        )
+    }
     data = Path(__file__).parents[2] / "calibration_data"
     experiment = data / "sphere_experiment"
     contacts = [memscal.read_scan(experiment / f"sphere_{k}.h5") for k in ("dry", "lubricated")]
-    scan, raster = memscal.read_scan(experiment / "rod_scan.h5"), data / "rod_scan_raster.h5"
+    scan = memscal.read_scan(experiment / "rod_scan.h5")
+    raster = data / "rod_scan_raster.h5"
     apparatus = memscal.calibrate(scan).apparatus
     memscal.write_scan(scan, files["line"])
     memscal.write_scan(memscal.read_scan(raster), files["raster"])

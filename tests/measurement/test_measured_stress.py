@@ -64,7 +64,8 @@ def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
 
 
 def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
-    exact, found = made.measured(3), made.measured(3, conversion_uncertainty=0.02)
+    exact = made.measured(3)
+    found = made.measured(3, conversion_uncertainty=0.02)
     for before, after in zip(exact.profiles, found.profiles, strict=True):
         part = after.roots["conversion_constant"] @ after.roots["conversion_constant"].T
         np.testing.assert_allclose(part, 4e-4 * np.outer(after.s_zz, after.s_zz), rtol=1e-9)
@@ -89,7 +90,8 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
     for profile, part in zip(made.measured(2).profiles, parts, strict=True):
         [signal] = contact_signals([part], SENSOR)
         prepared = prepared_scan(part, SENSOR, signal)
-        found, a = restore_known(prepared.scan, SENSOR), made.CONVERSION
+        found = restore_known(prepared.scan, SENSOR)
+        a = made.CONVERSION
         nodes = found.posterior.nodes
         sigma = found.posterior.covariance[nodes:, nodes:]
         # Columns by differences: a shifted centre moves every point on the blurred profile.
@@ -146,7 +148,8 @@ def test_contacts_at_single_points_give_what_rows_give() -> None:
 
 
 def test_repeats_at_one_position_are_averaged() -> None:
-    once, thrice = made.measured(5), made.measured(5, repeats=3)
+    once = made.measured(5)
+    thrice = made.measured(5, repeats=3)
     for few, many in zip(once.profiles, thrice.profiles, strict=True):
         assert many.r.size == few.r.size == 33
         ratio = few.roots["noise"] / many.roots["noise"]
@@ -163,7 +166,8 @@ def test_correlated_noise_is_averaged_with_its_correlation() -> None:
         covariance = np.outer(points.weight, points.weight) ** -0.5 * points.correlation
         mean = (profile.x[:, None] == points.x) * points.weight
         mean /= mean.sum(axis=1, keepdims=True)
-        expected, found = mean @ covariance @ mean.T, profile.roots["noise"]
+        expected = mean @ covariance @ mean.T
+        found = profile.roots["noise"]
         found = found @ found.T
         np.testing.assert_allclose(found / found[0, 0], expected / expected[0, 0], atol=1e-9)
 
@@ -199,14 +203,20 @@ def test_profiles_of_several_scans_know_theirs() -> None:
     assert [p.lubrication for p in found.profiles] == ["dry"] * 4 + ["lubricated"]
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"sensor": StressSensor(name="another", channel="zz")}, 'sensor "another".*"a simulated'),
-    ({"sensor": StressSensor(name="a simulated sensor", channel="xz")}, 'channel .* "xz".*"zz"'),
-    ({"film": replace(made.EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
-    ({"film": replace(made.EXACT_FILM, young_modulus=3e6)}, "Young's modulus 3 MPa.*2.2 MPa"),
-    ({"film": replace(made.EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
-    ({"film": replace(made.EXACT_FILM, law="neo-hookean")}, 'law "neo-hookean" .*"linear"'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sensor": StressSensor(name="another", channel="zz")}, 'sensor "another".*"a simulated'),
+        (
+            {"sensor": StressSensor(name="a simulated sensor", channel="xz")},
+            'channel .* "xz".*"zz"',
+        ),
+        ({"film": replace(made.EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
+        ({"film": replace(made.EXACT_FILM, young_modulus=3e6)}, "Young's modulus 3 MPa.*2.2 MPa"),
+        ({"film": replace(made.EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
+        ({"film": replace(made.EXACT_FILM, law="neo-hookean")}, 'law "neo-hookean" .*"linear"'),
+    ],
+)
 def test_what_does_not_belong_together_is_refused_by_both_names(changes, words) -> None:
     scan = replace(made.contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
     with pytest.raises(InputError, match=rf"not belong together: .*{words}"):
@@ -238,10 +248,13 @@ def spoilt(row: int, columns: slice) -> Scan:
     return replace(scan, u_zz=u, source=SourceFile("gaps.h5", ""))
 
 
-@pytest.mark.parametrize(("row", "columns", "words"), [
-    (1, slice(None), r"gaps\.h5, 0\.69 N, dry: all 33 points are missing"),
-    (2, slice(12, 21), r"1\.37 N, dry: 9 neighbouring points .* -2 to 2 mm"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("row", "columns", "words"),
+    [
+        (1, slice(None), r"gaps\.h5, 0\.69 N, dry: all 33 points are missing"),
+        (2, slice(12, 21), r"1\.37 N, dry: 9 neighbouring points .* -2 to 2 mm"),
+    ],
+)
 def test_a_gap_of_a_contact_s_radius_is_refused_with_its_place(row, columns, words) -> None:
     with pytest.raises(InputError, match=words):
         memscal.measure_stress(spoilt(row, columns), SENSOR)
@@ -297,13 +310,17 @@ def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads: tupl
 
 
 def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:
-    scan, sensor = tmp_path / "sphere.h5", tmp_path / "sensor.apparatus.h5"
+    scan = tmp_path / "sphere.h5"
+    sensor = tmp_path / "sensor.apparatus.h5"
     memscal.write_scan(made.contact_scan(3, load=(1.37,)), scan)
     SENSOR.save(sensor)
-    read, known = memscal.read_scan(scan), memscal.load_apparatus(sensor)
-    of_path, of_scan = memscal.measure_stress(scan, sensor), memscal.measure_stress(read, known)
+    read = memscal.read_scan(scan)
+    known = memscal.load_apparatus(sensor)
+    of_path = memscal.measure_stress(scan, sensor)
+    of_scan = memscal.measure_stress(read, known)
     assert of_path.profiles == of_scan.profiles
-    by_path, by_scan = memscal.restore(str(scan), sensor), memscal.restore(read, known)
+    by_path = memscal.restore(str(scan), sensor)
+    by_scan = memscal.restore(read, known)
     assert by_path.force == pytest.approx(by_scan.force, rel=1e-12)
 
 

@@ -32,7 +32,8 @@ def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, 
     pressure = (1 - (r / radius) ** 2) ** exponent
     pressure /= 2 * np.pi * np.sum(weights * r * pressure)
     outward = shear * pressure * r / (2 * WIDTH)
-    x, nu = K * EXACT_FILM.thickness, EXACT_FILM.poisson_ratio
+    x = K * EXACT_FILM.thickness
+    nu = EXACT_FILM.poisson_ratio
     film = base_normal_from_pressure(x, nu)
     expected = film * hankel(0, pressure, r, weights)
     expected -= base_normal_from_shear(x, nu) * hankel(1, outward, r, weights)
@@ -62,9 +63,11 @@ def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed: int) ->
     scan = made.sphere_scan(made.pressed(), seed=seed)
     points = measured_points(scan)
     start, _ = gaussian_pressure(scan, made.known_apparatus(), points)
-    reference, root = start.model.reference, np.sqrt(start.weights)
+    reference = start.model.reference
+    root = np.sqrt(start.weights)
     line = np.linspace(-1.0, 1.0, points.u.size)
-    shapes, count = pressure_shapes(EXACT_FILM), float(start.outlier_weight.sum())
+    shapes = pressure_shapes(EXACT_FILM)
+    count = float(start.outlier_weight.sum())
     for shape, weighed in zip(shapes, weighed_shapes(shapes, start), strict=True):
 
         def residual(theta: np.ndarray, shape: PressureShape = shape) -> np.ndarray:
@@ -97,9 +100,11 @@ def test_fits_that_are_weighed_together_are_as_each_by_itself() -> None:
     start, _ = gaussian_pressure(scan, made.known_apparatus(), measured_points(scan))
     for weighed in weighed_shapes(pressure_shapes(EXACT_FILM)[:4], start):
         count = float(start.outlier_weight.sum())
-        one, together = weigh_departures(weighed.reduced, weighed.basis, count), weighed.average()
+        one = weigh_departures(weighed.reduced, weighed.basis, count)
+        together = weighed.average()
         for name in ("mean", "covariance", "probability"):
-            left, right = getattr(one, name), getattr(together, name)
+            left = getattr(one, name)
+            right = getattr(together, name)
             np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12 * np.abs(left).max())
 
 

@@ -41,7 +41,8 @@ def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> R
 @pytest.mark.parametrize("load", [0.34, 1.0, 2.75])
 @pytest.mark.parametrize("friction", [0.0, np.inf])
 def test_without_noise_the_calculated_stress_comes_back(load: float, friction: float) -> None:
-    found, contact = restored(load, friction, 0, 0.0), made.pressed(load, friction)
+    found = restored(load, friction, 0, 0.0)
+    contact = made.pressed(load, friction)
     assert made.plane_error(found.r, found.sigma_zz, contact.base_stress(found.r)) < 4e-3
     assert found.force == pytest.approx(load, rel=0.02)
     assert found.passed
@@ -86,7 +87,8 @@ def test_the_blur_is_that_of_the_apparatus_function() -> None:
 
 def test_a_calculated_contact_is_told_from_another() -> None:
     found = restored(1.0, np.inf, 3)
-    same, other = found.compare(made.pressed(1.0, np.inf)), found.compare(made.pressed(1.0, 0.0))
+    same = found.compare(made.pressed(1.0, np.inf))
+    other = found.compare(made.pressed(1.0, 0.0))
     assert same.p_value > 1e-3 > other.p_value
     assert same.within > 0.7 > other.within
 
@@ -108,7 +110,8 @@ def test_an_uncertain_conversion_constant_makes_every_stress_as_uncertain() -> N
 
 
 def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
-    scan, r = made.sphere_scan(made.pressed(), noise=0.001, seed=2), np.array([0.0, 1e-3, 3e-3])
+    scan = made.sphere_scan(made.pressed(), noise=0.001, seed=2)
+    r = np.array([0.0, 1e-3, 3e-3])
     share = 0.02
     found = memscal.restore(scan, made.known_apparatus(width_uncertainty=share))
     changed = memscal.restore(scan, made.known_apparatus(wider(share)))
@@ -119,12 +122,14 @@ def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
 
 @pytest.mark.parametrize("source", ["position_scale", "film"])
 def test_an_uncertain_input_counts_as_much_as_it_changes(source: str) -> None:
-    scan, r = made.sphere_scan(made.pressed(), noise=0.001, seed=2), np.array([0.0, 1.5e-3, 3e-3])
+    scan = made.sphere_scan(made.pressed(), noise=0.001, seed=2)
+    r = np.array([0.0, 1.5e-3, 3e-3])
     share = 0.01
     if source == "film":
         film = replace(scan.film, thickness_uncertainty=share * scan.film.thickness)
         other = replace(scan.film, thickness=(1 + share) * scan.film.thickness)
-        stated, wrong = replace(scan, film=film), replace(scan, film=other)
+        stated = replace(scan, film=film)
+        wrong = replace(scan, film=other)
     else:
         stated = replace(scan, position_scale_uncertainty=share)
         wrong = replace(scan, x=(1 + share) * scan.x)
@@ -152,11 +157,13 @@ def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting)
     low, high = chi2.ppf([1e-4, 1 - 1e-4], len(z)) / len(z)
     # Half of a mean square of one: any shape may be.
     assert 0.4 * low < np.mean(np.square(z)) < high
-    raster, bounds = "raster" in setting, cramer_rao(0.005, **setting)
+    raster = "raster" in setting
+    bounds = cramer_rao(0.005, **setting)
     for f in found:
         assert ("axisymmetry" in {check.name for check in f.checks}) == raster
         # Of a round contact no other parameter is correlated with the centre.
-        u, bound = f.centre_uncertainty[: 1 + raster], [bounds["centre"]] * (1 + raster)
+        u = f.centre_uncertainty[: 1 + raster]
+        bound = [bounds["centre"]] * (1 + raster)
         np.testing.assert_allclose(u, bound, rtol=0.2)
         assert np.all(np.abs(f.centre[: 1 + raster] - [0.14e-3, 0.0][: 1 + raster]) < 5 * u)
 
@@ -195,7 +202,8 @@ def test_the_table_is_a_reference_with_uncertainties() -> None:
     assert profile.load == found.scan.load
 
 
-OTHER, NOISE = memscal.StressSensor(name="other"), np.random.default_rng(0).normal(0, 1e-5, 33)
+OTHER = memscal.StressSensor(name="other")
+NOISE = np.random.default_rng(0).normal(0, 1e-5, 33)
 BARE = replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan))
 BESIDE = replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None)
 BAD = {

@@ -19,11 +19,17 @@ def by_both(
 ) -> tuple[Contact, Contact]:
     ways = [
         indent(
-            film(nu), indenter, load=load, friction=friction, loading=loading, rings=rings,
-            backend=backend, film_radius=radius,
+            film(nu),
+            indenter,
+            load=load,
+            friction=friction,
+            loading=loading,
+            rings=rings,
+            backend=backend,
+            film_radius=radius,
         )
         for backend, radius, rings in (("hankel", None, None), ("fem", 25e-3, 64))
-    ]  # fmt: skip
+    ]
     return ways[0], ways[1]
 
 
@@ -88,7 +94,8 @@ def test_only_finite_elements_have_a_mesh_to_show() -> None:
     hankel, fem = by_both(0.5, SPHERE, 1.37, 0.0)
     mesh = fem.mesh()
     on_top = np.isclose(mesh.points[:, 1], 2e-3)
-    r, sunk = mesh.points[on_top, 0], -mesh.displacement[on_top, 1]
+    r = mesh.points[on_top, 0]
+    sunk = -mesh.displacement[on_top, 1]
     near = r < 6e-3
     np.testing.assert_allclose(
         sunk[near], hankel.surface_depression(r[near]), atol=AGREEMENT * hankel.depth

@@ -87,10 +87,12 @@ def test_every_load_increment_is_a_flat_punch_s(nu: float, friction: float) -> N
     # loads a contact is stiff as a rod of its radius (Mossakovskii's argument, on any film).
     path = indent(film(nu), SPHERE, load=list(np.linspace(1.0, 1.6, 7)), friction=friction)
     stiffness = [
-        2 * film(nu).contact_modulus * a
+        2
+        * film(nu).contact_modulus
+        * a
         * solve_rod(a / 2e-3, nu, sticking=friction > 0).stiffness_factor
         for a in np.array([contact.contact_radius for contact in path])
-    ]  # fmt: skip
+    ]
     depth = simpson(1 / np.array(stiffness), x=np.array([contact.load for contact in path]))
     # Where a film of nu = 0 sticks, its tractions oscillate towards the edge, which blurs it.
     assert path[-1].depth - path[0].depth == pytest.approx(depth, rel=4e-4 if nu > 0 else 1.5e-3)
@@ -117,24 +119,30 @@ def test_the_base_carries_the_load(friction: float, loading: str) -> None:
 
 
 # A compressible film that sticks at once has an edge that oscillates: see the refusals.
-@pytest.mark.parametrize(("nu", "friction", "loading"), [
-    (nu, friction, loading)
-    for nu in (0.3, 0.495, 0.5)
-    for friction in FRICTIONS
-    for loading in ("incremental", "total")
-    if nu > 0.4 or loading == "incremental" or friction < 10
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("nu", "friction", "loading"),
+    [
+        (nu, friction, loading)
+        for nu in (0.3, 0.495, 0.5)
+        for friction in FRICTIONS
+        for loading in ("incremental", "total")
+        if nu > 0.4 or loading == "incremental" or friction < 10
+    ],
+)
 def test_signorini_s_and_amontons_conditions_hold(nu: float, friction: float, loading: str) -> None:
     for contact in indent(film(nu), SPHERE, load=LOADS[1::2], friction=friction, loading=loading):
-        a, peak = contact.contact_radius, contact.max_interface_stress
+        a = contact.contact_radius
+        peak = contact.max_interface_stress
         r = contact.traction.rings
-        p, q = contact.interface_pressure(r), contact.interface_shear(r)
+        p = contact.interface_pressure(r)
+        q = contact.interface_shear(r)
         # What sticks may pull a little at the very edge of its contact: the last rings.
         assert p[r < 0.98 * a].min() >= 0
         assert p.min() > -1e-2 * peak
         if math.isfinite(friction):
             assert np.max((np.abs(q) - friction * p)[r < 0.98 * a]) < 1e-9 * peak
-        inside, outside = r[r < 0.97 * a], np.linspace(1.01, 3.0, 40) * a
+        inside = r[r < 0.97 * a]
+        outside = np.linspace(1.01, 3.0, 40) * a
         gap = SPHERE.height(inside) - contact.depth + contact.surface_depression(inside)
         assert np.max(np.abs(gap)) < 1e-9 * contact.depth
         beyond = SPHERE.height(outside) - contact.depth + contact.surface_depression(outside)

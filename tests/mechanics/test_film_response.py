@@ -17,12 +17,14 @@ def march_through_film(x: float, nu: float) -> tuple[np.ndarray, np.ndarray]:
     Returns surface displacements (down, outward) and base stresses (pressure, shear) for a
     unit pressure (first column) and a unit outward traction (second column) on the surface.
     """
-    rate = np.array([
-        [0, 1, 1, 0],
-        [-nu / (1 - nu), 0, 0, (1 - 2 * nu) / (2 * (1 - nu))],
-        [2 / (1 - nu), 0, 0, nu / (1 - nu)],
-        [0, 0, -1, 0],
-    ])  # fmt: skip
+    rate = np.array(
+        [
+            [0, 1, 1, 0],
+            [-nu / (1 - nu), 0, 0, (1 - 2 * nu) / (2 * (1 - nu))],
+            [2 / (1 - nu), 0, 0, nu / (1 - nu)],
+            [0, 0, -1, 0],
+        ]
+    )
     carry = expm(rate * x)
     surface_traction = np.array([[0.0, 1.0], [-1.0, 0.0]])  # rows sigma_rz, sigma_zz
     base = np.linalg.solve(carry[2:, 2:], surface_traction)

@@ -22,7 +22,8 @@ def test_the_compliance_is_reciprocal(nu: float) -> None:
     one, other = (model.field(*rng.uniform(size=(2, rings.size))) for _ in range(2))
 
     def along(forces: HankelField, moved: HankelField) -> float:
-        p, q = forces.traction.pressure(r), forces.traction.shear(r)
+        p = forces.traction.pressure(r)
+        q = forces.traction.shear(r)
         return float(measure @ (p * moved.depression(r) + q * moved.outward(r)))
 
     assert along(one, other) == pytest.approx(along(other, one), rel=1e-5)

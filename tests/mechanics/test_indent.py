@@ -132,21 +132,31 @@ def test_loads_and_depths_that_are_not_positive_are_refused(name: str, value: fl
         indent(FILM, ROD, load=asked[0], depth=asked[1])
 
 
-@pytest.mark.parametrize(("asked", "error", "words"), [
-    ({"load": 1.0, "depth": 1e-4}, InputError, "either a load or a depth, not both"),
-    ({}, InputError, "either a load or a depth"), ({"depth": 2e-3}, DomainError, "sink"),
-    ({"load": 10.0}, DomainError, "sink"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("asked", "error", "words"),
+    [
+        ({"load": 1.0, "depth": 1e-4}, InputError, "either a load or a depth, not both"),
+        ({}, InputError, "either a load or a depth"),
+        ({"depth": 2e-3}, DomainError, "sink"),
+        ({"load": 10.0}, DomainError, "sink"),
+    ],
+)
 def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> None:
     with pytest.raises(error, match=words):
         indent(FILM, ROD, **asked)
 
 
-@pytest.mark.parametrize(("wrong", "message"), [
-    ({"friction": -0.1}, "friction is -0.1"), ({"friction": math.nan}, "friction is nan"),
-    ({"backend": "magic"}, "backend is 'magic'"), ({"loading": "sudden"}, "loading is 'sudden'"),
-    ({"strain": "huge"}, "strain is 'huge'"), ({"rings": 3}, "at least 16"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"friction": -0.1}, "friction is -0.1"),
+        ({"friction": math.nan}, "friction is nan"),
+        ({"backend": "magic"}, "backend is 'magic'"),
+        ({"loading": "sudden"}, "loading is 'sudden'"),
+        ({"strain": "huge"}, "strain is 'huge'"),
+        ({"rings": 3}, "at least 16"),
+    ],
+)
 def test_what_makes_no_sense_is_refused_in_plain_words(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         indent(FILM, Sphere(radius=0.1288), load=1.0, **wrong)

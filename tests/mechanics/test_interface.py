@@ -21,10 +21,13 @@ def press(interface: Interface | None = None, load: float = 1.37, mu: float = 0.
     return indent(FILM, SPHERE, load=load, friction=mu, interface=interface, rings=64)
 
 
-@pytest.mark.parametrize(("parameter", "separation", "pressure"), [
-    *[(4, d, p) for d, p in ((2, 0.0266), (1, 0.3027), (0, 1.7202), (-1, 5.6185))],
-    *[(17, d, p) for d, p in ((1, 1.2865), (0, 7.3107), (-1, 23.8785))],
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("parameter", "separation", "pressure"),
+    [
+        *[(4, d, p) for d, p in ((2, 0.0266), (1, 0.3027), (0, 1.7202), (-1, 5.6185))],
+        *[(17, d, p) for d, p in ((1, 1.2865), (0, 7.3107), (-1, 23.8785))],
+    ],
+)
 def test_greenwood_and_tripp_s_own_values(parameter, separation, pressure) -> None:
     # p in E* sqrt(sigma / 8B), mu = (8/3) eta sigma sqrt(2 B beta); here sigma = B = beta = 1.
     density = parameter * 3 / (8 * math.sqrt(2))
@@ -58,12 +61,17 @@ def test_a_law_its_inverse_and_its_slope_belong_together(law) -> None:
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
-@pytest.mark.parametrize("rough", [
-    GreenwoodTripp(roughness=1e-10, asperity_density=1e16, asperity_radius=1e-9),
-    ExponentialCompliance(decay_length=1e-10, reference_pressure=1e5),
-], ids=["GT", "exponential"])  # fmt: skip
+@pytest.mark.parametrize(
+    "rough",
+    [
+        GreenwoodTripp(roughness=1e-10, asperity_density=1e16, asperity_radius=1e-9),
+        ExponentialCompliance(decay_length=1e-10, reference_pressure=1e5),
+    ],
+    ids=["GT", "exponential"],
+)
 def test_the_rigid_contact_returns_as_the_roughness_vanishes(rough, mu) -> None:
-    smooth, nearly = press(mu=mu), press(Interface(normal=rough), mu=mu)
+    smooth = press(mu=mu)
+    nearly = press(Interface(normal=rough), mu=mu)
     assert nearly.depth == pytest.approx(smooth.depth, rel=5e-4)
     assert nearly.contact_radius == pytest.approx(smooth.contact_radius, rel=2e-2)
     r = np.linspace(0.0, 6e-3, 40)
@@ -90,7 +98,8 @@ def test_every_point_of_a_rough_contact_obeys_the_law(law) -> None:
 def test_roughness_widens_a_contact_and_lowers_its_pressure_most_at_light_load() -> None:
     lowering = []
     for load in (0.1, 2.75):
-        smooth, rough = press(load=load), press(Interface(normal=GREENWOOD_TRIPP), load=load)
+        smooth = press(load=load)
+        rough = press(Interface(normal=GREENWOOD_TRIPP), load=load)
         assert rough.contact_radius > smooth.contact_radius
         lowering.append(1 - rough.max_interface_stress / smooth.max_interface_stress)
     assert lowering[0] > 2 * lowering[1] > 0
@@ -118,11 +127,17 @@ def test_a_slip_length_lowers_the_friction_that_a_contact_seems_to_have() -> Non
 
 
 def test_the_shear_follows_the_elastic_stretch_up_to_the_slip_length() -> None:
-    mu, length = 0.5, 3e-6
+    mu = 0.5
+    length = 3e-6
     contact = indent(
-        FILM, SPHERE, load=1.37, friction=mu, interface=Interface(slip_length=length),
-        loading="total", rings=64,
-    )  # fmt: skip
+        FILM,
+        SPHERE,
+        load=1.37,
+        friction=mu,
+        interface=Interface(slip_length=length),
+        loading="total",
+        rings=64,
+    )
     r = np.linspace(0.05, 0.9, 30) * contact.contact_radius
     stretch = np.clip(contact.surface_outward(r) / length, -1, 1)
     expected = -mu * contact.interface_pressure(r) * stretch
@@ -132,21 +147,31 @@ def test_the_shear_follows_the_elastic_stretch_up_to_the_slip_length() -> None:
 
 def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle() -> None:
     contacts = indent(
-        FILM, SPHERE, load=[1.37, 0.3, 1.37], friction=0.3,
-        interface=Interface(normal=EXPONENTIAL, slip_length=0.5e-6), rings=64,
-    )  # fmt: skip
+        FILM,
+        SPHERE,
+        load=[1.37, 0.3, 1.37],
+        friction=0.3,
+        interface=Interface(normal=EXPONENTIAL, slip_length=0.5e-6),
+        rings=64,
+    )
     dissipated = [contact.dissipated_energy or 0.0 for contact in contacts]
     assert 0 < dissipated[0] < dissipated[2]
     assert contacts[2].depth == pytest.approx(contacts[0].depth, rel=0.05)
 
 
-@pytest.mark.parametrize(("make", "message"), [
-    (lambda: Interface(slip_length=-1e-6), "slip length"),
-    (lambda: Interface(slip_length=math.nan), "slip length"),
-    (lambda: ExponentialCompliance(decay_length=-1.0, reference_pressure=1.0), "decay length"),
-    (lambda: ExponentialCompliance(decay_length=1.0, reference_pressure=0.0), "reference"),
-    (lambda: GreenwoodTripp(roughness=1e-6, asperity_density=0.0, asperity_radius=1e-6), "density"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Interface(slip_length=-1e-6), "slip length"),
+        (lambda: Interface(slip_length=math.nan), "slip length"),
+        (lambda: ExponentialCompliance(decay_length=-1.0, reference_pressure=1.0), "decay length"),
+        (lambda: ExponentialCompliance(decay_length=1.0, reference_pressure=0.0), "reference"),
+        (
+            lambda: GreenwoodTripp(roughness=1e-6, asperity_density=0.0, asperity_radius=1e-6),
+            "density",
+        ),
+    ],
+)
 def test_laws_that_make_no_sense_are_refused(make: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()

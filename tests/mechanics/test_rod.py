@@ -26,15 +26,21 @@ def test_frictionless_rod_solves_the_fredholm_equation(ratio: float, nu: float) 
     np.testing.assert_allclose(found, cosines.T @ (t_weights * phi) / (t_weights @ phi), atol=1e-10)
 
 
-@pytest.mark.parametrize(("nu", "sticking"), [
-    *((nu, False) for nu in (0.0, 0.2, 0.5)), *((nu, True) for nu in (0.0, 0.2, 0.4, 0.49)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("nu", "sticking"),
+    [
+        *((nu, False) for nu in (0.0, 0.2, 0.5)),
+        *((nu, True) for nu in (0.0, 0.2, 0.4, 0.49)),
+    ],
+)
 def test_a_very_thick_film_is_a_half_space(nu: float, sticking: bool) -> None:
     # Boussinesq: P = 2 E* a delta; the film's correction is of the order a/h.
     # Mossakovskii, Spence: P = 4 G a delta ln(3 - 4 nu)/(1 - 2 nu), where the film sticks.
-    exact, near = 1.0, 1e-7
+    exact = 1.0
+    near = 1e-7
     if sticking:
-        exact, near = (1 - nu) * np.log(3 - 4 * nu) / (1 - 2 * nu), 3e-6
+        exact = (1 - nu) * np.log(3 - 4 * nu) / (1 - 2 * nu)
+        near = 3e-6
     assert solve_rod(1e-8, nu, sticking=sticking).stiffness_factor == pytest.approx(exact, abs=near)
 
 
@@ -50,7 +56,8 @@ def test_a_thin_incompressible_film_is_lubricated_flow(sticking: bool, factor: f
 
 def test_a_thin_compressible_film_is_compressed_uniaxially() -> None:
     # P -> pi a^2 M delta/h with M = 2G (1-nu)/(1-2nu), again with an edge of the order h.
-    nu, ratios = 0.3, np.array([10.0, 20.0])
+    nu = 0.3
+    ratios = np.array([10.0, 20.0])
     kappa = np.array([solve_rod(ratio, nu, sticking=False).stiffness_factor for ratio in ratios])
     root = np.sqrt(kappa / (np.pi * (1 - nu) ** 2 / (2 * (1 - 2 * nu)) * ratios))
     assert 2 * root[1] - root[0] == pytest.approx(1, abs=3e-3)

@@ -11,9 +11,12 @@ from memscal.model.field_mesh import FieldMesh
 
 def parts(**changes: Any) -> dict[str, Any]:
     return {
-        "points": [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]], "triangles": [[0, 1, 2]],
-        "displacement": np.zeros((3, 2)), "stress": np.zeros((3, 4)), **changes,
-    }  # fmt: skip
+        "points": [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]],
+        "triangles": [[0, 1, 2]],
+        "displacement": np.zeros((3, 2)),
+        "stress": np.zeros((3, 4)),
+        **changes,
+    }
 
 
 def test_a_field_mesh_keeps_its_own_read_only_copy() -> None:
@@ -25,14 +28,17 @@ def test_a_field_mesh_keeps_its_own_read_only_copy() -> None:
         mesh.triangles[0, 0] = 1
 
 
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"stress": np.zeros((3, 3))}, r"stress .* \(3, 3\), but \(3, 4\)"),
-    ({"displacement": np.zeros((2, 2))}, r"displacement .* \(2, 2\), but \(3, 2\)"),
-    ({"displacement": np.full((3, 2), np.nan)}, "displacement .* not finite"),
-    ({"triangles": [[0, 1, 2, 0]]}, "three columns"),
-    ({"triangles": [[1, 2, 3]]}, "outside 0 to 2"),
-    ({"triangles": [[-1, 1, 2]]}, "outside 0 to 2"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"stress": np.zeros((3, 3))}, r"stress .* \(3, 3\), but \(3, 4\)"),
+        ({"displacement": np.zeros((2, 2))}, r"displacement .* \(2, 2\), but \(3, 2\)"),
+        ({"displacement": np.full((3, 2), np.nan)}, "displacement .* not finite"),
+        ({"triangles": [[0, 1, 2, 0]]}, "three columns"),
+        ({"triangles": [[1, 2, 3]]}, "outside 0 to 2"),
+        ({"triangles": [[-1, 1, 2]]}, "outside 0 to 2"),
+    ],
+)
 def test_a_field_mesh_refuses_parts_that_do_not_fit(changes: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         FieldMesh(**parts(**changes))

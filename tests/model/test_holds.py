@@ -19,7 +19,10 @@ def log(seed: int, correlation: float = 0.0, *, creep: float = 0.0) -> dict[str,
     rng = np.random.default_rng(seed)
     parts = []
     for x, before, u in zip(PLACES, [-9e-3, *PLACES[:-1]], SIGNAL, strict=True):
-        moves, waits, ramp, held = 6, int(rng.integers(8, 12)), 4, int(rng.integers(20, 40))
+        moves = 6
+        waits = int(rng.integers(8, 12))
+        ramp = 4
+        held = int(rng.integers(20, 40))
         up = np.linspace(0, 1, ramp, endpoint=False)
         load = [np.zeros(moves + waits), up, np.ones(held), up[::-1], np.zeros(5)]
         late = [np.zeros(moves + waits), up, 1 - creep * np.exp(-np.arange(held) / 8), up[::-1]]
@@ -79,6 +82,9 @@ def test_a_log_becomes_a_scan_and_a_figure():
     assert scan.load == pytest.approx(1.0, abs=1e-3)
     figure = scan.holds.plot()
     assert [axes.get_ylabel() for axes in figure.axes] == [
-        "x (mm)", "load (N)", "reading (mV)", "reading (mV)",
-    ]  # fmt: skip
+        "x (mm)",
+        "load (N)",
+        "reading (mV)",
+        "reading (mV)",
+    ]
     assert len(figure.axes[2].collections[0].get_segments()) == PLACES.size

@@ -15,56 +15,68 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
     scan = make_scan("repeats")
     one = slice(0, 1)
     single = replace(
-        scan, u_zz=scan.u_zz[one], u_zz_errors=scan.u_zz_errors[one],
-        normal_load=scan.normal_load[one], channels={},
-    )  # fmt: skip
+        scan,
+        u_zz=scan.u_zz[one],
+        u_zz_errors=scan.u_zz_errors[one],
+        normal_load=scan.normal_load[one],
+        channels={},
+    )
     assert single.kind == "repeats"
     assert set(replace(scan, branch=["Approach", "", "retreat"]).only_passes(2).branch.flat) == {2}
 
 
-@pytest.mark.parametrize(("kind", "changes", "problem"), [
-    ("line", {"u_zz": np.zeros(32)}, r"u_zz has shape \(32,\).*\(33,\) or \(repeat, 33\)"),
-    ("line", {"u_zz": np.zeros((2, 2, 33))}, "u_zz has shape"),
-    ("line", {"u_zz": np.zeros((0, 33))}, "u_zz has shape"),
-    ("line", {"u_zz": 1.0}, "u_zz has shape"),
-    ("raster", {"u_zz": np.zeros((33, 9))}, r"\(33, 9\).*\(9, 33\), from y and x"),
-    ("raster", {"u_zz": np.zeros(33)}, "u_zz has shape"),
-    ("points", {"y": np.zeros(32)}, r"\(32, 33\), from y and x"),
-    ("points", {"repeat": np.zeros(32)}, r"repeat has shape \(32,\)"),
-    ("points", {"repeat": np.full(33, 0.5)}, "no whole numbers"),
-    ("raster", {"repeat": np.zeros(33)}, r"repeat has shape(.|\n)*rows of a u_zz"),
-    ("points", {"y": np.full(33, 1e-3)}, r"0 mm along y(.|\n)*Leave y out"),
-    ("points", {"x": np.full(33, 1e-3)}, r"0 mm along x(.|\n)*direction='y'"),
-    ("line", {"u_zz_errors": np.zeros(3)}, "u_zz_errors has shape"),
-    ("line", {"normal_load": np.ones((2, 33))}, "normal_load has shape"),
-    ("line", {"channels": {"u_yz": np.zeros(7)}}, "u_yz has shape"),
-    ("line", {"x": np.full(33, np.nan)}, "x of the scan holds a value that is not finite"),
-    ("line", {"x": np.zeros((33, 1))}, "x of the scan has shape"),
-    ("raster", {"y": np.full(9, np.inf)}, "y of the scan"),
-    ("line", {"u_zz": np.full(33, np.inf)}, "infinite voltage"),
-    ("line", {"u_zz_errors": np.full(33, -1e-6)}, "negative or infinite"),
-    ("line", {"load": 0.0}, "load of the scan is 0 N"),
-    ("line", {"load": float("nan")}, "load of the scan is nan N"),
-    ("line", {"load": float("inf")}, "load of the scan is inf N"),
-    ("line", {"load_uncertainty": -0.01}, "standard uncertainty of the load"),
-    ("line", {"branch": [1, 2]}, r"branch has shape \(2,\)"),
-    ("line", {"branch": np.full(33, 3)}, "branch of the scan holds 3,"),
-    ("repeats", {"branch": ["approach", "retreat", "up"]}, "branch of the scan holds up,"),
-    ("line", {"normal_load_errors": np.ones(3)}, "normal_load_errors has shape"),
-    ("line", {"normal_load_errors": np.full(33, -0.01)}, "negative or infinite"),
-    ("line", {"normal_load_errors": np.full(33, np.inf)}, "negative or infinite"),
-    ("line", {"normal_load": None, "normal_load_errors": np.full(33, 0.02)}, "without normal_load"),
-    ("line", {"lubrication": "wet"}, "lubrication of the scan is 'wet'"),
-    ("line", {"lubrication": "dry", "lubricant": "glycerol"}, "'glycerol'.*is dry"),
-    ("line", {"lubricant": "glycerol"}, "'glycerol'.*is not stated"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "changes", "problem"),
+    [
+        ("line", {"u_zz": np.zeros(32)}, r"u_zz has shape \(32,\).*\(33,\) or \(repeat, 33\)"),
+        ("line", {"u_zz": np.zeros((2, 2, 33))}, "u_zz has shape"),
+        ("line", {"u_zz": np.zeros((0, 33))}, "u_zz has shape"),
+        ("line", {"u_zz": 1.0}, "u_zz has shape"),
+        ("raster", {"u_zz": np.zeros((33, 9))}, r"\(33, 9\).*\(9, 33\), from y and x"),
+        ("raster", {"u_zz": np.zeros(33)}, "u_zz has shape"),
+        ("points", {"y": np.zeros(32)}, r"\(32, 33\), from y and x"),
+        ("points", {"repeat": np.zeros(32)}, r"repeat has shape \(32,\)"),
+        ("points", {"repeat": np.full(33, 0.5)}, "no whole numbers"),
+        ("raster", {"repeat": np.zeros(33)}, r"repeat has shape(.|\n)*rows of a u_zz"),
+        ("points", {"y": np.full(33, 1e-3)}, r"0 mm along y(.|\n)*Leave y out"),
+        ("points", {"x": np.full(33, 1e-3)}, r"0 mm along x(.|\n)*direction='y'"),
+        ("line", {"u_zz_errors": np.zeros(3)}, "u_zz_errors has shape"),
+        ("line", {"normal_load": np.ones((2, 33))}, "normal_load has shape"),
+        ("line", {"channels": {"u_yz": np.zeros(7)}}, "u_yz has shape"),
+        ("line", {"x": np.full(33, np.nan)}, "x of the scan holds a value that is not finite"),
+        ("line", {"x": np.zeros((33, 1))}, "x of the scan has shape"),
+        ("raster", {"y": np.full(9, np.inf)}, "y of the scan"),
+        ("line", {"u_zz": np.full(33, np.inf)}, "infinite voltage"),
+        ("line", {"u_zz_errors": np.full(33, -1e-6)}, "negative or infinite"),
+        ("line", {"load": 0.0}, "load of the scan is 0 N"),
+        ("line", {"load": float("nan")}, "load of the scan is nan N"),
+        ("line", {"load": float("inf")}, "load of the scan is inf N"),
+        ("line", {"load_uncertainty": -0.01}, "standard uncertainty of the load"),
+        ("line", {"branch": [1, 2]}, r"branch has shape \(2,\)"),
+        ("line", {"branch": np.full(33, 3)}, "branch of the scan holds 3,"),
+        ("repeats", {"branch": ["approach", "retreat", "up"]}, "branch of the scan holds up,"),
+        ("line", {"normal_load_errors": np.ones(3)}, "normal_load_errors has shape"),
+        ("line", {"normal_load_errors": np.full(33, -0.01)}, "negative or infinite"),
+        ("line", {"normal_load_errors": np.full(33, np.inf)}, "negative or infinite"),
+        (
+            "line",
+            {"normal_load": None, "normal_load_errors": np.full(33, 0.02)},
+            "without normal_load",
+        ),
+        ("line", {"lubrication": "wet"}, "lubrication of the scan is 'wet'"),
+        ("line", {"lubrication": "dry", "lubricant": "glycerol"}, "'glycerol'.*is dry"),
+        ("line", {"lubricant": "glycerol"}, "'glycerol'.*is not stated"),
+    ],
+)
 def test_a_scan_that_contradicts_itself_is_refused(kind, changes, problem) -> None:
     with pytest.raises(InputError, match=problem):
         make_scan(kind, **changes)
 
 
 def test_a_scan_keeps_its_own_copy_of_its_data() -> None:
-    x, u, shear = np.linspace(-1e-3, 1e-3, 33), np.ones(33), np.ones(33)
+    x = np.linspace(-1e-3, 1e-3, 33)
+    u = np.ones(33)
+    shear = np.ones(33)
     scan = make_scan(x=x, u_zz=u, channels={"u_xz": shear})
     x += 1.0
     u += 1.0
@@ -82,18 +94,21 @@ def test_scans_and_profiles_are_shown_in_one_short_line(thing) -> None:
     assert "\n" not in repr(thing)
 
 
-@pytest.mark.parametrize(("changes", "problem"), [
-    ({"load": 0.0}, "load of the stress profile is 0 N"),
-    ({"r": np.linspace(1e-2, 0, 101)}, "r of the stress profile must increase"),
-    ({"r": np.zeros(101)}, "r of the stress profile must increase"),
-    ({"r": np.linspace(-1e-3, 1e-2, 101)}, "r of the stress profile is negative"),
-    ({"sigma_zz": np.zeros(100)}, "sigma_zz of the stress profile has 100 values for 101"),
-    ({"sigma_rz": np.zeros(102)}, "sigma_rz of the stress profile has 102 values for 101"),
-    ({"sigma_zz": np.full(101, np.nan)}, "sigma_zz of the stress profile holds"),
-    ({"sigma_zz": np.zeros((101, 1))}, "sigma_zz of the stress profile has shape"),
-    ({"r": [], "sigma_zz": []}, r"r of the stress profile has shape \(0,\)"),
-    ({"r": 1.0}, r"r of the stress profile has shape \(\)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"load": 0.0}, "load of the stress profile is 0 N"),
+        ({"r": np.linspace(1e-2, 0, 101)}, "r of the stress profile must increase"),
+        ({"r": np.zeros(101)}, "r of the stress profile must increase"),
+        ({"r": np.linspace(-1e-3, 1e-2, 101)}, "r of the stress profile is negative"),
+        ({"sigma_zz": np.zeros(100)}, "sigma_zz of the stress profile has 100 values for 101"),
+        ({"sigma_rz": np.zeros(102)}, "sigma_rz of the stress profile has 102 values for 101"),
+        ({"sigma_zz": np.full(101, np.nan)}, "sigma_zz of the stress profile holds"),
+        ({"sigma_zz": np.zeros((101, 1))}, "sigma_zz of the stress profile has shape"),
+        ({"r": [], "sigma_zz": []}, r"r of the stress profile has shape \(0,\)"),
+        ({"r": 1.0}, r"r of the stress profile has shape \(\)"),
+    ],
+)
 def test_a_profile_that_contradicts_itself_is_refused(changes, problem) -> None:
     with pytest.raises(InputError, match=problem):
         make_profile(**changes)

@@ -15,9 +15,21 @@ from hypothesis import strategies as st
 from memscal.formats.hdf5.writer import CONTENTS_PATH, DIGEST_ATTRIBUTE, content_digest
 
 NUMBERS = (
-    0.0, -0.0, 1.0, -1.0, 1e-9, 1e9, 1e-297, 1e200, 1e303, 1e308, 5e-324, float("nan"),
-    float("inf"), float("-inf"),
-)  # fmt: skip
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    1e-9,
+    1e9,
+    1e-297,
+    1e200,
+    1e303,
+    1e308,
+    5e-324,
+    float("nan"),
+    float("inf"),
+    float("-inf"),
+)
 SHAPES = ((), (0,), (1,), (2,), (7,), (7, 1), (1, 7), (3, 3), (2, 2, 2), (1, 1, 1, 1, 1))
 TYPES = ("f2", "f4", "f8", ">f8", "i1", "u1", "i8", "u8", "bool", "c16", "S4", "O")
 UNITS = (
@@ -61,7 +73,9 @@ def change_bytes(data: bytes, changes: Sequence[ByteChange]) -> bytes:
     """Return data with changes of bytes."""
     for kind, where, size, value in changes:
         at = int(where * max(len(data) - 1, 0))
-        before, piece, after = data[:at], data[at : at + size], data[at + size :]
+        before = data[:at]
+        piece = data[at : at + size]
+        after = data[at + size :]
         data = {
             "flip": before + bytes(b ^ (1 << value % 8) for b in piece[:1]) + piece[1:] + after,
             "set": before + bytes([value]) * len(piece) + after,
@@ -89,10 +103,23 @@ class Edit(NamedTuple):
 EDITS = st.lists(
     st.builds(
         Edit,
-        st.sampled_from((
-            "scale", "fill", "element", "replace", "units", "units", "text", "delete", "attribute",
-            "drop attribute", "group", "sparse", "chunks",
-        )),
+        st.sampled_from(
+            (
+                "scale",
+                "fill",
+                "element",
+                "replace",
+                "units",
+                "units",
+                "text",
+                "delete",
+                "attribute",
+                "drop attribute",
+                "group",
+                "sparse",
+                "chunks",
+            )
+        ),
         st.integers(0, 10_000),
         st.sampled_from(NUMBERS),
         st.sampled_from(SHAPES),
@@ -102,7 +129,7 @@ EDITS = st.lists(
     ),
     min_size=1,
     max_size=4,
-)  # fmt: skip
+)
 
 
 def edit_hdf5(data: bytes, edits: Sequence[Edit], *, digest: bool) -> bytes:
@@ -137,7 +164,8 @@ def _edit(file: h5py.File, edit: Edit) -> None:
     if not among:
         return
     path = edit.item if isinstance(edit.item, str) else among[edit.item % len(among)]
-    place, item = len(path) if isinstance(edit.item, str) else edit.item, file[path]
+    place = len(path) if isinstance(edit.item, str) else edit.item
+    item = file[path]
     with np.errstate(all="ignore"):
         if edit.kind == "scale":
             item[...] = np.nan_to_num(item[()] * edit.number).astype(item.dtype)
@@ -171,13 +199,17 @@ def _as(number: float, dtype: np.dtype[Any]) -> Any:
 
 def _replace(file: h5py.File, path: str, edit: Edit) -> None:
     attributes = dict(file[path].attrs)
-    of, name = file[path].parent, path.rpartition("/")[2]
+    of = file[path].parent
+    name = path.rpartition("/")[2]
     del file[path]
-    shape, options = edit.shape, {}
+    shape = edit.shape
+    options = {}
     if edit.kind == "sparse":  # claims much, and holds nothing
-        shape, options = (2**27, 3), {"chunks": (2**12, 3), "compression": "gzip"}
+        shape = (2**27, 3)
+        options = {"chunks": (2**12, 3), "compression": "gzip"}
     elif edit.kind == "chunks":
-        shape, options = (40,), {"chunks": (20,), "compression": "gzip", "shuffle": True}
+        shape = (40,)
+        options = {"chunks": (20,), "compression": "gzip", "shuffle": True}
     dtype: Any = h5py.string_dtype() if edit.dtype == "O" else edit.dtype
     made = of.create_dataset(name, shape, dtype, **options)
     if edit.kind != "sparse" and np.dtype(made.dtype).kind in "fiu" and made.size:
@@ -236,21 +268,32 @@ class CellChange(NamedTuple):
 TABLE = st.lists(
     st.builds(
         CellChange,
-        st.sampled_from((
-            "cell", "cell", "drop", "double", "insert", "separator", "encoding", "line ends",
-        )),
+        st.sampled_from(
+            (
+                "cell",
+                "cell",
+                "drop",
+                "double",
+                "insert",
+                "separator",
+                "encoding",
+                "line ends",
+            )
+        ),
         st.integers(0, 100),
         st.integers(0, 5),
         st.sampled_from(CELLS),
     ),
     min_size=1,
     max_size=5,
-)  # fmt: skip
+)
 
 
 def change_table(data: bytes, changes: Sequence[CellChange]) -> bytes:
     """Return a table of text with changes of cells, rows, separators or encoding."""
-    lines, end, encoding = data.decode().splitlines(), "\n", "utf-8"
+    lines = data.decode().splitlines()
+    end = "\n"
+    encoding = "utf-8"
     for kind, row, column, text in changes:
         row %= max(len(lines), 1)
         cells = lines[row].split(",") if lines else [""]

@@ -38,7 +38,8 @@ from memscal.formats.scan import write_scan
 
 #: Documented exit codes: done, a check failed, usage, input refused, output not written.
 CODES = {0, 1, 2, 3, 4}
-SECONDS, GIBIBYTE = 20.0, 2**30
+SECONDS = 20.0
+GIBIBYTE = 2**30
 
 
 def drawn(reduced: int, whole: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -105,7 +106,8 @@ def survives(folder: Path, data: bytes, *commands: tuple[str, ...], name: str = 
         path.unlink()
     (folder / name).write_bytes(data)
     for command in commands:
-        said, shown = io.StringIO(), io.StringIO()
+        said = io.StringIO()
+        shown = io.StringIO()
         start = time.process_time()
         with warnings.catch_warnings(), contextlib.chdir(folder), little_memory():
             # What a user would see of numpy, scipy or h5py; of a wrong unit they are to see it.
@@ -150,14 +152,20 @@ def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
     survives(folder, change_bytes(good[kind], changes), *LOOKED_AT, *USED[kind])
 
 
-_U, _X, _LIMIT = "/entry/data/u_zz", "/entry/data/x", "/entry/quality/reconvolution/limit"
+_U = "/entry/data/u_zz"
+_X = "/entry/data/x"
+_LIMIT = "/entry/quality/reconvolution/limit"
 _OPTIONS = "/entry/process/configuration/data"
 #: Edits with which commands once crashed, hung, ran out of memory or printed what is no JSON.
 CORPUS = (
-    ("scan", Edit("scale", _U, 1e303)), ("scan", Edit("scale", _U, 1e-297)),
-    ("scan", Edit("fill", _X, 1e308)), ("scan", Edit("units", _X, unit="furlong")),
-    ("scan", Edit("units", _X, unit="m")), ("scan", Edit("scale", _X, 1e200)),
-    ("scan", Edit("sparse", _U)), ("scan", Edit("sparse", _X, dtype="i1")),
+    ("scan", Edit("scale", _U, 1e303)),
+    ("scan", Edit("scale", _U, 1e-297)),
+    ("scan", Edit("fill", _X, 1e308)),
+    ("scan", Edit("units", _X, unit="furlong")),
+    ("scan", Edit("units", _X, unit="m")),
+    ("scan", Edit("scale", _X, 1e200)),
+    ("scan", Edit("sparse", _U)),
+    ("scan", Edit("sparse", _X, dtype="i1")),
     ("scan", Edit("fill", "/entry/sample/film/poisson_ratio", 5e-324)),
     ("raster", Edit("fill", "/entry/data/normal_load", float("nan"))),
     ("raster", Edit("scale", "/entry/sample/film/young_modulus", 1e-9)),
@@ -167,7 +175,7 @@ CORPUS = (
     ("artifact", Edit("replace", "/entry/parameters/centre_errors", shape=(0,))),
     ("compact", Edit("replace", "/entry/radial_profile/r", shape=(1, 7))),
     ("stress", Edit("text", "/entry/profiles", text='["a", "a"]')),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(("kind", "edit"), CORPUS)
@@ -196,6 +204,20 @@ def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
 def test_damaged_meshes_are_read_or_refused(good, folder, changes) -> None:
     # Each is read by a process of its own.
     change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
-    run = ("import", "in.vtu", "-o", "out.h5", "--format", "reference", "--r-unit", "mm",
-           "--sigma", "S", "--sigma-unit", "MPa", "--load", "1")  # fmt: skip
+    run = (
+        "import",
+        "in.vtu",
+        "-o",
+        "out.h5",
+        "--format",
+        "reference",
+        "--r-unit",
+        "mm",
+        "--sigma",
+        "S",
+        "--sigma-unit",
+        "MPa",
+        "--load",
+        "1",
+    )
     survives(folder, change(good["mesh"], changes), run, name="in.vtu")

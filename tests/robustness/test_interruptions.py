@@ -42,8 +42,11 @@ def folder(tmp_path: Path) -> Path:
 def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "memscal", *arguments],
-        cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 def timed(folder: Path) -> float:
@@ -70,7 +73,8 @@ def interrupted(folder: Path, number: signal.Signals, delay: float) -> tuple[int
 def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
     folder: Path, seed: int
 ) -> None:
-    draw, whole = random.Random(seed), timed(folder)
+    draw = random.Random(seed)
+    whole = timed(folder)
     for _ in range(number(5, 250)):
         code, _ = interrupted(folder, signal.SIGKILL, draw.uniform(0, 1.1 * whole))
         assert code in (0, 1, -signal.SIGKILL)
@@ -88,7 +92,8 @@ def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
 
 
 def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder: Path, seed: int) -> None:
-    draw, whole = random.Random(seed), timed(folder)
+    draw = random.Random(seed)
+    whole = timed(folder)
     for _ in range(number(1, 84)):
         for sent, expected in CODES.items():
             code, said = interrupted(folder, sent, draw.uniform(0, whole))
@@ -138,9 +143,11 @@ def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path: Path, seed: int) -> N
     write_scan(make_scan(), tmp_path / "scan.h5")
     for name in ("artifact.h5", "scan.h5"):
         path = tmp_path / name
-        good, known = path.read_bytes(), described(path)
+        good = path.read_bytes()
+        known = described(path)
         for _ in range(number(40, 500)):
-            damaged, at = bytearray(good), draw.randrange(len(good))
+            damaged = bytearray(good)
+            at = draw.randrange(len(good))
             damaged[at] ^= 1 << draw.randrange(8)
             path.write_bytes(damaged)
             passed = all(finding.passed for finding in check(path))

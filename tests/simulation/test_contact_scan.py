@@ -30,11 +30,17 @@ def truth(scan: Scan) -> dict[str, Any]:
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_the_voltage_over_the_plane_is_the_constant_times_each_load(friction: float) -> None:
     scan = simulate_contacts(
-        load=[0.34, 1.37], friction=friction, points=801, spacing=0.1e-3,
-        conversion_constant=3e-8, **EXACT, **CENTRED,
-    )  # fmt: skip
+        load=[0.34, 1.37],
+        friction=friction,
+        points=801,
+        spacing=0.1e-3,
+        conversion_constant=3e-8,
+        **EXACT,
+        **CENTRED,
+    )
     right = scan.x > -1e-9
-    r, u = scan.x[right], scan.u_zz[:, right]
+    r = scan.x[right]
+    u = scan.u_zz[:, right]
     total = 2 * np.pi * simpson(u * r, x=r, axis=1)
     np.testing.assert_allclose(total, 3e-8 * np.array([0.34, 1.37]), rtol=1e-6)
 
@@ -132,9 +138,15 @@ def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -
 
 def test_the_scan_and_its_truth_say_what_was_pressed() -> None:
     scan = simulate_contacts(
-        load=[0.34, 0.69], repeats=2, friction=0.4, points=9, spacing=1e-3,
-        lubrication="lubricated", lubricant="glycerol", seed=5,
-    )  # fmt: skip
+        load=[0.34, 0.69],
+        repeats=2,
+        friction=0.4,
+        points=9,
+        spacing=1e-3,
+        lubrication="lubricated",
+        lubricant="glycerol",
+        seed=5,
+    )
     assert scan.kind == "repeats"
     np.testing.assert_array_equal(scan.normal_load[:, 0], [0.34, 0.34, 0.69, 0.69])
     np.testing.assert_allclose(scan.x, np.arange(-4, 5) * 1e-3, atol=1e-18)
@@ -145,23 +157,29 @@ def test_the_scan_and_its_truth_say_what_was_pressed() -> None:
     assert (told["young_modulus"], told["indenter_radius"]) == (2.2e6, 128.8e-3)
 
 
-@pytest.mark.parametrize(("options", "error", "problem"), [
-    ({"load": []}, InputError, "list of loads is empty"),
-    ({"load": [0.3, 0.3]}, InputError, "given twice"),
-    ({"load": [-1.0]}, InputError, "load is -1 N"), ({"load": 1e7}, DomainError, "load|film"),
-    ({"points": 1}, InputError, "two contacts"), ({"repeats": 0}, InputError, "one row"),
-    ({"seed": -1}, InputError, "seed"), ({"spacing": 0.0}, InputError, "spacing"),
-    ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
-    ({"load_reading": -0.1}, InputError, "load_reading"),
-    ({"load_scale": 0.0}, InputError, "load_scale"),
-    ({"position_error": -1e-6}, InputError, "position_error"),
-    ({"noise": float("nan")}, InputError, "noise"),
-    ({"centre": (float("inf"), 0.0)}, InputError, "centre"),
-    ({"friction": -0.1}, InputError, "friction"),
-    ({"lubrication": "wet"}, InputError, "lubrication"),
-    ({"lubrication": "dry", "lubricant": "oil"}, InputError, "lubricant"),
-    ({"kernel": 561e-6}, InputError, "transform"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "error", "problem"),
+    [
+        ({"load": []}, InputError, "list of loads is empty"),
+        ({"load": [0.3, 0.3]}, InputError, "given twice"),
+        ({"load": [-1.0]}, InputError, "load is -1 N"),
+        ({"load": 1e7}, DomainError, "load|film"),
+        ({"points": 1}, InputError, "two contacts"),
+        ({"repeats": 0}, InputError, "one row"),
+        ({"seed": -1}, InputError, "seed"),
+        ({"spacing": 0.0}, InputError, "spacing"),
+        ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
+        ({"load_reading": -0.1}, InputError, "load_reading"),
+        ({"load_scale": 0.0}, InputError, "load_scale"),
+        ({"position_error": -1e-6}, InputError, "position_error"),
+        ({"noise": float("nan")}, InputError, "noise"),
+        ({"centre": (float("inf"), 0.0)}, InputError, "centre"),
+        ({"friction": -0.1}, InputError, "friction"),
+        ({"lubrication": "wet"}, InputError, "lubrication"),
+        ({"lubrication": "dry", "lubricant": "oil"}, InputError, "lubricant"),
+        ({"kernel": 561e-6}, InputError, "transform"),
+    ],
+)
 def test_what_cannot_be_scanned_is_refused(options, error, problem) -> None:
     with pytest.raises(error, match=problem):
         simulate_contacts(**{"load": [0.34], **options})
@@ -228,7 +246,8 @@ def test_what_is_drawn_scatters_as_it_is_stated() -> None:
 
 def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones() -> None:
     found = memscal.simulate_experiment(**FEW, **EXACT, draw_inputs=True, seed=3)
-    told, rod = truth(found.dry), truth(found.rod)
+    told = truth(found.dry)
+    rod = truth(found.rod)
     names = ("young_modulus", "poisson_ratio", "thickness")
     for name in names:
         assert told[name] == rod[name] != getattr(PAPER_FILM, name)
@@ -241,14 +260,23 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
     film = replace(film, poisson_ratio_uncertainty=None)
     sphere = memscal.Sphere(radius=told["indenter_radius"])
     again = simulate_contacts(
-        film=film, sphere=sphere, load=[told["load_1"]], friction=0.2, points=9, spacing=2e-3,
+        film=film,
+        sphere=sphere,
+        load=[told["load_1"]],
+        friction=0.2,
+        points=9,
+        spacing=2e-3,
         **EXACT,
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(found.dry.u_zz, again.u_zz, rtol=1e-9)
     pressed = memscal.simulate(
-        film=film, rod=memscal.Rod(radius=rod["indenter_radius"]), load=rod["load_1"],
-        noise=0.0, baseline=0.0, drift=0.0,
-    )  # fmt: skip
+        film=film,
+        rod=memscal.Rod(radius=rod["indenter_radius"]),
+        load=rod["load_1"],
+        noise=0.0,
+        baseline=0.0,
+        drift=0.0,
+    )
     np.testing.assert_allclose(found.rod.u_zz, pressed.u_zz, rtol=1e-12)
 
 
@@ -273,7 +301,8 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
     normal = memscal.ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6)
     law = memscal.Interface(normal=normal, slip_length=2e-6)
     found = memscal.simulate_experiment(**FEW, load_scatter=0.0, friction=0.3, interface=law)
-    dry, lubricated = truth(found.dry), truth(found.lubricated)
+    dry = truth(found.dry)
+    lubricated = truth(found.lubricated)
     assert (dry["slip_length"], dry["decay_length"]) == (2e-6, 1e-6)
     assert "slip_length" not in lubricated
     assert lubricated["decay_length"] == 1e-6

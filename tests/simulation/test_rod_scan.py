@@ -34,7 +34,8 @@ def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: Radia
 
 def test_a_line_is_the_middle_row_of_a_raster() -> None:
     options: dict[str, Any] = {"points": 33, "centre": (0.3e-3, 0.2e-3), "film": LINEAR, **STILL}
-    raster, line = simulate(raster=True, **options), simulate(**options)
+    raster = simulate(raster=True, **options)
+    line = simulate(**options)
     assert (raster.kind, line.kind) == ("raster", "line")
     np.testing.assert_array_equal(raster.x, raster.y)
     np.testing.assert_allclose(raster.u_zz[16], line.u_zz, rtol=1e-9)
@@ -102,16 +103,22 @@ def test_the_rod_is_pressed_by_the_law_at_each_load() -> None:
     scan = simulate(load=loads, repeats=2, **options)
     for rows, load in zip((scan.u_zz[:2], scan.u_zz[2:]), loads, strict=True):
         np.testing.assert_allclose(rows, [simulate(load=load, **options).u_zz] * 2, rtol=1e-9)
-    light, heavy = scan.u_zz[0].max() / loads[0], scan.u_zz[2].max() / loads[1]
+    light = scan.u_zz[0].max() / loads[0]
+    heavy = scan.u_zz[2].max() / loads[1]
     assert heavy / light > 1.1
 
 
-@pytest.mark.parametrize(("film", "law", "friction"), [
-    (PAPER_FILM, "neo-hookean", math.inf), (LINEAR, "linear", None),
-    (replace(PAPER_FILM, law=""), "linear", None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("film", "law", "friction"),
+    [
+        (PAPER_FILM, "neo-hookean", math.inf),
+        (LINEAR, "linear", None),
+        (replace(PAPER_FILM, law=""), "linear", None),
+    ],
+)
 def test_the_scan_states_its_law_if_it_has_one_and_it_is_wanted(film, law, friction) -> None:
-    scan, silent = simulate(film=film, points=9), simulate(film=film, points=9, state_law=False)
+    scan = simulate(film=film, points=9)
+    silent = simulate(film=film, points=9, state_law=False)
     assert (scan.film, scan.rod_friction) == (film, friction)
     assert (silent.film, silent.rod_friction) == (replace(film, law=""), None)
     assert scan.synthetic == silent.synthetic
@@ -180,16 +187,20 @@ class Own:
 
 
 def test_any_object_with_the_three_methods_is_a_kernel() -> None:
-    own, disc = simulate(kernel=Own(), seed=3), simulate(kernel=DISC, seed=3)
+    own = simulate(kernel=Own(), seed=3)
+    disc = simulate(kernel=DISC, seed=3)
     np.testing.assert_allclose(own.u_zz, disc.u_zz, rtol=1e-12)
     assert own.synthetic.items() >= {"kernel": "my own", "centre_of_mass": 0.0}.items()
 
 
-@pytest.mark.parametrize(("kernel", "problem"), [
-    (Own(size=2.0), "transform is 2 at k = 0, not 1"),
-    (Own(size=float("nan")), "transform is nan at k = 0"),
-    (561e-6, r"a float, which has no transform\(\)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kernel", "problem"),
+    [
+        (Own(size=2.0), "transform is 2 at k = 0, not 1"),
+        (Own(size=float("nan")), "transform is nan at k = 0"),
+        (561e-6, r"a float, which has no transform\(\)"),
+    ],
+)
 def test_what_is_no_apparatus_function_is_refused(kernel: Any, problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         simulate(kernel=kernel, points=9)

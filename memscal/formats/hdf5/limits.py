@@ -18,8 +18,10 @@ import h5py
 from memscal.errors import UnsafeFileError
 from memscal.model.sizes import MOST_ARRAY_BYTES, MOST_HDF5_BYTES
 
-_DESCRIPTOR, _OBJECT = 16, 16  # _OBJECT: header of an object in a global heap
-_CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
+_DESCRIPTOR = 16
+_OBJECT = 16  # _OBJECT: header of an object in a global heap
+_CONTINUATION = 0x10
+_ATTRIBUTE = 0x0C
 _SHARED = 0x02
 _VARIABLE_LENGTH = 9  # class of the datatype
 _MAX_BLOCKS = 1000
@@ -83,7 +85,8 @@ def attribute_text_lengths(
 def _dense_lengths(data: bytes, name: bytes, number: int, heaps: set[int]) -> Iterator[int]:
     """Yield the claims of every attribute of this name and of variable length, in any object."""
     # In a heap of many attributes a message stands as it would in the header.
-    terminated, whole = name + b"\0", memoryview(data)
+    terminated = name + b"\0"
+    whole = memoryview(data)
     position = data.find(terminated)
     for _ in range(_MAX_RECORDS):
         if position < 0:
@@ -119,10 +122,12 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
         start = header + 6 + (16 if settings & 0x20 else 0) + (4 if settings & 0x10 else 0)
         width = 1 << (settings & 0x03)
         size = int.from_bytes(data[start : start + width], "little")
-        blocks, prefix = [(start + width, size)], 6 if settings & 0x04 else 4
+        blocks = [(start + width, size)]
+        prefix = 6 if settings & 0x04 else 4
     else:
         (size,) = struct.unpack_from("<I", data, header + 8)
-        blocks, prefix = [(header + 16, size)], 8
+        blocks = [(header + 16, size)]
+        prefix = 8
     for _ in range(_MAX_BLOCKS):
         if not blocks:
             return
@@ -141,8 +146,10 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
 
 
 MAX_TEXT_BYTES = 4 * 2**20
-_MAX_RANK, _MAX_NUMBER_BYTES = 4, 16
-_MAX_CHUNKS, _MIN_CHUNK_LIMIT = 2**16, 2**20
+_MAX_RANK = 4
+_MAX_NUMBER_BYTES = 16
+_MAX_CHUNKS = 2**16
+_MIN_CHUNK_LIMIT = 2**20
 #: Chunks at the edges of an array of four axes may make it this many times as large.
 _MAX_MARGIN = 16
 _UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
@@ -150,7 +157,8 @@ _UNWRITTEN = "was never written in full", "Values that are not there would read 
 
 #: Bytes that may be held of any file, and more for each of its bytes: packed readings of noise
 #: stand for two or three bytes each, and arrays without noise beside them for many.
-_USUAL, _MOST_PER_BYTE = 2**26, 64
+_USUAL = 2**26
+_MOST_PER_BYTE = 64
 
 
 def most_held(size: int) -> int:
@@ -194,7 +202,8 @@ class Layout(NamedTuple):
     def of(cls, where: str, item: Any) -> Layout:
         """Look at a dataset or an attribute."""
         # HDF5's objects are asked for once: each costs as much as reading a number.
-        space, kind = item.get_space(), item.get_type()
+        space = item.get_space()
+        kind = item.get_type()
         if space.get_simple_extent_type() == h5py.h5s.NULL:
             raise refuse(where, "has a null dataspace", "It holds no value.")
         return cls(kind, space.shape, math.prod(space.shape) * kind.get_size())

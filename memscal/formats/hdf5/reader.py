@@ -45,7 +45,8 @@ def damage_named(
         raise FormatError(f"{problem}.", why=f"{why} ({reason}).", cure=cure) from error
 
 
-_MAX_ATTRIBUTE_BYTES, _MAX_ATTRIBUTE_ITEMS = 2**16, 64
+_MAX_ATTRIBUTE_BYTES = 2**16
+_MAX_ATTRIBUTE_ITEMS = 64
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 

@@ -37,12 +37,16 @@ _WORKER = Path(__file__).with_name("worker.py")
 _MAX_ANSWER_BYTES = 512 * 2**20
 # Of the child, and of its answer: for the libraries and a small mesh, and more for each byte of the
 # file.
-_MEMORY, _MEMORY_PER_BYTE = 640 * 2**20, 20
-_ANSWER, _ANSWER_PER_BYTE = 2**25, 20
-_SECONDS, _BYTES_PER_SECOND = 60.0, 2**20
+_MEMORY = 640 * 2**20
+_MEMORY_PER_BYTE = 20
+_ANSWER = 2**25
+_ANSWER_PER_BYTE = 20
+_SECONDS = 60.0
+_BYTES_PER_SECOND = 2**20
 # Whatever else is in the environment is not for a process that reads files of others.
 _ENVIRONMENT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PATH", "SYSTEMROOT")
-_MAX_REASON, _MAX_SHOWN = 400, 80
+_MAX_REASON = 400
+_MAX_SHOWN = 80
 _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 # The address of an array in another file, such as film.h5:/data0, where XDMF has numbers.
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
@@ -167,7 +171,8 @@ _OTHERS = {
     *(".exo", ".e", ".bdf", ".unv", ".odb", ".rst", ".mph", ".ply", ".stl", ".obj"),
 }
 _CELLS = {3: "triangle", 6: "triangle6"}
-_MAX_NAME, _MAX_NOTES = 80, 4000
+_MAX_NAME = 80
+_MAX_NOTES = 4000
 
 
 def is_mesh(path: str | os.PathLike[str]) -> bool:
@@ -216,7 +221,8 @@ class Mesh:
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""
     shown = os.fspath(path)
-    name, ending = os.path.basename(shown), os.path.splitext(shown)[1].lower()
+    name = os.path.basename(shown)
+    ending = os.path.splitext(shown)[1].lower()
     if ending not in _KINDS:
         raise FormatError(
             f"{name} is not a mesh of a kind that is read.",

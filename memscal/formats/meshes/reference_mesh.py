@@ -18,7 +18,9 @@ from memscal.model.notation import printable
 AXES = "xyz"
 # Of the largest coordinate: meshes are often stored in single precision.
 _TOLERANCE = 1e-6
-_FEWEST, _CIRCLES, _DIRECTIONS = 4, 501, 72
+_FEWEST = 4
+_CIRCLES = 501
+_DIRECTIONS = 72
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +86,14 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
 def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
     """Find what lies on the base, at a level of the vertical axis in m: by default the lowest."""
     heights = frame.height[mesh.used]
-    lowest, highest = float(heights.min()), float(heights.max())
+    lowest = float(heights.min())
+    highest = float(heights.max())
     position = lowest if level is None else level
     # Only where nothing lies above it is the base the upper face of the film.
     outward = 1 if position >= highest - frame.tolerance else -1
     on_base = np.abs(frame.height - position) <= frame.tolerance
-    sides, nodes = [], []
+    sides = []
+    nodes = []
     for block in mesh.solid:
         touching = on_base[block.nodes]
         middle = frame.height[block.nodes].mean(axis=1)
@@ -155,7 +159,10 @@ def average_over_circles(
 
 # VTK's order of a symmetric tensor, and that of axisymmetric elements in FEM programs.
 _SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")
-_SCALAR, _AXISYMMETRIC, _SIX, _NINE = 1, 4, 6, 9
+_SCALAR = 1
+_AXISYMMETRIC = 4
+_SIX = 6
+_NINE = 9
 _MOST_LISTED = 30
 
 

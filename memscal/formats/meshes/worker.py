@@ -23,7 +23,8 @@ _SECTIONS = ("Points", "Cells", "PointData", "CellData")
 _NUMBERS = re.compile("U?Int(8|16|32|64)|Float(32|64)")
 # Bytes that are not XML follow the first underscore of a raw section.
 _RAW = re.compile(rb"""<AppendedData[^>]*encoding\s*=\s*["']raw["'][^>]*>\s*_""")
-_MOST_FILES, _MOST_PRINTED = 32, 300
+_MOST_FILES = 32
+_MOST_PRINTED = 300
 _FORBIDDEN = {"ctypes", "ftplib", "pickle", "pty", "shutil", "socket", "subprocess", "urllib"}
 # What an import does: modules that are needed late, such as an encoding, may still be loaded.
 _ALLOWED_OF_OS = {"os.listdir", "os.scandir"}
@@ -53,7 +54,8 @@ def main() -> None:
         if sum(values.nbytes for values in arrays) > request["output"]:
             raise MemoryError
     except BaseException as error:  # noqa: BLE001 - meshio ends the program on some files
-        arrays, header = [], _failure(error, request["memory"])
+        arrays = []
+        header = _failure(error, request["memory"])
     np.save(answer, np.frombuffer(json.dumps(header).encode(), np.uint8))
     for values in arrays:
         np.save(answer, values, allow_pickle=False)
@@ -150,7 +152,8 @@ def _read(meshio: Any, kind: str, given: Any) -> tuple[str, Any]:
             root = {"vtu": _tidy_vtu, "xdmf": _tidy_xdmf}[kind](given.read())
             # meshio parses with this function: it is given the tidy tree.
             ET.parse = lambda *_: ET.ElementTree(root)
-        path, opener = f"mesh.{kind}", builtins.open
+        path = f"mesh.{kind}"
+        opener = builtins.open
         # The mesh has no name: it is what stands in the standard input.
         vars(builtins)["open"] = lambda file, *a, **k: (
             given if file == path else opener(file, *a, **k)
@@ -169,7 +172,8 @@ def _tidy_vtu(data: bytes) -> Element:
         end = data.rfind(b"</AppendedData>")
         if end < begin.end():
             raise ValueError("it ends inside its appended data")
-        data, raw = data[: begin.end()] + data[end:], data[begin.end() : end]
+        raw = data[begin.end() : end]
+        data = data[: begin.end()] + data[end:]
     root = ET.fromstring(data)
     if root.tag != "VTKFile" or root.get("type") != "UnstructuredGrid":
         raise ValueError(f"it holds {root.get('type', root.tag)}, not an unstructured grid")

@@ -16,7 +16,8 @@ from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
 # A larger difference between force and load is warned of, one beyond a factor is refused.
-_WARNED, _REFUSED = 0.03, 2.0
+_WARNED = 0.03
+_REFUSED = 2.0
 # Samples whose stress has not decayed to this share of its maximum end early.
 _DECAYED = 0.01
 # In SI; a force calculated from larger numbers would overflow.
@@ -114,8 +115,11 @@ def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, Float
 
 def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message]:
     """Hold the force that the samples carry against their load, which finds a wrong unit."""
-    force, load = profile.force, profile.load
-    file_name, kind, turned = samples.source.file_name, samples.kind, -samples.sign
+    force = profile.force
+    load = profile.load
+    file_name = samples.source.file_name
+    kind = samples.kind
+    turned = -samples.sign
     if force <= 0:
         counted = "negative" if turned == -1 else "positive"
         raise InputError(
@@ -124,7 +128,8 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message
             cure=f"If the program counts compression as {counted}, say so (sign={turned}; "
             f"--sign {turned}).",
         )
-    ratio, reach = force / load, profile.r[-1] * 1e3
+    ratio = force / load
+    reach = profile.r[-1] * 1e3
     tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
     early = tail > _DECAYED
     within = f"within r = {reach:.4g} mm"

@@ -30,7 +30,8 @@ Columns = dict[str, NDArray[Any]]
 _ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "u_xz", "u_yz")
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
 #: so large a share of them was probably repeated.
-_CLOSE, _MANY = 0.1, 0.25
+_CLOSE = 0.1
+_MANY = 0.25
 #: Loads of one line that differ by more than this share were hardly meant to be one.
 _MIXED = 0.3
 
@@ -50,18 +51,34 @@ class ImportedScan(Scan):
 
 @reported
 def import_table(
-    source: Any, *, u: Column, x: Column | None = None, y: Column | None = None,
-    x_unit: str | None = None, u_unit: str | None = None,
-    u_errors: Column | None = None, noise: float | None = None,
-    load: float | None = None, load_column: Column | None = None, load_unit: str | None = None,
-    load_scatter: float | None = None, x_error: float | None = None,
-    repeat: Column | Sequence[Column] | None = None, branch: Column | None = None,
-    u_xz: Column | None = None, u_yz: Column | None = None, u_sign: int = 1, holds: bool = False,
-    sheet: str | None = None, skip_rows: int = 0, missing: Sequence[str] = (),
-    delimiter: str | None = None, decimal: str | None = None,
+    source: Any,
+    *,
+    u: Column,
+    x: Column | None = None,
+    y: Column | None = None,
+    x_unit: str | None = None,
+    u_unit: str | None = None,
+    u_errors: Column | None = None,
+    noise: float | None = None,
+    load: float | None = None,
+    load_column: Column | None = None,
+    load_unit: str | None = None,
+    load_scatter: float | None = None,
+    x_error: float | None = None,
+    repeat: Column | Sequence[Column] | None = None,
+    branch: Column | None = None,
+    u_xz: Column | None = None,
+    u_yz: Column | None = None,
+    u_sign: int = 1,
+    holds: bool = False,
+    sheet: str | None = None,
+    skip_rows: int = 0,
+    missing: Sequence[str] = (),
+    delimiter: str | None = None,
+    decimal: str | None = None,
     progress: Listener = None,  # noqa: ARG001 - @reported
     **stated: Any,
-) -> ImportedScan:  # fmt: skip
+) -> ImportedScan:
     """Read a scan from a table with one row for each reading.
 
     The header is found below what precedes it.  Units stand in the heads (``x/mm``, ``x [mm]``,
@@ -127,25 +144,38 @@ def import_table(
         cure = "Give fields of memscal.Scan, such as indenter=memscal.Rod(radius=0.25e-3)."
         raise InputError(problem, cure=cure)
     require_sign("sign of the voltage", u_sign)
-    no_load, of_u = load is None and load_column is None, (u_unit, "u_unit (--u-unit)")
+    no_load = load is None and load_column is None
+    of_u = (u_unit, "u_unit (--u-unit)")
     noisy = u_errors is not None or noise is not None
     for useless, problem, cure in (
-        (load_unit and load_column is None, "load_unit (--load-unit) belongs to a column of loads.",
-         "Give the load (--load) in N: 80 g weigh 0.785 N."),
-        (no_load and stated.get("load_uncertainty") is not None,
-         "load_uncertainty (--load-uncertainty) belongs to a load.", "Give the load, too."),
-        (noisy and (holds or (u_errors is not None and noise is not None)),
-         "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or that of holds.",
-         "Give one of them."),
-    ):  # fmt: skip
+        (
+            load_unit and load_column is None,
+            "load_unit (--load-unit) belongs to a column of loads.",
+            "Give the load (--load) in N: 80 g weigh 0.785 N.",
+        ),
+        (
+            no_load and stated.get("load_uncertainty") is not None,
+            "load_uncertainty (--load-uncertainty) belongs to a load.",
+            "Give the load, too.",
+        ),
+        (
+            noisy and (holds or (u_errors is not None and noise is not None)),
+            "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or of holds.",
+            "Give one of them.",
+        ),
+    ):
         if useless:
             raise InputError(problem, cure=cure)
     if x is None and y is None:
         raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
     table = open_table(
-        source, sheet=sheet, skip_rows=skip_rows, missing=tuple(missing), delimiter=delimiter,
+        source,
+        sheet=sheet,
+        skip_rows=skip_rows,
+        missing=tuple(missing),
+        delimiter=delimiter,
         decimal=decimal,
-    )  # fmt: skip
+    )
     u_unit = table.unit_of(u, *of_u)
     reading = reading_of(u_unit, table.where(u))
     volts = dimension_in("voltage", reading)
@@ -153,14 +183,16 @@ def import_table(
     wanted = {
         name: Wanted(column, table.unit_of(column, *unit), dimension)
         for name, column, dimension, unit in (
-            ("u_zz", u, volts, (*of_u, None)), ("u_xz", u_xz, volts, (*of_u, u_unit)),
+            ("u_zz", u, volts, (*of_u, None)),
+            ("u_xz", u_xz, volts, (*of_u, u_unit)),
             ("u_yz", u_yz, volts, (*of_u, u_unit)),
             ("u_zz_errors", u_errors, volts, (None, "", u_unit)),
             ("normal_load", load_column, "force", (load_unit, "load_unit (--load-unit)", "N")),
-            ("x", x, "length", of_x), ("y", y, "length", of_x),
+            ("x", x, "length", of_x),
+            ("y", y, "length", of_x),
         )
         if column is not None
-    }  # fmt: skip
+    }
     units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items())
     numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
     wanted |= {f"repeat {i}": Wanted(c, words=BRANCHES) for i, c in enumerate(numbering)}
@@ -196,9 +228,13 @@ def import_table(
 
 
 def _scan_of(
-    columns: Columns, notes: list[str], reading: Reading, load_scatter: float | None,
-    x_error: float | None, stated: dict[str, Any],
-) -> ImportedScan:  # fmt: skip
+    columns: Columns,
+    notes: list[str],
+    reading: Reading,
+    load_scatter: float | None,
+    x_error: float | None,
+    stated: dict[str, Any],
+) -> ImportedScan:
     """Return the scan of columns without gaps in their positions, and add to the notes."""
     words = _numbered_by_load(columns, notes)
     if "normal_load" in columns:
@@ -275,8 +311,10 @@ def _set_up_in_words(stated: Any) -> Iterator[str]:
     film, indenter = (getattr(stated, name, None) for name in ("film", "indenter"))
     shape = "indenter" if indenter is None else indenter.shape
     for name, owner, record in (
-        (shape, indenter, ROUND_INDENTER), ("pressed with", stated, LOAD), ("film", film, FILM),
-    ):  # fmt: skip
+        (shape, indenter, ROUND_INDENTER),
+        ("pressed with", stated, LOAD),
+        ("film", film, FILM),
+    ):
         words = []
         for q in (q for q in record.quantities if not q.name.endswith("_uncertainty")):
             value, u = (getattr(owner, key, None) for key in (q.name, f"{q.name}_uncertainty"))
@@ -339,7 +377,8 @@ def _placed(columns: Columns, notes: list[str], of_rows: Callable[[Any], str]) -
 
 
 def _counted(columns: Columns) -> list[str]:
-    x, y = columns["x"], columns.get("y", np.zeros(columns["x"].size))
+    x = columns["x"]
+    y = columns.get("y", np.zeros(columns["x"].size))
     repeat = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
     places = places_of(x, y, repeat)
     number = int(repeat.max()) + 1

@@ -38,7 +38,9 @@ _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 #: Options of reading by the kinds of tables that have a use for them.
 _USES = {"delimiter": ("text",), "skip_rows": ("text", "workbook"), "sheet": ("workbook",)}
 _Read = TypeVar("_Read")
-_PIECE, _MAX_NAME, _MAX_REASON = 2**16, 80, 300
+_PIECE = 2**16
+_MAX_NAME = 80
+_MAX_REASON = 300
 
 
 def open_table(source: Any, **reading: Any) -> NamedColumns:
@@ -57,7 +59,8 @@ def open_table(source: Any, **reading: Any) -> NamedColumns:
         return TextTable(source, **reading)
     if not path:
         return _columns_in_memory(source, **reading)
-    name, data = PurePath(source).name, read_bytes(source)
+    name = PurePath(source).name
+    data = read_bytes(source)
     library = {"workbook": "openpyxl", "Parquet": "pyarrow.parquet"}[kind]
     try:
         reader = import_module(library)
@@ -92,7 +95,8 @@ def _sheet_table(
     chosen = book[sheet] if sheet else book.worksheets[0]
     claimed = chosen.max_row or 0
     chosen.reset_dimensions()  # which may claim billions of cells
-    text, cells = io.BytesIO(), 0
+    text = io.BytesIO()
+    cells = 0
     for row in counted(chosen.iter_rows(values_only=True), "rows", claimed):
         cells += max(len(row), 1)
         if cells > MOST_TAGS:
@@ -105,11 +109,14 @@ def _sheet_table(
 
 def _inflated(data: bytes, name: str) -> io.BytesIO:
     """Return the XML of a workbook unpacked, if it is neither too large nor of another kind."""
-    plain, total, tags = io.BytesIO(), 0, {True: 0, False: 0}
+    plain = io.BytesIO()
+    total = 0
+    tags = {True: 0, False: 0}
     with zipfile.ZipFile(io.BytesIO(data)) as packed, zipfile.ZipFile(plain, "w") as unpacked:
         # Others are pictures and programs.
         for entry in (e for e in packed.infolist() if e.filename.endswith((".xml", ".rels"))):
-            pieces, in_sheet = [], entry.filename.startswith("xl/worksheets/")
+            pieces = []
+            in_sheet = entry.filename.startswith("xl/worksheets/")
             most = MOST_TAGS if in_sheet else MOST_OTHER_TAGS
             with packed.open(entry) as member:
                 while piece := member.read(_PIECE):
@@ -119,10 +126,12 @@ def _inflated(data: bytes, name: str) -> io.BytesIO:
                     if total > MOST_FILE_BYTES or tags[in_sheet] > most:
                         of = f"tags of XML in its {'sheets' if in_sheet else 'texts and styles'}"
                         size, most, of = (
-                            (tags[in_sheet], most, of) if tags[in_sheet] > most
+                            (tags[in_sheet], most, of)
+                            if tags[in_sheet] > most
                             else (total, MOST_FILE_BYTES, "bytes when it is unpacked")
-                        )  # fmt: skip
-                        kind, cure = UnsafeFileError, "Save the sheet as CSV."
+                        )
+                        kind = UnsafeFileError
+                        cure = "Save the sheet as CSV."
                         raise too_large(name, size, most, of, cure=cure, error=kind)
             xml = b"".join(pieces)
             # Entities multiply, and other encodings hide them.
@@ -146,18 +155,29 @@ class FrameTable(NamedColumns):
     """Columns that another library holds or reads, each by ``column(index)``."""
 
     def __init__(
-        self, name: str, names: Sequence[Any], rows: int, column: Callable[[int], Any], *,
-        units: Sequence[str] = (), source: SourceFile | None = None,
-        decimal: str | None = None, missing: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        names: Sequence[Any],
+        rows: int,
+        column: Callable[[int], Any],
+        *,
+        units: Sequence[str] = (),
+        source: SourceFile | None = None,
+        decimal: str | None = None,
+        missing: Sequence[str] = (),
+    ) -> None:
         super().__init__(name, missing)
         self.names = tuple(printable(head, _MAX_NAME) for head in names)
-        self.source, self.decimal, self._unit_row = source, decimal, tuple(units)
-        self._rows, self._column = rows, column
+        self.source = source
+        self.decimal = decimal
+        self._unit_row = tuple(units)
+        self._rows = rows
+        self._column = column
 
     def _room(self, columns: int) -> tuple[int, int]:
         if self._rows > (most := self._most(columns)):
-            of, cure = f"rows of {columns} columns", "Average neighbouring readings."
+            of = f"rows of {columns} columns"
+            cure = "Average neighbouring readings."
             raise too_large(self._name, self._rows, most, of, cure=cure)
         return self._rows, self._rows
 

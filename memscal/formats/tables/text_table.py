@@ -41,10 +41,15 @@ _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 _HEADS = (re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"), re.compile(r"([^/]+?)\s*/(.+)"))
 #: Cells that mean a missing value, in capital or small letters.
 MISSING = ("", "-", "nan", "na", "n/a", "#n/a", "<na>", "nat", "null", "none")
-_MAX_NAME, _MAX_COMMENTS, _MAX_COMMENT, _NAMED = 80, 20, 300, 5
+_MAX_NAME = 80
+_MAX_COMMENTS = 20
+_MAX_COMMENT = 300
+_NAMED = 5
 #: Lines from which delimiter, decimal mark and header are found; bytes that hold them, and bytes
 #: that are then cut into cells at once.
-_SAMPLE, _FIRST, _BLOCK = 250, 2**16, 2**22
+_SAMPLE = 250
+_FIRST = 2**16
+_BLOCK = 2**22
 #: Rows that tell which columns hold numbers: the last ones, for a preamble stands above them.
 _LAST = 50
 #: What may stand in a block that needs no care: no quote and no sign of a comment.
@@ -75,7 +80,8 @@ class NamedColumns:
     _row = "row"
 
     def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
-        self._name, self._unit_row = name, tuple[str, ...]()
+        self._name = name
+        self._unit_row = tuple[str, ...]()
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
         self._sentinels = [_float(w.replace(",", ".")) for w in missing if _NUMBER.fullmatch(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
@@ -87,7 +93,8 @@ class NamedColumns:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        (rows, room), count = self._room(len(wanted)), 0
+        (rows, room) = self._room(len(wanted))
+        count = 0
         values = [np.empty(room) for _ in wanted]
         parts = self._parts([*wanted.values()])
         for lines, part in counted(parts, "rows", rows, lambda part: len(part[0])):
@@ -261,14 +268,22 @@ class TextTable(NamedColumns):
         sheet: Sheet | None = None,
     ) -> None:
         super().__init__(os.path.basename(os.fspath(path)), missing)
-        self._path, self._sheet, self._row = path, sheet, "row" if sheet else "line"
-        self._digest, self._latin, self._width, self._line = hashlib.sha256(), False, 0, 1
+        self._path = path
+        self._sheet = sheet
+        self._row = "row" if sheet else "line"
+        self._digest = hashlib.sha256()
+        self._latin = False
+        self._width = 0
+        self._line = 1
         self._comments: list[int] = []
         self._blocks = self._whole_lines()
-        head, written, lines = b"", Numbered(), Numbered()
+        head = b""
+        written = Numbered()
+        lines = Numbered()
         # A head of a few endless lines, or of comments alone, is looked at no further than this.
         while len(lines) < _SAMPLE and len(head) <= _BLOCK and (block := next(self._blocks, b"")):
-            head, self._line = head + block, 1
+            head = head + block
+            self._line = 1
             written = self._numbered(head)
             lines = [(n, s) for n, s in written if n > skip_rows and not _is_comment(s)]
         if not lines:
@@ -294,7 +309,8 @@ class TextTable(NamedColumns):
             comments = [(n, s.lstrip(" \t#%")) for n, s in written if n < places[start]]
             found = [(n, self._rows([(n, s)])[0]) for n, s in comments if s]
             above = [(n, cut[0]) for n, cut in found if len(cut[0]) == len(rows[start])]
-        self._header, names = (places[start], False), tuple[str, ...]()
+        self._header = (places[start], False)
+        names = tuple[str, ...]()
         if above and _filled(above[-1][1]) >= min(2, len(rows[start])):
             line, names = above.pop()
             title, cells = above[-1] if above else (0, ())
@@ -303,7 +319,9 @@ class TextTable(NamedColumns):
             if named and not any(map(_is_number, cells)) and any(map(is_common_unit, bare)):
                 units = tuple(unit if unit and is_unit(unit) else "" for unit in bare)
                 if 2 * _filled(units) >= _filled(bare):
-                    self._unit_row, line, names = units, title, cells
+                    self._unit_row = units
+                    line = title
+                    names = cells
             self._header = line, bool(names)
         heads = [*names, *[""] * (self._width - len(names))]
         self.names = tuple(printable(c, _MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
@@ -355,7 +373,8 @@ class TextTable(NamedColumns):
                 why="A quotation mark stands alone; the readings within would be lost.",
                 cure="Take quotation marks out of the rows of numbers, or close them.",
             )
-        spaces, stated = self._delimiter == " ", self._columns
+        spaces = self._delimiter == " "
+        stated = self._columns
         for row, place in zip(rows, places, strict=True):
             # Cells may be missing at the end; between spaces, any may be.
             if len(row) != stated if spaces else any(row[stated:]):
@@ -403,7 +422,8 @@ class TextTable(NamedColumns):
 
     def _whole_lines(self) -> Iterator[bytes]:
         """Yield a few lines, then blocks of whole lines."""
-        rest, size = b"", _FIRST
+        rest = b""
+        size = _FIRST
         for piece in self._pieces():
             rest += piece
             while len(rest) > size:
@@ -421,7 +441,8 @@ class TextTable(NamedColumns):
         yield self._part(*self._first, indices, wanted)
         for block in self._blocks:
             if numbers := self._plain_numbers(block, indices):
-                first, self._line = self._line, self._line + numbers[0].size
+                first = self._line
+                self._line = self._line + numbers[0].size
                 yield range(first, self._line), numbers
             else:
                 written = self._numbered(block)
@@ -443,7 +464,8 @@ class TextTable(NamedColumns):
         block = block.replace(b"\r\n", b"\n").rstrip(b"\n") + b"\n"
         if self._delimiter not in _DELIMITERS or block.translate(None, _PLAIN):
             return []
-        lines, mark = block.translate(self._marks).splitlines(), self._delimiter.encode()
+        lines = block.translate(self._marks).splitlines()
+        mark = self._delimiter.encode()
         spaces = self._delimiter == " "
         width = len(lines[0].split(None if spaces else mark))
         # The ends of the cells, as they follow each other in equal rows.
@@ -470,16 +492,19 @@ class TextTable(NamedColumns):
         try:
             text = block.decode("latin-1" if self._latin else "utf-8-sig")
         except UnicodeDecodeError:
-            self._latin, text = True, block.decode("latin-1")
+            self._latin = True
+            text = block.decode("latin-1")
         # A typographic minus is one.
         lines = text.replace("\r\n", "\n").replace("\r", "\n").replace("−", "-").split("\n")
-        first, self._line = self._line, self._line + len(lines) - 1
+        first = self._line
+        self._line = self._line + len(lines) - 1
         return [(number, line) for number, line in enumerate(lines, first) if line.strip()]
 
     def _rows(self, lines: Numbered) -> tuple[Rows, list[int]]:
         """Cut lines into cells; return them with the numbers of their lines."""
         if self._delimiter == " ":
-            rows, places = [line.split() for _, line in lines], [number for number, _ in lines]
+            rows = [line.split() for _, line in lines]
+            places = [number for number, _ in lines]
         else:
             try:
                 reader = csv.reader(
@@ -488,7 +513,8 @@ class TextTable(NamedColumns):
                 cut = [(row, lines[reader.line_num - 1][0]) for row in reader]
             except (csv.Error, TypeError) as error:
                 raise FormatError(f"{self._name} cannot be cut into columns: {error}.") from error
-            rows, places = [row for row, _ in cut], [number for _, number in cut]
+            rows = [row for row, _ in cut]
+            places = [number for _, number in cut]
         self._width = max(self._width, *map(len, rows), 0)
         if self._width > MOST_COLUMNS:
             cure = "Leave out columns."
@@ -532,7 +558,8 @@ def _first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
 
 def _find_delimiter(lines: list[str]) -> str:
     """Take the delimiter that cuts the most lines into equally many pieces, of numbers."""
-    best, score = " ", 0.0
+    best = " "
+    score = 0.0
     for delimiter in _DELIMITERS:
         rows = [line.split(None if delimiter == " " else delimiter) for line in lines[-_LAST:]]
         widths = [len(row) for row in rows]
@@ -540,7 +567,8 @@ def _find_delimiter(lines: list[str]) -> str:
         cells = [c.strip(' "') for row in rows if len(row) == common for c in row]
         found = widths.count(common) * (0.1 + sum(map(_is_number, cells)) / len(cells))
         if common > 1 and found > score:
-            best, score = delimiter, found
+            best = delimiter
+            score = found
     return best
 
 

@@ -97,7 +97,8 @@ def smooth(
     from scipy.interpolate import make_lsq_spline
 
     r, weights = gauss_between(line.corners, _ORDER + 1)
-    quartic, weights = line.at(r) @ values, np.sqrt(weights * r)
+    quartic = line.at(r) @ values
+    weights = np.sqrt(weights * r)
     knots = np.concatenate([line.r[2:-1:2], np.full(_SMOOTH_DEGREE + 1, line.r[-1])])
 
     def mirrored(half: FloatArray, sign: int) -> FloatArray:
@@ -168,7 +169,8 @@ class MixedSystem:
 
         pressure = self.displacement.with_element(skfem.ElementTriP3())
         coupled = squeeze.assemble(self.displacement, pressure)
-        stiff, soft = distortion.assemble(self.displacement), compression.assemble(pressure)
+        stiff = distortion.assemble(self.displacement)
+        soft = compression.assemble(pressure)
         return csr_array(block_array([[stiff, coupled.T], [coupled, soft]]))
 
     @cached_property
@@ -186,9 +188,11 @@ class MixedSystem:
     def side(self, depth: float) -> tuple[QuarticLine, NDArray[np.int64], NDArray[np.int64]]:
         """Return the side of the mesh at a depth, with its outward and inward unknowns."""
         on_side = self.displacement.get_dofs(lambda x: x[1] == depth)
-        outward, inward = on_side.all(["u^1"]), on_side.all(["u^2"])
+        outward = on_side.all(["u^1"])
+        inward = on_side.all(["u^2"])
         r = self.displacement.doflocs[0]
-        outward, inward = outward[np.argsort(r[outward])], inward[np.argsort(r[inward])]
+        outward = outward[np.argsort(r[outward])]
+        inward = inward[np.argsort(r[inward])]
         return QuarticLine(r[inward]), outward, inward
 
     @cached_property
@@ -222,7 +226,8 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
     dofs = np.asarray(system.displacement.element_dofs)
     local = np.asarray(skfem.ElementTriP4.doflocs)
-    outward, inward = dofs[0::2], dofs[1::2]
+    outward = dofs[0::2]
+    inward = dofs[1::2]
     nodes, index = np.unique(inward, return_inverse=True)
     index = index.reshape(inward.shape)
     # The displacement's gradient and the mean pressure at the nodes of every triangle.
@@ -234,15 +239,18 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     squeeze = np.asarray(at_nodes.with_element(skfem.ElementTriP3()).interpolate(pressed))
     r, depth = system.displacement.doflocs[:, nodes]
     displacement = np.empty((nodes.size, 2))
-    displacement[index, 0], displacement[index, 1] = solution[outward], -solution[inward]
+    displacement[index, 0] = solution[outward]
+    displacement[index, 1] = -solution[inward]
 
     def averaged(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel()))
 
-    radial, vertical = averaged(gradient[0][0]), averaged(gradient[1][1])
+    radial = averaged(gradient[0][0])
+    vertical = averaged(gradient[1][1])
     hoop = np.where(r > 0, displacement[:, 0] / np.where(r > 0, r, 1.0), radial)
     slip = averaged(gradient[0][1] + gradient[1][0])
-    mean, volume = averaged(squeeze), (radial + vertical + hoop) / 3
+    mean = averaged(squeeze)
+    volume = (radial + vertical + hoop) / 3
     stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
     points = film.thickness * np.stack([r, 1 - depth], axis=1)
     return FieldMesh(
@@ -292,19 +300,23 @@ class ElementFilm:
     @cached_property
     def system(self) -> MixedSystem:
         """The finite-element equations, in film thicknesses and shear moduli."""
-        rings, radius = self.r / self.film.thickness, self.radius / self.film.thickness
+        rings = self.r / self.film.thickness
+        radius = self.radius / self.film.thickness
         mesh = film_triangles(rings, radius=radius, thickness=1.0, refinement=self.refinement)
         return MixedSystem(mesh, self.film.poisson_ratio)
 
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        system, rings = self.system, self.r / self.film.thickness
+        system = self.system
+        rings = self.r / self.film.thickness
         line, outward, inward = system.side(0.0)
-        hats, seen = line.loads_of_hats(rings).tocsc(), line.at(rings)
+        hats = line.loads_of_hats(rings).tocsc()
+        seen = line.at(rings)
         scale = self.film.thickness / self.film.shear_modulus
         moved = np.empty((2, 2, rings.size, rings.size))
-        tell, done = counter("tractions", 2 * rings.size), 0
+        tell = counter("tractions", 2 * rings.size)
+        done = 0
         for source, unknowns in enumerate((inward, outward)):
             for start in range(0, rings.size, _BATCH):
                 batch = slice(start, start + _BATCH)

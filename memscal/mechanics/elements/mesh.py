@@ -132,7 +132,9 @@ class _Front:
             node[i] = len(self.points)
             self.points.append((self.r[i], lower[i]))
         self._fill(node, np.flatnonzero(kept))
-        self.r, self.depth, self.node = self.r[kept], lower[kept], node[kept]
+        self.r = self.r[kept]
+        self.depth = lower[kept]
+        self.node = node[kept]
 
     def _next_depths(self) -> FloatArray:
         """Return the depth to which each node would go; the last steps to the base are even."""
@@ -161,7 +163,10 @@ class _Front:
     def _fill(self, node: NDArray[np.int64], kept: NDArray[np.int64]) -> None:
         """Add the triangles between this row and the next."""
         for left, right in pairwise(kept):
-            a, b, a_below, b_below = self.node[left], self.node[right], node[left], node[right]
+            a = self.node[left]
+            b = self.node[right]
+            a_below = node[left]
+            b_below = node[right]
             if right - left == 2:
                 middle = self.node[left + 1]
                 corners = [(a, a_below, middle), (a_below, b_below, middle), (middle, b_below, b)]
@@ -172,5 +177,6 @@ class _Front:
             self.triangles.extend(triangle for triangle in corners if len(set(triangle)) == 3)
 
     def _length(self, start: int, end: int) -> float:
-        (r1, d1), (r2, d2) = self.points[start], self.points[end]
+        (r1, d1) = self.points[start]
+        (r2, d2) = self.points[end]
         return float(np.hypot(r1 - r2, d1 - d2))

@@ -70,8 +70,10 @@ class Rubber:
     @classmethod
     def of(cls, film: ElasticFilm) -> Rubber:
         r"""Return the material with the film's moduli at small strain."""
-        G, ratio = film.shear_modulus * _PASCAL_TO_MPA, film.mooney_rivlin_ratio or 0.0
-        c1, c2 = G / 2 / (1 + ratio), G / 2 * ratio / (1 + ratio)
+        G = film.shear_modulus * _PASCAL_TO_MPA
+        ratio = film.mooney_rivlin_ratio or 0.0
+        c1 = G / 2 / (1 + ratio)
+        c2 = G / 2 * ratio / (1 + ratio)
         compliance = (1 - 2 * film.poisson_ratio) / (G - 2 * c2 * (1 - 2 * film.poisson_ratio))
         held = _HELD * G / (1 + 2 * _HELD * G * compliance)
         return cls(c1, c2, held, compliance / (1 - held * compliance))
@@ -103,7 +105,8 @@ class Rubber:
 
     def tangent(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the derivative of the nominal stress by the gradient, shape (..., 5, 5)."""
-        cof, second = cofactor(F), _curvature(F)
+        cof = cofactor(F)
+        second = _curvature(F)
         stiffness = self.held * cof[..., :, None] * cof[..., None, :]
         stiffness -= self._pressing(F, p)[..., None] * second
         if self.c2:
@@ -113,7 +116,8 @@ class Rubber:
 
     def cauchy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the Cauchy stress rr, zz, hoop and rz, tension positive, shape (..., 4)."""
-        S, (rr, rz, zr, zz, hoop) = np.moveaxis(self.stress(F, p), -1, 0), np.moveaxis(F, -1, 0)
+        S = np.moveaxis(self.stress(F, p), -1, 0)
+        (rr, rz, zr, zz, hoop) = np.moveaxis(F, -1, 0)
         pulled = [S[0] * rr + S[1] * rz, S[2] * zr + S[3] * zz, S[4] * hoop, S[0] * zr + S[1] * zz]
         return np.asarray(np.stack(pulled, axis=-1) / determinant(F)[..., None])
 
@@ -142,7 +146,8 @@ def mesh_below_a_rod(
 ) -> Any:
     """Return a mesh (mm) that is finest where the rod's edge folds the surface."""
     thickness, _, refinement = size
-    finest, slope = finest / finer[0] / refinement, _SLOPE / finer[1]
+    finest = finest / finer[0] / refinement
+    slope = _SLOPE / finer[1]
     side = min(_SHARE_OF_ROD * rod, _WIDEST_NEAR * thickness) / refinement
     mesh = _tensor(np.linspace(0.0, rod, max(2, round(rod / side)) + 1), side, _NEAR_A_ROD, size)
     while True:
@@ -170,13 +175,16 @@ def _tensor(even: FloatArray, side: float, reach: float, size: FilmSize) -> Any:
     import skfem
 
     thickness, radius, refinement = size
-    contact, grow = even[-1], 1 + _GROWTH / refinement
+    contact = even[-1]
+    grow = 1 + _GROWTH / refinement
     near, far = (widest * thickness / refinement for widest in (_WIDEST_NEAR, _WIDEST_FAR))
-    r, step = [contact], side
+    r = [contact]
+    step = side
     while r[-1] < radius:
         step = min(step * grow, near if r[-1] < contact + reach * thickness else far)
         r.append(radius if radius - r[-1] < 1.5 * step else r[-1] + step)
-    depth, step = [0.0], side
+    depth = [0.0]
+    step = side
     while depth[-1] < thickness:
         depth.append(thickness if thickness - depth[-1] < 1.5 * step else depth[-1] + step)
         step = min(step * grow, near)
@@ -350,13 +358,17 @@ def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> tuple[Float
     gradients = np.zeros((*radius.shape, 5, 12))
     on_axis = radius < 1e-12
     for i, (field,) in enumerate(displacement.basis):
-        value, slope = np.broadcast_to(np.asarray(field), radius.shape), field.grad
+        value = np.broadcast_to(np.asarray(field), radius.shape)
+        slope = field.grad
         # u/r on the axis is the slope of u.
         hoop = np.where(on_axis, slope[0], value / np.where(on_axis, 1.0, radius))
         for row, column, derivative in (
-            (0, i, slope[0]), (1, i, slope[1]), (4, i, hoop),
-            (2, 6 + i, slope[0]), (3, 6 + i, slope[1]),
-        ):  # fmt: skip
+            (0, i, slope[0]),
+            (1, i, slope[1]),
+            (4, i, hoop),
+            (2, 6 + i, slope[0]),
+            (3, 6 + i, slope[1]),
+        ):
             gradients[:, :, row, column] = derivative
     pressures = [np.broadcast_to(np.asarray(field), radius.shape) for (field,) in pressure.basis]
     return gradients, np.stack(pressures, axis=-1)

@@ -38,7 +38,8 @@ class RodFace:
     def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points, tangents and curvature vectors at ``s`` (mm), shapes (2, n)."""
         angle = np.clip((s - self.flat) / self.edge, 0.0, np.pi / 2)
-        sine, cosine = np.sin(angle), np.cos(angle)
+        sine = np.sin(angle)
+        cosine = np.cos(angle)
         wall = np.maximum(s - self.flat - np.pi / 2 * self.edge, 0.0)
         rise = 2 * self.edge * np.sin(angle / 2) ** 2
         points = np.stack([np.minimum(s, self.flat) + self.edge * sine, rise + wall])
@@ -47,7 +48,8 @@ class RodFace:
 
     def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the arc length of the nearest point, and the distance outside it."""
-        x, y = r - self.flat, self.edge - z  # outward and downward from the rounding's centre
+        x = r - self.flat
+        y = self.edge - z  # outward and downward from the rounding's centre
         wall = np.where((x <= 0) & (y <= 0), x > y, x > 0)
         s = np.where(wall, self.flat + np.pi / 2 * self.edge - y, r)
         turning = (x > 0) & (y > 0)
@@ -63,7 +65,8 @@ class SphereFace:
 
     def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points, tangents and curvature vectors at ``s`` (mm), shapes (2, n)."""
-        sine, cosine = np.sin(s / self.radius), np.cos(s / self.radius)
+        sine = np.sin(s / self.radius)
+        cosine = np.cos(s / self.radius)
         height = 2 * self.radius * np.sin(s / (2 * self.radius)) ** 2
         points = np.stack([self.radius * sine, height])
         return points, np.stack([cosine, sine]), np.stack([-sine, cosine]) / self.radius
@@ -86,7 +89,9 @@ _KEPT = 0.1
 _MOST_ITERATIONS = 30
 # A step or a guess that changes a point's volume by such factors is shortened to the first of these
 # shares that does not.  One that moves nothing by more than so many thicknesses is harmless.
-_CRUSHED, _SWOLLEN, _HARMLESS = 0.1, 4.0, 1e-5
+_CRUSHED = 0.1
+_SWOLLEN = 4.0
+_HARMLESS = 1e-5
 _SHARES = (1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 16, 1 / 32)
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
@@ -131,20 +136,26 @@ class Pressing:
 
     def press(self, start: Pressed, goal: Target, before: Pressed) -> Pressed:
         """Return the equilibrium at a goal, from a state near it and the last; or NewtonError."""
-        elements, seen = self.elements, set[bytes]()
+        elements = self.elements
+        seen = set[bytes]()
         state = self.placed(self._touching(start, before, set()) or start)
-        forces, tangent, last = elements.forces(state.x), None, np.inf
+        forces = elements.forces(state.x)
+        tangent = None
+        last = np.inf
         for _ in range(_MOST_ITERATIONS):
             state, moved, tangent = self._step(state, forces, goal, tangent)
             if not moved < _FARTHEST * elements.thickness:
                 break
-            forces, near, last = elements.forces(state.x), moved < _KEPT * last, moved
+            forces = elements.forces(state.x)
+            near = moved < _KEPT * last
+            last = moved
             if tangent is None or moved > _LOOSE * elements.thickness:
                 tangent = None
                 continue
             changed = self._touching(state, before, seen, forces)
             if changed is not None:
-                state, tangent = self.placed(changed), None
+                state = self.placed(changed)
+                tangent = None
                 forces = elements.forces(state.x)
             elif moved < _SETTLED * elements.thickness:
                 if elements.is_inside_out(state.x):
@@ -157,11 +168,13 @@ class Pressing:
 
     def interpolated(self, contact: Any) -> Pressed:
         """Return a guess at the state of a contact that was found on another mesh."""
-        elements, pressed = self.elements, contact.inside.pressed
+        elements = self.elements
+        pressed = contact.inside.pressed
         mesh = contact.inside.pressing.elements
         # A node touches between two that did.
         touched = np.isin(mesh.surface, pressed.touching)
-        r, before = elements.nodes[0][elements.surface], mesh.nodes[0][mesh.surface]
+        r = elements.nodes[0][elements.surface]
+        before = mesh.nodes[0][mesh.surface]
         touching = elements.surface[np.interp(r, before, touched) > 1 - 1e-9]
         x = elements.interpolated(pressed.x, mesh)
         return self.at_nearest(replace(pressed, x=x, touching=touching))
@@ -178,7 +191,8 @@ class Pressing:
 
     def placed(self, state: Pressed) -> Pressed:
         """Return the state with its touching nodes on the face."""
-        x, n = state.x.copy(), self.elements.n
+        x = state.x.copy()
+        n = self.elements.n
         points, _, _ = self.face.contour(state.place)
         x[state.touching] = points[0] - self.elements.nodes[0][state.touching]
         x[state.touching + n] = points[1] - state.depth
@@ -216,7 +230,8 @@ class Pressing:
         self, state: Pressed, to: Pressed | None = None, share: FloatArray | float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """Return arc length and distance of the surface's nodes, on the way to another state."""
-        n, nodes = self.elements.n, self.elements.surface
+        n = self.elements.n
+        nodes = self.elements.surface
         radius = self.elements.nodes[0][nodes]
         to = to or state
         u, w = ((1 - share) * state.x[dofs] + share * to.x[dofs] for dofs in (nodes, nodes + n))
@@ -230,7 +245,9 @@ class Pressing:
         self, state: Pressed, forces: FloatArray, goal: Target, tangent: _Tangent | None
     ) -> tuple[Pressed, float, _Tangent | None]:
         """Take Newton's step; return the state after it and how far it moves something, in mm."""
-        touching, n, change = state.touching, self.elements.n, self._change(state)
+        touching = state.touching
+        n = self.elements.n
+        change = self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
         solution = tangent.factors.solve(-np.asarray(change.T @ forces))
         sunk = goal.value - state.depth
@@ -243,7 +260,8 @@ class Pressing:
         moved = max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk))
         for share in _SHARES:
             place = state.place if self.sticking else state.place + share * free[touching]
-            x, depth = state.x + share * free, state.depth + share * sunk
+            x = state.x + share * free
+            depth = state.depth + share * sunk
             ahead = self.placed(replace(state, x=x, depth=depth, place=place))
             if moved < _HARMLESS * self.elements.thickness or self.is_sound(ahead, state):
                 break
@@ -260,7 +278,8 @@ class Pressing:
     def _change(self, state: Pressed) -> Any:
         """Return the change of all unknowns with those that are free, sparse."""
         # The places of sliding nodes are in the columns of their radial displacement.
-        size, touching = self.elements.size, state.touching
+        size = self.elements.size
+        touching = state.touching
         change = sparse.eye_array(size, format="csc")
         if not self.sticking:
             _, tangents, _ = self.face.contour(state.place)
@@ -272,8 +291,10 @@ class Pressing:
 
     def _tangent(self, state: Pressed, forces: FloatArray, change: Any) -> _Tangent:
         """Return what the forces change by, at a state."""
-        touching, n = state.touching, self.elements.n
-        stiffness, free = self.elements.tangent(state.x), self._free(state)
+        touching = state.touching
+        n = self.elements.n
+        stiffness = self.elements.tangent(state.x)
+        free = self._free(state)
         if self.sticking:
             reduced = stiffness[free][:, free]
         else:
@@ -324,7 +345,9 @@ class Path:
     """The states so far, and the length of the next step; goals are loads in N or depths in mm."""
 
     def __init__(self, pressing: Pressing, start: Pressed) -> None:
-        self.pressing, self.start, self.length = pressing, start, np.inf
+        self.pressing = pressing
+        self.start = start
+        self.length = np.inf
         self.states: list[Pressed] = []
 
     def reach(self, goal: Target, guesses: Iterable[Pressed]) -> Iterator[float]:
@@ -334,7 +357,8 @@ class Path:
                 self.states.append(self.pressing.press(guess, goal, guess))
                 yield 1.0
                 return
-        begin, halvings = _value(self.states[-1], goal) if self.states else 0.0, 0
+        begin = _value(self.states[-1], goal) if self.states else 0.0
+        halvings = 0
         way = goal.value - begin
         if np.isinf(self.length):
             self.length = min(_FIRST * self._radius(goal), goal.value / _FIRST_STEPS)
@@ -370,13 +394,15 @@ class Path:
         states = self.states[-3:] or [self.start]
         values = np.array([_value(state, goal) for state in states])
         if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
-            states, values = states[-1:], values[-1:]
+            states = states[-1:]
+            values = values[-1:]
         for share in _SHARES:
             to = float(values[-1] + share * (goal.value - values[-1]))
             # The parabola through three states.
             powers = np.vander(values - to, increasing=True).T
             weights = np.linalg.solve(powers, np.eye(values.size)[0])
-            x, depth = weights @ [s.x for s in states], float(weights @ [s.depth for s in states])
+            x = weights @ [s.x for s in states]
+            depth = float(weights @ [s.depth for s in states])
             ahead = replace(states[-1], x=x, depth=depth if isinstance(goal, Load) else to)
             if not self.pressing.sticking:
                 ahead = self.pressing.at_nearest(ahead)

@@ -39,7 +39,8 @@ from memscal.progress import counter
 _MM = 1e3
 _MPA = 1e6
 # The mesh that tells the convergence has sides longer by a factor, and takes a share of the work.
-_COARSER, _COARSE_WORK = 1.5, 0.3
+_COARSER = 1.5
+_COARSE_WORK = 0.3
 # Where a state does not depend on the path, this is followed on a mesh that is rougher still.
 _ROUGHER = 1.5**3
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
@@ -62,7 +63,9 @@ _SAMPLES = np.linspace(0.0, 4.0, 41)
 
 def press_at_finite_strain(request: RingRequest) -> tuple[Contact, ...]:
     """Return the contacts at the targets, visited in their order."""
-    film, indenter, targets = request.film, request.indenter, request.targets
+    film = request.film
+    indenter = request.indenter
+    targets = request.targets
     friction = request.friction
     if not (friction == 0 or math.isinf(friction)) or not request.interface.rigid:
         raise DomainError(
@@ -108,7 +111,8 @@ def solve_finite_strain(
     # the wall; under a sphere that sticks nothing in the contact moves radially.
     goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    tell, rest = counter("the loading", 1.0), 1 - _COARSE_WORK
+    tell = counter("the loading", 1.0)
+    rest = 1 - _COARSE_WORK
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
     coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(_COARSE_WORK * x)))
     return tuple(request.solve(refinement, coarse, lambda x: tell(1 - rest + rest * x)))
@@ -186,14 +190,19 @@ class _Request:
             rod = self.indenter.radius * _MM
             face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
             if self.sticking:
-                finest, (inner, outer) = _FINEST_STICKING, _FOLD_STICKING
+                finest = _FINEST_STICKING
+                (inner, outer) = _FOLD_STICKING
                 outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
             else:
-                finest, (inner, outer) = _FINEST_SLIDING, _FOLD_SLIDING
+                finest = _FINEST_SLIDING
+                (inner, outer) = _FOLD_SLIDING
             mesh = film_elements.mesh_below_a_rod(
-                size, rod=rod, fold=(inner * rod, outer * rod), finest=finest * face.edge,
+                size,
+                rod=rod,
+                fold=(inner * rod, outer * rod),
+                finest=finest * face.edge,
                 finer=self.finer,
-            )  # fmt: skip
+            )
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))
@@ -228,10 +237,12 @@ class _Request:
 
     def _start(self, pressing: Pressing) -> Pressed:
         """Return the untouched film, and the nodes that will touch first."""
-        elements, nodes = pressing.elements, pressing.elements.surface
+        nodes = pressing.elements.surface
+        elements = pressing.elements
         r = elements.nodes[0][nodes]
         if isinstance(pressing.face, RodFace):
-            reach, depth = pressing.face.flat, 0.0
+            reach = pressing.face.flat
+            depth = 0.0
         else:
             reach = 0.8 * self._hertz_radius(self.goals[0])
             depth = reach**2 / (self.indenter.extent * _MM)
@@ -240,7 +251,9 @@ class _Request:
 
     def _contact(self, pressing: Pressing, states: list[Pressed]) -> Contact:
         """Return the last state on a way in SI units, of unknown convergence."""
-        pressed, elements, rod = states[-1], pressing.elements, isinstance(self.indenter, Rod)
+        pressed = states[-1]
+        elements = pressing.elements
+        rod = isinstance(self.indenter, Rod)
         # Between the last node that touches and the next.
         field = FiniteStrainField(pressing, pressed)
         last = int(np.flatnonzero(np.isin(elements.surface, pressed.touching))[-1])
@@ -289,7 +302,8 @@ class FiniteStrainField(FieldByOrder):
         # linear between the corners: more accurate than stresses taken inside the elements, and in
         # balance with the load to rounding.
         elements = self.pressing.elements
-        forces, nodes = elements.forces(self.pressed.x), elements.base
+        forces = elements.forces(self.pressed.x)
+        nodes = elements.base
         r = elements.nodes[0][nodes][::2]
         # The hat on the axis has hardly any area: its force is added to that of the next one.
         normal, shear = (
@@ -301,16 +315,20 @@ class FiniteStrainField(FieldByOrder):
     @cached_property
     def surface(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Radii of the surface's nodes before deformation, their depression and outward shift."""
-        elements, x = self.pressing.elements, self.pressed.x
+        elements = self.pressing.elements
+        x = self.pressed.x
         nodes = elements.surface
-        r, w, u = elements.nodes[0][nodes], -x[nodes + elements.n], x[nodes]
+        r = elements.nodes[0][nodes]
+        w = -x[nodes + elements.n]
+        u = x[nodes]
         return r / _MM, w / _MM, u / _MM
 
     def _base(self, r: FloatArray, order: int) -> FloatArray:
         return _interpolated(self.base[0], self.base[1 + order], r, parity=-1 if order else 1)
 
     def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
-        r, traction = self.base[0], self.base[1 + order]
+        r = self.base[0]
+        traction = self.base[1 + order]
         return hankel_transform(r, traction, np.ravel(k), order=order).reshape(np.shape(k))
 
     def _surface(self, r: FloatArray, order: int) -> FloatArray:
@@ -318,8 +336,10 @@ class FiniteStrainField(FieldByOrder):
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
-        elements, x = self.pressing.elements, self.pressed.x
-        law, points = MOONEY_RIVLIN if elements.material.c2 else NEO_HOOKEAN, elements.nodes.T / _MM
+        elements = self.pressing.elements
+        x = self.pressed.x
+        law = MOONEY_RIVLIN if elements.material.c2 else NEO_HOOKEAN
+        points = elements.nodes.T / _MM
         return FieldMesh(
             points=points,
             triangles=anticlockwise(points, elements.bases[0].element_dofs.T),
@@ -333,27 +353,34 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
     """Return pressure and shear (Pa) at the deformed radii of the corners in contact."""
     # Means over the hats of the corners: nodal forces of quadratic elements are no tractions (that
     # on the axis has no area).  A rod's wall is left out.
-    elements, x = pressing.elements, pressed.x
+    elements = pressing.elements
+    x = pressed.x
     nodes = elements.surface
     forces = elements.forces(x)
     touching = np.isin(nodes, pressed.touching)
     place = np.zeros(nodes.size)
     place[touching] = pressed.place
     _, (along, up), _ = pressing.face.contour(place)
-    radial, upward = forces[nodes] * touching, forces[nodes + elements.n] * touching
-    pushed, dragged = up * radial - along * upward, along * radial + up * upward
-    r, z = elements.nodes[0][nodes] + x[nodes], x[nodes + elements.n]
+    radial = forces[nodes] * touching
+    upward = forces[nodes + elements.n] * touching
+    pushed = up * radial - along * upward
+    dragged = along * radial + up * upward
+    r = elements.nodes[0][nodes] + x[nodes]
+    z = x[nodes + elements.n]
     # The axis is held: its radial force is not the indenter's.
     if r[0] < 1e-12:
         dragged[0] = 0.0
     side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
-    left, right = r[:-2:2], r[2::2]
-    falling, rising = side * (2 * left + right), side * (left + 2 * right)
+    left = r[:-2:2]
+    right = r[2::2]
+    falling = side * (2 * left + right)
+    rising = side * (left + 2 * right)
     area = np.pi / 3 * (np.append(falling, 0.0) + np.append(0.0, rising))
 
     chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
     chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
-    pressure, shear = _on_corners(pushed) / area, _on_corners(dragged) / area
+    pressure = _on_corners(pushed) / area
+    shear = _on_corners(dragged) / area
     return RingTraction(r[::2][chosen] / _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA)
 
 

@@ -141,8 +141,10 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
     columns = table["table"][0 if sticking else 1]
     # How many depths each column has; it ends where the first of those beside it does.
     reached = np.isfinite(columns[..., 0]).sum(axis=-1)
-    i, j = (int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
-            for axis, value in ((ratios, poisson), (radii, radius)))  # fmt: skip
+    i, j = (
+        int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
+        for axis, value in ((ratios, poisson), (radii, radius))
+    )
     ends = reached[i : i + 2, j : j + 2].min(axis=1)
     count = int(ends[_polynomial(ratios[i : i + 2], poisson) != 0].min())
     if count < _STENCIL:

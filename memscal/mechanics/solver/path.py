@@ -41,7 +41,8 @@ def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
 
 def _mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
     """Return the mixture of two states that is at ``target``; statuses are the second's."""
-    begin, end = _reached(lower, target), _reached(upper, target)
+    begin = _reached(lower, target)
+    end = _reached(upper, target)
     share = (target.value - begin) / (end - begin)
     if not 0 <= share <= 1:
         problem = f"No contact was found at {target}."
@@ -89,7 +90,8 @@ def _between_rings(
         upper = meeting_at(rings)
     lower = meeting_at(rings - 1)
     while _reached(lower, target) > target.value and rings > 2:
-        rings, upper = rings - 1, lower
+        rings = rings - 1
+        upper = lower
         lower = meeting_at(rings - 1)
     state = _mixture(lower, upper, target)
     tension = -float(problem.compliance.areas @ np.minimum(state.pressure, 0.0))
@@ -146,7 +148,8 @@ class _Walk:
         before = self.state
         self.work += (before.load + following.load) / 2 * (following.depth - before.depth)
         self.dissipated += _dissipation(self.problem, before, following)
-        self.state, self.steps = following, self.steps + 1
+        self.state = following
+        self.steps = self.steps + 1
 
     def point(self) -> PathPoint:
         energy = _elastic_energy(self.problem, self.state)
@@ -162,7 +165,8 @@ def _step_by_step(
     """Follow the path from target to target."""
     walk = _Walk(problem, problem.virgin())
     # The last state of the path that a target interrupted, and the way it went.
-    resume, upward = walk, True
+    resume = walk
+    upward = True
     farthest = max(target.value for target in targets)
     for target in targets:
         if math.isclose(_reached(walk.state, target), target.value, rel_tol=1e-12):
@@ -178,7 +182,8 @@ def _step_by_step(
             elif problem.friction == 0:
                 walk.step_to(step.take_step(problem, walk.state, target))
             else:
-                resume, upward = _walk_ring_by_ring(walk, target, rising=rising), rising
+                resume = _walk_ring_by_ring(walk, target, rising=rising)
+                upward = rising
         except ConvergenceError as error:
             error.last = walk.point() if walk.steps else None
             raise
@@ -192,7 +197,8 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     problem = walk.problem
     while following := walk.ahead or _next_meeting(problem, walk.state, target, rising=rising):
         walk.ahead = None
-        begin, end = _reached(walk.state, target), _reached(following, target)
+        begin = _reached(walk.state, target)
+        end = _reached(following, target)
         if not (begin < end <= target.value or begin > end >= target.value):
             # The path goes on from the ring before: a state between two rings changes no other.
             before = replace(walk, ahead=following)

@@ -47,7 +47,8 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
-_FEWEST_RINGS, _MOST_RINGS = 48, 384
+_FEWEST_RINGS = 48
+_MOST_RINGS = 384
 # Rings are doubled until base stress, load and depth change by less than this ...
 _SETTLED = 1e-4
 # ... and a solution that changes by more than this is refused.
@@ -94,7 +95,8 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
         changes = [_change(request, *pair) for pair in zip(fine, coarse, strict=True)]
         if max(changes) < _SETTLED or request.rings or 2 * count > _MOST_RINGS:
             break
-        count, coarse = 2 * count, fine
+        count = 2 * count
+        coarse = fine
     contacts = [replace(c, convergence=change) for c, change in zip(fine, changes, strict=True)]
     if max(changes) > _TOLERABLE:
         error = ConvergenceError(
@@ -168,7 +170,8 @@ def _even_film(film: ElasticFilm, reach: float) -> HankelFilm:
 
 def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathPoint]:
     rings = model.compliance.r
-    film, heights = request.film, request.indenter.height(rings)
+    film = request.film
+    heights = request.indenter.height(rings)
     problem = ContactProblem(film, model.compliance, heights, request.friction, request.interface)
     # Between rigid surfaces a step is a ring; where nothing touches all at once, as many steps.
     return follow(problem, request.targets, request.loading, increments=rings.size)
@@ -197,7 +200,8 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
 
 
 def _contact(request: RingRequest, model: HankelFilm | ElementFilm, point: PathPoint) -> Contact:
-    state, rings = point.state, model.compliance.r
+    state = point.state
+    rings = model.compliance.r
     if state.depth >= request.film.thickness:
         raise too_deep(request.film, request.indenter, state.load, state.depth)
     radius = _contact_radius(request, rings, state)
@@ -238,7 +242,8 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     if last == 0:
         return float(rings[1]) / 2
     # The pressure ends like a square root: its square falls in proportion to r^2.
-    inner, outer = p[last - 1] ** 2, p[last] ** 2
+    inner = p[last - 1] ** 2
+    outer = p[last] ** 2
     squares = rings[last - 1] ** 2, rings[last] ** 2
     if inner <= outer:
         return float(rings[last])
@@ -272,5 +277,6 @@ def relative_change(fine: Contact, coarse: Contact, r: FloatArray) -> float:
     """Return the largest relative change of base stress at ``r`` (m), load and depth."""
     stress = fine.base_stress(r)
     by_stress = np.max(np.abs(stress - coarse.base_stress(r))) / np.max(np.abs(stress))
-    by_load, by_depth = abs(coarse.load / fine.load - 1), abs(coarse.depth / fine.depth - 1)
+    by_load = abs(coarse.load / fine.load - 1)
+    by_depth = abs(coarse.depth / fine.depth - 1)
     return float(max(by_stress, by_load, by_depth))

@@ -64,8 +64,10 @@ class ContactProblem:
 
     def virgin(self) -> ContactState:
         """Return the state of the first touch, at the ring (or rings) of the lowest height."""
-        nothing, lowest = np.zeros(self.size), float(self.heights.min())
-        touching, slip = self.heights <= lowest, np.zeros(self.size, dtype=np.int8)
+        nothing = np.zeros(self.size)
+        lowest = float(self.heights.min())
+        touching = self.heights <= lowest
+        slip = np.zeros(self.size, dtype=np.int8)
         return ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
 
 
@@ -136,8 +138,11 @@ class _Trial(NamedTuple):
 
 
 def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trial:
-    c, mu, n = problem.compliance, problem.friction, problem.size
-    rows, off_axis = np.flatnonzero(status.pressing), c.r > 0
+    c = problem.compliance
+    mu = problem.friction
+    n = problem.size
+    rows = np.flatnonzero(status.pressing)
+    off_axis = c.r > 0
     stuck = np.flatnonzero(status.pressing & (status.slip == 0) & off_axis) if mu > 0 else rows[:0]
     # Shear of a slipping ring per pressure.  Nothing slips where friction has no bound.
     bounded = mu if math.isfinite(mu) else 0.0
@@ -146,7 +151,8 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
 
     # In units of the film's own compliance, the matrix mixes pressures with pressures.  The last
     # row is the goal's, from the start that of a ring which the surfaces are to meet.
-    unit, ring = c.whole[0, 0], goal.ring if isinstance(goal, Touch) else 0
+    unit = c.whole[0, 0]
+    ring = goal.ring if isinstance(goal, Touch) else 0
     unknown = np.concatenate([rows, n + stuck])
     equations = c.whole.take(np.append(unknown, ring), axis=0)
     matrix = np.zeros((equations.shape[0], equations.shape[0]))
@@ -174,7 +180,8 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
             cure="Check film, indenter and loads, and their units; try another number of rings.",
         ) from error
 
-    pressure, shear = np.zeros(n), np.zeros(n)
+    pressure = np.zeros(n)
+    shear = np.zeros(n)
     pressure[rows] = solution[: rows.size]
     shear[rows] = ratio * solution[: rows.size]
     shear[stuck] = solution[rows.size : -1]
@@ -202,7 +209,8 @@ def _add_tangential_compliance(
 ) -> None:
     r"""Replace :math:`u = u^0` by :math:`\mu p\,(u - u^0) + \ell q = 0`, linearised."""
     rows, stuck = rings
-    mu, length = problem.friction, problem.interface.slip_length
+    mu = problem.friction
+    length = problem.interface.slip_length
     limit = mu * np.maximum(status.pressure[stuck], 0.0)
     # The equation is divided by what keeps it of the size of the others, also where p vanishes.
     size = limit + length / np.diagonal(problem.compliance.radial)[stuck]
@@ -233,7 +241,8 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    law, pressing = problem.interface.normal_law, start.touching.copy()
+    law = problem.interface.normal_law
+    pressing = start.touching.copy()
     separation = np.zeros(problem.size)  # counts where the interface is compliant alone
     if law is not None:
         separation = problem.separations(start)
@@ -269,16 +278,19 @@ def _revise(
     problem: ContactProblem, status: _Status, trial: _Trial, held: int | None, careful: bool
 ) -> tuple[_Status, bool]:
     """Return a status that the trial does not contradict, and whether nothing changed."""
-    p, separation = trial.pressure, trial.separation
+    p = trial.pressure
+    separation = trial.separation
     slip, tangential = _revised_slip(problem, status, trial, careful)
-    law, normal = problem.interface.normal_law, False
+    law = problem.interface.normal_law
+    normal = False
     if law is None:
         pressing = _revised_contact(status, trial, held, careful=careful)
         normal = not np.array_equal(pressing, status.pressing)
     else:
         separation = _revised_separation(problem.film, law, status, trial)
         pressing = _bearing(problem, law, separation)
-    settled, stretch = not (normal or tangential), status.stretch
+    settled = not (normal or tangential)
+    stretch = status.stretch
     if not problem.interface.rigid:
         settled &= bool(np.abs(p - status.pressure).max() <= _SETTLED * p.max())
         length = problem.interface.slip_length
@@ -308,8 +320,12 @@ def _revised_slip(
     mu = problem.friction
     if mu == 0 or np.isinf(mu):
         return status.slip, False
-    p, q, u, sticks = np.maximum(trial.pressure, 0.0), trial.shear, trial.outward, status.slip == 0
-    stretch, length = u - status.anchor, problem.interface.slip_length
+    p = np.maximum(trial.pressure, 0.0)
+    q = trial.shear
+    u = trial.outward
+    sticks = status.slip == 0
+    stretch = u - status.anchor
+    length = problem.interface.slip_length
     excess = (np.abs(q) - mu * p) / (mu * np.abs(trial.pressure).max())
     # A slipping ring stretches the interface by its slip length, against the shear; on the axis
     # nothing slips.
@@ -336,7 +352,9 @@ def _revised_separation(
     """Return the next trial of the separations."""
     # Where the surfaces part, the linear equations' own; where they close, the one at which the
     # (convex) law bears the linear equations' pressure.
-    before, gap, p = status.separation, trial.separation, trial.pressure
+    before = status.separation
+    gap = trial.separation
+    p = trial.pressure
     after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
     closing = status.pressing & (gap < before) & (p > 0)
     borne = law.separation(np.where(closing, p, 1.0), film)

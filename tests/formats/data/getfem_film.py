@@ -11,8 +11,14 @@ from typing import Any
 
 import numpy as np
 
-THICKNESS, MODULUS, LOAD, WIDTH, REACH = 2.0, 2.2, 1.0, 1.0, 16.0
-BASE, TOP, AXIS = 1, 2, 3
+THICKNESS = 2.0
+MODULUS = 2.2
+LOAD = 1.0
+WIDTH = 1.0
+REACH = 16.0
+BASE = 1
+TOP = 2
+AXIS = 3
 
 BULK = (
     "X(1)*(2*G*(Grad_u(1,1)*Grad_Test_u(1,1) + Grad_u(2,2)*Grad_Test_u(2,2)"
@@ -39,7 +45,8 @@ def main(path: str) -> None:
     """Solve and save."""
     import getfem
 
-    near, far = 6.0 * np.linspace(0.0, 1.0, 23) ** 1.6, np.linspace(6.0, REACH, 9)
+    near = 6.0 * np.linspace(0.0, 1.0, 23) ** 1.6
+    far = np.linspace(6.0, REACH, 9)
     heights = THICKNESS * np.linspace(0.0, 1.0, 8) ** 1.5
     getfem.util("trace level", 0)
     mesh = getfem.Mesh("cartesian", np.concatenate([near, far[1:]]), heights)

@@ -14,9 +14,11 @@ def main(path: str) -> None:
     """Make the mesh and save it."""
     import vtk
 
-    radii, heights = np.linspace(0.0, 8.0, 41), np.linspace(0.0, 2.0, 4)
+    radii = np.linspace(0.0, 8.0, 41)
+    heights = np.linspace(0.0, 2.0, 4)
     r, z = (each.ravel() for each in np.meshgrid(radii, heights))
-    grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+    grid = vtk.vtkUnstructuredGrid()
+    points = vtk.vtkPoints()
     points.SetDataTypeToDouble()
     for place in zip(r, z, np.zeros_like(r), strict=True):
         points.InsertNextPoint(place)

@@ -35,7 +35,8 @@ def test_surface_and_base_are_as_by_hankel_transforms(nu: float, width: float) -
     ours = elements(nu, width)
     hankel = HankelFilm(ours.film, ours.r)
     p, q = tractions(ours.r)
-    a, b = ours.compliance, hankel.compliance
+    a = ours.compliance
+    b = hankel.compliance
     down = b.normal @ p
     assert worst(a.normal @ p, down, down) < 2e-4
     assert worst(a.radial_by_pressure @ p, b.radial_by_pressure @ p, down) < 2e-4
@@ -43,7 +44,8 @@ def test_surface_and_base_are_as_by_hankel_transforms(nu: float, width: float) -
     assert worst(a.radial @ q, outward, outward) < 1e-4
     assert worst(a.normal_by_shear @ q, b.normal_by_shear @ q, outward) < 1e-4
     carried = a.areas @ p
-    a, b = ours.field(p, q), hankel.field(p, q)
+    a = ours.field(p, q)
+    b = hankel.field(p, q)
     r = np.linspace(0, ours.r[-1] + 4 * H, 80)
     normal = b.base_normal(r)
     assert worst(a.base_normal(r), normal, normal) < 2e-4
@@ -58,8 +60,10 @@ def test_surface_and_base_are_as_by_hankel_transforms(nu: float, width: float) -
 def test_the_field_at_the_rings_is_what_the_compliance_says() -> None:
     ours = elements(0.5, 1.7)
     p, q = tractions(ours.r)
-    field, c = ours.field(p, q), ours.compliance
-    w, u = c.normal @ p + c.normal_by_shear @ q, c.radial_by_pressure @ p + c.radial @ q
+    field = ours.field(p, q)
+    c = ours.compliance
+    w = c.normal @ p + c.normal_by_shear @ q
+    u = c.radial_by_pressure @ p + c.radial @ q
     np.testing.assert_allclose(field.depression(ours.r), w, rtol=1e-8, atol=1e-14)
     np.testing.assert_allclose(field.outward(ours.r), u, rtol=1e-8, atol=1e-14)
     between = (ours.r[1:] + ours.r[:-1]) / 2
@@ -73,7 +77,8 @@ def test_finer_triangles_agree_better_with_hankel_transforms() -> None:
     traction = tractions(models[0].r)
     expected = HankelFilm(models[0].film, models[0].r).field(*traction)
     r = np.linspace(0, 4 * H, 60)
-    normal, down = expected.base_normal(r), expected.depression(r)
+    normal = expected.base_normal(r)
+    down = expected.depression(r)
     found = [model.field(*traction) for model in models]
     at_base = [worst(field.base_normal(r), normal, normal) for field in found]
     on_top = [worst(field.depression(r), down, down) for field in found]

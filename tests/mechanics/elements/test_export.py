@@ -36,7 +36,8 @@ def test_quadratic_triangles_cover_the_film_anticlockwise() -> None:
 def test_the_stress_balances_the_tractions_on_both_faces(nu: float) -> None:
     field, mesh, rings, pressure = solved(nu)
     r, z = mesh.points.T
-    top, base = np.isclose(z, H, atol=1e-12), z == 0
+    top = np.isclose(z, H, atol=1e-12)
+    base = z == 0
     # Tension positive: a pressure of p is a stress of -p; z upward: an outward traction q is q.
     carried = np.interp(r[top], rings, pressure, right=0.0)
     np.testing.assert_allclose(mesh.stress[top, 1], -carried, atol=1.5e3)

@@ -34,7 +34,8 @@ def test_the_triangles_cover_the_film_once(name: str, radius: float) -> None:
 
 @pytest.mark.parametrize("name", RINGS)
 def test_corners_on_the_surface_are_rings_and_the_last_ring_is_one(name: str) -> None:
-    mesh, rings = film_triangles(RINGS[name], radius=12.5, thickness=1.0), RINGS[name]
+    mesh = film_triangles(RINGS[name], radius=12.5, thickness=1.0)
+    rings = RINGS[name]
     surface = np.sort(mesh.points[mesh.points[:, 1] == 0, 0])
     inside = surface[surface <= rings[-1]]
     assert np.all(np.isin(inside, rings))

@@ -60,7 +60,9 @@ def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch: float) -
 def test_the_tangent_is_the_derivative_of_the_forces(nu: float, ratio: float | None) -> None:
     elements = cylinder(nu, ratio)
     wave = np.sin(np.arange(elements.size) * 1.7)
-    x, direction, step = 0.03 * wave, np.cos(np.arange(elements.size) * 0.9), 1e-6
+    x = 0.03 * wave
+    direction = np.cos(np.arange(elements.size) * 0.9)
+    step = 1e-6
     change = (elements.forces(x + step * direction) - elements.forces(x - step * direction)) / 2
     assert elements.tangent(x) @ direction == pytest.approx(change / step, abs=1e-8)
 
@@ -70,7 +72,8 @@ def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film(r
     elements = cylinder(ratio=ratio)
     x = 0.03 * np.sin(np.arange(elements.size) * 1.7)
     x[2 * elements.n :] = 0.0  # its multiplier does no work in the energy
-    direction, step = np.cos(np.arange(elements.size) * 0.9), 1e-6
+    direction = np.cos(np.arange(elements.size) * 0.9)
+    step = 1e-6
     direction[2 * elements.n :] = 0.0
     change = elements.energy(x + step * direction) - elements.energy(x - step * direction)
     assert elements.forces(x) @ direction == pytest.approx(change / (2 * step), rel=1e-7)
@@ -78,7 +81,8 @@ def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film(r
 
 @pytest.mark.parametrize("ratio", [0.0, 0.5, 2.0])
 def test_simple_shear_of_a_mooney_rivlin_film_is_the_closed_form(ratio: float) -> None:
-    rubber, gamma = Rubber.of(film_of(ratio=ratio)), 0.8
+    rubber = Rubber.of(film_of(ratio=ratio))
+    gamma = 0.8
     F = np.array([1.0, gamma, 0.0, 1.0, 1.0])
     rr, zz, hoop, rz = rubber.cauchy(F, np.zeros(()))
     assert rubber.shear_modulus == pytest.approx(FILM.shear_modulus * 1e-6, rel=1e-12)
@@ -161,7 +165,8 @@ def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods: tuple[Conta
 def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]) -> None:
     deepest = pressed_rods[-1]
     r, depression, outward = deepest.inside.surface
-    moved, above = (r + outward) * 1e3, (deepest.depth - depression) * 1e3
+    moved = (r + outward) * 1e3
+    above = (deepest.depth - depression) * 1e3
     _, gap = RodFace(0.25, 0.05).nearest(moved, above)
     assert gap.min() > -1e-9
     assert deepest.contact_radius == pytest.approx(ROD.radius, rel=0.03)

@@ -81,7 +81,8 @@ def test_a_film_that_sticks_at_once_has_not_moved_sideways() -> None:
 
 
 def test_more_friction_means_a_stiffer_contact_and_more_stress_below() -> None:
-    depths, stresses = [], []
+    depths = []
+    stresses = []
     for friction in (0.0, 0.05, 0.1, 0.2, 0.3, math.inf):
         contact = indent(FILM, SPHERE, load=2.75, friction=friction)
         depths.append(contact.depth)
