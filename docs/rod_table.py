@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import memscal
-from memscal.mechanics.finite_strain.solve import follow_depths
-from memscal.mechanics.finite_strain.table import FILE
+from memscal.extensions.finite_strain.solve import follow_depths
+from memscal.mechanics.tabulated_rod import FILE
 
 POISSON = (0.45, 0.475, 0.49, 0.5)
 RADII = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.36, 0.44, 0.52, 0.6)  # over the thickness

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +13,7 @@ from scipy.special import j0, j1
 from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline, ring_areas
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
+from memscal.extensions import hook
 from memscal.model.apparatus import ApparatusData, ApparatusField
 from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
@@ -53,9 +53,6 @@ class ApparatusFunction(Result, ApparatusData):
     >>> bool(apparatus.stress(volts)[0] < contact.base_stress(0.0))
     True
     """
-
-    _summary: ClassVar[str] = "calibration"
-    _figure: ClassVar[str] = "calibration.calibration_figure"
 
     source: SourceFile | None = field(default=None, init=False)
     """The file it was read from; ``None`` for a changed copy."""
@@ -206,9 +203,7 @@ class ApparatusFunction(Result, ApparatusData):
         OutputError
             If the file exists and ``overwrite`` is false, or cannot be written.
         """
-        from memscal.formats.artifact import write_artifact
-
-        write_artifact(self, path, overwrite=overwrite)
+        hook("write_artifact")(self, path, overwrite=overwrite)
 
     def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""

@@ -26,7 +26,7 @@ from memscal.formats.hdf5 import writer  # noqa: E402
 settings.register_profile("memscal", deadline=None, print_blob=True)
 settings.load_profile("memscal")
 
-REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.mechanics.finite_strain.solve")
+REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.extensions.finite_strain.solve")
 
 FULL_STUDY = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 

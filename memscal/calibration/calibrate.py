@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from os import PathLike
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from memscal.calibration.field_uncertainty import field_errors
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
-from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError, MemscalError
@@ -36,6 +35,7 @@ from memscal.estimation.reference import (
     require_same_set_up,
     with_film_of,
 )
+from memscal.extensions import hook
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.model.apparatus import (
@@ -55,6 +55,9 @@ from memscal.model.sizes import MOST_OF_LINES
 from memscal.model.stress import IdealReference, StressField, StressProfile
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, done_with, in_steps, reported
+
+if TYPE_CHECKING:
+    from memscal import Sweep
 
 #: Parameters that differ between a division and the Bayesian estimate.
 _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
@@ -208,9 +211,6 @@ class Calibration(Result):
         Correlation coefficients of the inputs' errors.
     """
 
-    _summary: ClassVar[str] = "calibration"
-    _figure: ClassVar[str] = "calibration.calibration_figure"
-
     apparatus: ApparatusFunction
     solution: Solution
     effects: Mapping[str, InputEffect] = field(default_factory=dict)
@@ -226,7 +226,7 @@ class Calibration(Result):
         return self.apparatus.passed
 
     @single_threaded()
-    def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:
+    def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> "Sweep":
         """Vary the white noise over two decades of amplitude, and over seeds.
 
         Parameters
@@ -248,8 +248,9 @@ class Calibration(Result):
         InputError
             If a number is out of range, or the scan's fields cannot be divided.
         """
-        swept = sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
-        return replace(swept, reading=self.apparatus.reading)
+        swept = hook("sweep_noise")(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+        sweep: Sweep = replace(swept, reading=self.apparatus.reading)
+        return sweep
 
 
 @reported

@@ -21,9 +21,8 @@ from memscal.formats.files import together
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
-    from memscal.calibration.monte_carlo import MonteCarlo
-    from memscal.calibration.sweep import Sweep
     from memscal.deconvolution.division import Method
+    from memscal.model.result import Result
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
@@ -31,16 +30,16 @@ if TYPE_CHECKING:
 _MOST_WORKERS = 8
 
 
-def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
+def _drawn(calibration: Calibration, draws: int, seed: int) -> Any:
     """Draw in processes, show how many draws are done, and where they and the budget disagree."""
-    from memscal.calibration.monte_carlo import monte_carlo
+    from memscal.extensions import hook
     from memscal.model.checks import Message
     from memscal.model.quantities import estimated_quantity
 
     # Starting a process takes about as long as forty draws of a line.
     workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
     with out.working("Calibrating drawn scans"):
-        drawn = monte_carlo(calibration, draws=draws, seed=seed, workers=workers)
+        drawn = hook("monte_carlo")(calibration, draws=draws, seed=seed, workers=workers)
     differing = [c for c in drawn.comparisons if not c.agrees]
     texts = [f"{estimated_quantity(c.name).words}: {c.reason}" for c in differing]
     out.show_messages([*drawn.messages, *(Message("disagreement", text) for text in texts)])
@@ -285,7 +284,7 @@ def command(
 
     with out.working(f"Calibrating by {settings['method'].name}"):
         calibration = calibrate(data, **settings)
-    further: dict[str, Sweep | MonteCarlo] = {}
+    further: dict[str, Result] = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
             further["sweep"] = calibration.sweep(seed=seed)

@@ -1,31 +1,12 @@
 """The group of commands: their names and one line on each, without importing any of them."""
 
 import os
-from importlib import import_module
 
 import click
 
 from memscal.cli.failures import debug_option
+from memscal.extensions import COMMANDS, module
 from memscal.version import __version__
-
-COMMANDS = {
-    "calibrate": ("calibrate", "Find a sensor's apparatus function from a rod scan."),
-    "batch": ("batch", "Calibrate a folder of scans, or those of a manifest."),
-    "summary": ("summary", "Summarise the results of a batch: distributions, outliers, map."),
-    "reference": ("reference", "Solve the stress at the base of a film under an indenter."),
-    "apply": ("apply", "Turn contact scans into measured stress, load by load."),
-    "restore": ("restore", "Restore the stress at the base of a film from a scan."),
-    "compare": ("compare", "Compare measured with calculated stress: effective friction."),
-    "certificate": ("certificate", "Write a certificate of calibration (HTML, PDF, XML)."),
-    "design": ("design", "Predict the uncertainties of a scan before it is made."),
-    "simulate": ("simulate", "Make a synthetic scan, or the scans of an experiment."),
-    "import": ("import_", "Convert a table or a mesh to a scan or a reference."),
-    "inspect": ("inspect", "Show what a file holds."),
-    "check": ("check", "Check a file's safety, schema, digest and content."),
-    "explain": ("explain", "Explain what a quality check tests, and what to do if it fails."),
-    "completion": ("completion", "Print the shell's completion script."),
-}
-"""Command: its module in this package, and what it does."""
 
 SETTINGS = {"help_option_names": ["--help", "-h"], "max_content_width": 100}
 
@@ -41,7 +22,7 @@ class LazyGroup(click.Group):
         """Import a command."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = import_module(f"memscal.cli.{COMMANDS[cmd_name][0]}").command
+        command: click.Command = module(COMMANDS[cmd_name][0]).command
         return command
 
     def resolve_command(

@@ -13,6 +13,7 @@ from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, option, output_options, si
 from memscal.cli.output import emit, emit_json, message, show_messages
+from memscal.extensions import hook
 from memscal.formats.files import together
 from memscal.model.checks import marked_texts
 from memscal.summaries.table import readable
@@ -40,14 +41,14 @@ def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> Imported
 
         setting |= _stated(options, _OF_TABLES)
         return read_reference_table(path, reading=_stated(options, _READING), **setting)
-    from memscal.formats.meshes.reference_mesh import read_reference_mesh
 
     setting |= _stated(options, _OF_MESHES)
     if "base" in setting:
         setting["base"] = si(setting["base"], -3)
     if "centre" in setting:
         setting["centre"] = tuple(si(position, -3) for position in setting["centre"])
-    return read_reference_mesh(path, **setting)
+    profile: ImportedProfile = hook("read_reference_mesh")(path, **setting)
+    return profile
 
 
 EXAMPLES = """\b
@@ -229,15 +230,13 @@ def command(
     Readings are kept as they are. What was read, and what was pressed on what, is printed and
     kept in the notes of the file.
     """
-    from memscal.formats.meshes.mesh_files import is_mesh, with_drawn_in
-
-    mesh = is_mesh(table)
+    mesh = hook("is_mesh")(table)
     options |= {name: options[name] or None for name in ("repeat", "missing", "figures", "holds")}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     figures = options["figures"] or ()
     laboratory = options["laboratory"]
-    inputs = [*with_drawn_in(table), *([laboratory] if laboratory else [])]
+    inputs = [*hook("with_drawn_in")(table), *([laboratory] if laboratory else [])]
     out.prove_writable([output, *figures], force=force, inputs=inputs)
     with together():
         if kind == "scan":

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import click
 
 from memscal.cli.failures import debug_option
+from memscal.extensions import hook
 
 if TYPE_CHECKING:
     from memscal.axisymmetry.kernels import RadialKernel
@@ -119,9 +120,7 @@ def with_laboratory(path: Path | None, scan: Scan) -> Scan:
     """Return a scan with what a laboratory's file adds to it, where there is one."""
     if path is None:
         return scan
-    from memscal.formats.laboratory import read_laboratory
-
-    return replace(scan, **read_laboratory(path).additions(scan))
+    return replace(scan, **hook("read_laboratory")(path).additions(scan))
 
 
 def _one_form(ctx: click.Context, param: click.Parameter, given: bool) -> bool:

@@ -13,6 +13,7 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, PAPER_FILM, Quantity, indenter_from, option, options_of, si
+from memscal.extensions import hook
 from memscal.formats.files import together
 
 if TYPE_CHECKING:
@@ -231,9 +232,7 @@ def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) 
 
         drawn = out.rendered(lambda: contact_figure(contacts), figures)
     if mesh is not None:
-        from memscal.formats.meshes.mesh_files import write_mesh
-
-        write_mesh(contacts[0].mesh(), mesh, overwrite=force)
+        hook("write_mesh")(contacts[0].mesh(), mesh, overwrite=force)
     if output is not None:
         from memscal.formats.reference import write_reference
 

@@ -13,8 +13,8 @@ from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.estimation import points
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import BaseStress, Contact
-from memscal.mechanics.finite_strain.table import largest_tabulated_load
 from memscal.mechanics.press_rod import is_tabulated, press_rod
+from memscal.mechanics.tabulated_rod import largest_tabulated_load
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.indenter import Rod

@@ -14,6 +14,9 @@ from matplotlib.figure import Figure
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.calibrate import Calibration
+from memscal.extensions import VIEWS
+from memscal.extensions.fleet import results_summary as fleet_results
+from memscal.extensions.fleet.results import FleetResults
 from memscal.figures.calibration import values_text
 from memscal.figures.friction import comparison_figures
 from memscal.figures.style import render_figure
@@ -22,7 +25,6 @@ from memscal.measurement.restoration import Restoration
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData
 from memscal.model.checks import Message, QualityCheck, marked_texts
-from memscal.model.fleet import FleetResults
 from memscal.model.indenter import RoundIndenter
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.notation import format_measured
@@ -32,7 +34,6 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
-from memscal.summaries import fleet_results
 from memscal.summaries.calibration import apparatus_of, sensor_title
 from memscal.summaries.declared import total_of
 from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
@@ -149,7 +150,7 @@ def report_of(result: Result) -> Report:
     tables: list[Table] = result.tables()
     checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
     title = tables[0].title if tables else type(result).__name__
-    pictures = [Picture(result.plot, title, title)] if result._figure else []
+    pictures = [Picture(result.plot, title, title)] if VIEWS[type(result).__name__][1] else []
     return Report(title=title, pictures=pictures, checks=checks, messages=messages)
 
 

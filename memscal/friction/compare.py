@@ -12,6 +12,7 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL, accepted_differences, measured_mask
+from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction import effective
@@ -24,7 +25,6 @@ from memscal.friction.checks import (
 )
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import Channel, load_points, require_line, sensor_of
-from memscal.friction.model_comparison import compare_interface
 from memscal.friction.results import (
     BoundedEstimate,
     DryAgainstLubricated,
@@ -260,7 +260,7 @@ def compare(
     if not interface:
         return comparison
     assert macroscopic is not None
-    laws = compare_interface(
+    laws = hook("compare_interface")(
         measured.profiles,
         sensor,
         macroscopic=macroscopic,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
@@ -230,9 +229,6 @@ class FrictionComparison(Result, Checked):
     messages: tuple[Message, ...] = field(default=())
     shear: ApparatusFunction | None = None
 
-    _summary: ClassVar[str] = "comparison"
-    _figure: ClassVar[str] = "friction.comparison_figure"
-
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         return f"<FrictionComparison: {joint_text(self.joint)}; {state_of_checks(self.checks)}>"
@@ -253,8 +249,6 @@ class ShearComparison(Result):
     loads: Mapping[str, tuple[BoundedEstimate, ...]]
     joint: Mapping[str, Mapping[str, BoundedEstimate]]
     messages: tuple[Message, ...]
-
-    _summary: ClassVar[str] = "comparison"
 
     def __repr__(self) -> str:
         """Return the coefficients of all loads together."""
@@ -361,9 +355,6 @@ class InterfaceComparison(Result):
     tangential: LawComparison | None
     normal: LawComparison | None
     messages: tuple[Message, ...] = field(default=())
-
-    _summary: ClassVar[str] = "interface_laws"
-    _figure: ClassVar[str] = "friction.interface_figure"
 
     def __repr__(self) -> str:
         """Return the length of each law that yields."""

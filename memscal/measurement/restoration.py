@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
-from typing import ClassVar, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -160,9 +160,6 @@ class Restoration(Result, Checked):
     comparison: StressComparison | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = ()
-
-    _summary: ClassVar[str] = "restoration"
-    _figure: ClassVar[str] = "stress.restoration_figure"
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

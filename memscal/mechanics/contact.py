@@ -100,8 +100,6 @@ class Contact(Result):
 
     unit: ClassVar[str] = "Pa"
     form: ClassVar[None] = None
-    _summary: ClassVar[str] = "contact"
-    _figure: ClassVar[str] = "stress.contact_figure"
 
     def __repr__(self) -> str:
         """Return what was pressed, load, depth and radius in place of the field."""

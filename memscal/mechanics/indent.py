@@ -8,9 +8,9 @@ from typing import Any, overload
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.extensions import hook
 from memscal.mechanics.contact import Contact, too_deep
 from memscal.mechanics.film_response import HankelField
-from memscal.mechanics.finite_strain.solve import press_at_finite_strain
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.rod import solve_rod
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
@@ -173,7 +173,7 @@ def indent(
     # Without friction there is nothing for a slip length to act on.
     rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
     if strain == "finite":
-        contacts = press_at_finite_strain(request)
+        contacts = hook("press_at_finite_strain")(request)
     elif isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel":
         contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:

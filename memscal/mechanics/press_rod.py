@@ -4,8 +4,8 @@ import math
 from functools import lru_cache
 
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.finite_strain.table import tabulated_rod
 from memscal.mechanics.indent import indent
+from memscal.mechanics.tabulated_rod import tabulated_rod
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
 

@@ -35,8 +35,6 @@ _CURE = (
 class Holds(Result):
     """Holds that were found in a log of n rows, m of them, in SI units."""
 
-    _figure = "holds.holds_figure"
-
     log: Mapping[str, FloatArray]  # (n,) each: x, u_zz, and y and normal_load where they are logged
     line: NDArray[Any]  # (n,): line of the file
     first: NDArray[np.intp]  # (m,): row of the log

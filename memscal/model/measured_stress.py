@@ -14,10 +14,11 @@ that this conversion gives back, so that what was saved and read again is equal 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from memscal.extensions import hook
 from memscal.model.arrays import ByContent, FloatArray, frozen_array
 from memscal.model.checks import (
     NOISE_UNSTATED,
@@ -250,9 +251,6 @@ class MeasuredStress(Result, Checked, ByContent):
     artifact: SourceFile | None = None
     artifact_digest: str = ""
 
-    _summary: ClassVar[str] = "stress"
-    _figure: ClassVar[str] = "stress.measured_stress_figure"
-
     def __post_init__(self) -> None:
         for name in ("conversion_constant", "conversion_constant_uncertainty"):
             object.__setattr__(self, name, _kept(getattr(self, name)))
@@ -282,9 +280,7 @@ class MeasuredStress(Result, Checked, ByContent):
 
         The same files and options give the same bytes while ``SOURCE_DATE_EPOCH`` is set.
         """
-        from memscal.formats.stress import write_stress
-
-        write_stress(self, path, overwrite=overwrite)
+        hook("write_stress")(self, path, overwrite=overwrite)
 
 
 def _kept(value: float) -> float:

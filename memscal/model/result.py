@@ -1,15 +1,15 @@
 """Base of all results: each shows itself as text, mapping, arrays, figure and notebook cell.
 
-What a result says is written in :mod:`memscal.summaries`, its figure in :mod:`memscal.figures`.
-Both import the results, so that they are imported when a method is called.
+The modules that write and draw a result import it: the table of :mod:`memscal.extensions` names
+them, and they are imported when a method is called.
 """
 
 from __future__ import annotations
 
 from html import escape
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
+from memscal import extensions
 from memscal.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,28 +23,23 @@ _FORMS = {"dataset": "arrays", "frame": "data frame", "correlated": "covariance 
 class Result:
     """A result that prints, tabulates and draws itself.
 
-    ``_summary`` names the module of :mod:`memscal.summaries` with the functions
-    ``tables(result)``, ``mapping(result)`` and, where there is one, ``answer(result)``,
-    ``dataset(result)``, ``frame(result)`` and ``correlated(result)``; ``_figure`` names the module
-    and function of :mod:`memscal.figures` that draws it.
+    The module of its summary has the functions ``tables(result)``, ``mapping(result)`` and, where
+    there is one, ``answer(result)``, ``dataset(result)``, ``frame(result)`` and
+    ``correlated(result)``.
     """
-
-    _summary: ClassVar[str]
-    _figure: ClassVar[str] = ""
 
     def tables(self) -> list[Any]:
         """Return the tables of the result, those without rows left out."""
-        return [table for table in self._told("tables") if table.rows]
+        return [table for table in self._shown_as("tables") if table.rows]
 
     def answer(self) -> str:
         """Return what the result says, in about two lines; empty where only its tables do."""
-        told = getattr(import_module(f"memscal.summaries.{self._summary}"), "answer", None)
-        return str(told(self)) if told else ""
+        answer = getattr(self._summary_module(), "answer", None)
+        return str(answer(self)) if answer else ""
 
     def summary(self) -> str:
         """Return answer and tables of the result as text, as the command line prints them."""
-        text: str = import_module("memscal.summaries.table").text_of(self.answer(), self.tables())
-        return text
+        return str(extensions.hook("text_of")(self.answer(), self.tables()))
 
     def __str__(self) -> str:
         """Return the summary."""
@@ -57,39 +52,41 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them."""
-        mapping: dict[str, Any] = self._told("mapping")
+        mapping: dict[str, Any] = self._shown_as("mapping")
         return mapping
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the arrays on their axes, each with its unit, in SI units (needs xarray)."""
-        dataset: xarray.Dataset = self._told("dataset")
+        dataset: xarray.Dataset = self._shown_as("dataset")
         return dataset
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the result as a table of numbers, units in the names of columns (needs pandas)."""
-        return self._told("frame")
+        return self._shown_as("frame")
 
     def ufloats(self) -> dict[str, Any]:
         """Return the parameters as correlated numbers of the package uncertainties, in SI units."""
-        numbers: dict[str, Any] = self._told("correlated")
+        numbers: dict[str, Any] = self._shown_as("correlated")
         return numbers
 
     def plot(self, **options: Any) -> Figure:
         """Draw the result; the figure is returned, and nothing is shown or written."""
-        if not self._figure:
+        name = extensions.VIEWS[type(self).__name__][1]
+        if not name:
             raise InputError(f"There is no figure of a {type(self).__name__}.")
-        module, _, function = self._figure.rpartition(".")
-        draw = getattr(import_module(f"memscal.figures.{module}"), function)
-        figure: Figure = draw(self, **options)
+        module, _, function = name.rpartition(".")
+        figure: Figure = getattr(extensions.module(module), function)(self, **options)
         return figure
 
     def report(self) -> str:
         """Return the result as an HTML page without other files, network or scripts."""
-        page: str = import_module("memscal.figures.report").html_report(self)
-        return page
+        return str(extensions.hook("html_report")(self))
 
-    def _told(self, form: str) -> Any:
-        function = getattr(import_module(f"memscal.summaries.{self._summary}"), form, None)
+    def _summary_module(self) -> Any:
+        return extensions.module(extensions.VIEWS[type(self).__name__][0])
+
+    def _shown_as(self, form: str) -> Any:
+        function = getattr(self._summary_module(), form, None)
         if function is None:
             problem = f"A {type(self).__name__} has no {_FORMS[form]}."
             raise InputError(problem, cure="Use summary() or to_dict().")

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from importlib import import_module
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
+from memscal.extensions import hook
 from memscal.model import arrays
 from memscal.model.arrays import FloatArray
 from memscal.model.correlation import checked_correlation, of_points
@@ -291,7 +291,7 @@ class Scan:
         >>> Scan.from_arrays([-8, 0, 8], [[0.1, 2, 0.1], [0.2, 2, 0.1]], x_unit="mm", u_unit="mV")
         <ImportedScan: repeats, 2 x 3 points, x from -8 to 8 mm, no load stated>
         """
-        scan: Scan = import_module("memscal.formats.tables.scan").scan_of_arrays(x, u, **options)
+        scan: Scan = hook("scan_of_arrays")(x, u, **options)
         return scan
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.extensions.interface_laws import summary as interface_laws
+from memscal.extensions.interface_laws.summary import friction_name
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import (
     BoundedEstimate,
@@ -23,9 +25,7 @@ from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import MM, measured
-from memscal.summaries import interface_laws
 from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members
-from memscal.summaries.interface_laws import friction_name
 from memscal.summaries.table import (
     Table,
     checks_json,

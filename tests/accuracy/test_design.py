@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 import memscal
 from memscal import ParameterSet, Plan
-from memscal.simulation.rod_scan import PAPER_FILM
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 

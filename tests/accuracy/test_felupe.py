@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import j0
 
 from memscal import indent
-from memscal.mechanics.finite_strain.solve import solve_finite_strain
+from memscal.extensions.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Load
 
 felupe = pytest.importorskip("felupe", reason="FElupe, the other program, is not installed")

@@ -13,8 +13,8 @@ from helpers.scans import GAUSSIAN, TAILS
 from scipy.stats import binom, chi2, norm
 
 import memscal
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.model.film import LAWS
-from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 

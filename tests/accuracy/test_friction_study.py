@@ -18,12 +18,12 @@ from helpers.bounds import FULL
 from scipy.stats import binom, kstest, norm
 
 import memscal
+from memscal.extensions.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import _channels, _confronted, _joint, compare_measured
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import FrictionComparison
-from memscal.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
-from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 

@@ -18,11 +18,11 @@ from scipy.stats import binom
 
 import memscal
 from memscal import ElasticFilm, Interface, LawComparison
+from memscal.extensions.interface_laws.model_comparison import compare_interface
+from memscal.extensions.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
-from memscal.friction.model_comparison import compare_interface
-from memscal.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
-from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 

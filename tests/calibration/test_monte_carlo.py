@@ -7,11 +7,11 @@ from helpers.scans import EXACT_FILM, EXACT_ROD, LINEAR_FILM, TAILS, shear_scan,
 
 import memscal
 from memscal import Calibration, Scan
-from memscal.calibration.monte_carlo import DrawnScans, shortest_interval
 from memscal.calibration.uncertainty import BUDGETED
 from memscal.deconvolution.division import Division, DivisionProblem, create_regulariser
 from memscal.errors import FitError
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.extensions.monte_carlo.monte_carlo import DrawnScans, shortest_interval
+from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 
 def uncertain(**options: object) -> Calibration:

@@ -17,9 +17,9 @@ from memscal import Scan
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.cli import main
 from memscal.deconvolution.division import regulariser_names
+from memscal.extensions.simulation import rod_scan
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.checks import QualityCheck
-from memscal.simulation import rod_scan
 
 pytestmark = pytest.mark.filterwarnings("ignore::memscal.errors.UnitWarning")
 

@@ -13,8 +13,8 @@ import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
 from memscal.deconvolution.fourier_ratio import kernel_functionals
+from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.model.arrays import FloatArray
-from memscal.simulation.rod_scan import PAPER_ROD
 
 PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 

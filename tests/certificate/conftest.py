@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import memscal
-from memscal.certificate.certificate import Certificate, certify
-from memscal.formats.laboratory import LaboratoryFile, read_laboratory
+from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.laboratory import LaboratoryFile, read_laboratory
 
 DATA = Path(__file__).parents[2] / "calibration_data"
 

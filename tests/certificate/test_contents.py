@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import memscal
-from memscal.certificate.certificate import CertifiedValue, Conformity, certify
-from memscal.certificate.dcc import certificate_xml
-from memscal.certificate.page import certificate_page
 from memscal.errors import InputError
-from memscal.formats.laboratory import NEEDED, LaboratoryFile
+from memscal.extensions.certificate.certificate import CertifiedValue, Conformity, certify
+from memscal.extensions.certificate.dcc import certificate_xml
+from memscal.extensions.certificate.laboratory import NEEDED, LaboratoryFile
+from memscal.extensions.certificate.page import certificate_page
 from memscal.model.checks import Message
 from memscal.model.quantities import ESTIMATED
 

@@ -12,9 +12,9 @@ from dcclib.validation import SchematronValidator, XsdValidator
 from dsi_unit import DsiUnit
 
 import memscal
-from memscal.certificate.certificate import Certificate, certify
-from memscal.certificate.dcc import certificate_xml
-from memscal.certificate.page import certificate_page
+from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.dcc import certificate_xml
+from memscal.extensions.certificate.page import certificate_page
 from memscal.formats.inspection import check
 from memscal.formats.units import dsi_unit
 from memscal.model.quantities import PER_MM2

@@ -9,9 +9,9 @@ import pypdf
 import pytest
 
 import memscal
-from memscal.certificate.certificate import Certificate, certify
-from memscal.certificate.dcc import certificate_xml
-from memscal.certificate.page import certificate_page, certificate_pdf
+from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.dcc import certificate_xml
+from memscal.extensions.certificate.page import certificate_page, certificate_pdf
 from memscal.model.checks import QualityCheck
 
 NO_ACCREDITATION = "This is no accredited certificate"

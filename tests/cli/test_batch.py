@@ -19,9 +19,9 @@ from helpers.scans import simulated
 from scipy.stats import binom
 
 import memscal
-from memscal.formats.fleet import read_fleet
-from memscal.model.fleet import FleetResults
-from memscal.summaries.fleet_results import outliers
+from memscal.extensions.fleet.results import FleetResults
+from memscal.extensions.fleet.results_summary import outliers
+from memscal.extensions.fleet.shards import read_fleet
 
 COUNT = 12
 SHARD = 2
@@ -201,7 +201,7 @@ def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run:
 
 
 def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet: Path, folder: Path) -> None:
-    from memscal.formats.fleet import manifest_scans
+    from memscal.extensions.fleet.shards import manifest_scans
 
     for name in ("b/1.h5", "b/1.apparatus.h5", "b/notes.txt", "a.h5", "c,d.nxs"):
         (folder / name).parent.mkdir(exist_ok=True)

@@ -9,8 +9,8 @@ import pytest
 from helpers.console import Run, names
 
 import memscal
-from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.cli.options import si
+from memscal.extensions.monte_carlo.sweep import Sweep, sweep_noise
 
 
 def test_the_artifact_lies_beside_the_scan_and_holds_its_truth(run: Run, scan: Path):

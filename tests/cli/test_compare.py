@@ -16,7 +16,7 @@ from helpers.scans import known_apparatus
 import memscal
 from memscal.cli.compare import cache_from, user_cache_folder
 from memscal.cli.failures import CHECK_FAILED
-from memscal.simulation.experiment import simulate_experiment
+from memscal.extensions.simulation.experiment import simulate_experiment
 
 CHECKED = CHECK_FAILED
 USAGE = 2

@@ -8,7 +8,7 @@ from helpers.console import Run, names, run_program
 from helpers.records import assert_same
 
 import memscal
-from memscal.cli.simulate import FILES
+from memscal.extensions.simulation.command import FILES
 from memscal.formats.inspection import check
 
 SPHERE = ("simulate", "--experiment", "sphere")

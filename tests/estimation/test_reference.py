@@ -17,8 +17,8 @@ from memscal.estimation.reference import (
     require_same_set_up,
     rod_sensitivities,
 )
+from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.mechanics.contact import Contact
-from memscal.simulation.rod_scan import PAPER_ROD
 
 SCAN = simulated(film=LINEAR_FILM, rod=PAPER_ROD)
 POINTS = measured_points(SCAN)

@@ -12,8 +12,8 @@ from memscal.errors import InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.reference import reference_spectra
+from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.model.arrays import FloatArray
-from memscal.simulation.rod_scan import PAPER_ROD
 
 KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
 

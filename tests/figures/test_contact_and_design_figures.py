@@ -9,12 +9,12 @@ from matplotlib.lines import Line2D
 
 import memscal
 from memscal.errors import InputError
-from memscal.figures.design import design_figure
+from memscal.extensions.planning.design import Design
+from memscal.extensions.planning.figure import design_figure
 from memscal.figures.stress import contact_figure
 from memscal.figures.style import render_figure
 from memscal.mechanics.indent import indent
 from memscal.model.indenter import Rod
-from memscal.planning.design import Design
 
 
 def curve(axes, color: str, style: str) -> Line2D:

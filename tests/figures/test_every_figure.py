@@ -18,9 +18,9 @@ from matplotlib.transforms import Bbox
 
 import memscal
 from memscal.cli.compare import figure_stems
+from memscal.extensions.fleet.results import FleetResults
 from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import house_style, render_figure
-from memscal.model.fleet import FleetResults
 
 STATES = ("dry", "lubricated")
 OF_A_COMPARISON = ["", *figure_stems(STATES, interface=True)]

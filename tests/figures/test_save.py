@@ -45,7 +45,7 @@ def test_drawing_needs_no_pyplot_and_the_rest_no_matplotlib():
     code = (
         "import sys, memscal.figures, memscal.model.notation\n"
         "assert 'matplotlib' not in sys.modules\n"
-        "import memscal.figures.style, memscal.figures.report, memscal.figures.sweep\n"
+        "import memscal.figures.style, memscal.figures.report, memscal.figures.stress\n"
         "assert 'matplotlib.figure' in sys.modules\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.builders import make_sweep
 
-from memscal.figures.sweep import sweep_figure
+from memscal.extensions.monte_carlo.sweep_figure import sweep_figure
 
 
 def line(axes, label):

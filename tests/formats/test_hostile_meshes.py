@@ -20,8 +20,8 @@ import pytest
 from helpers.meshes import section, write
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.extensions.meshes.mesh_files import Mesh, read_mesh
 from memscal.formats.meshes import mesh_files
-from memscal.formats.meshes.mesh_files import Mesh, read_mesh
 
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
 BOMB = "".join(

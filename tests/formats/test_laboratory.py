@@ -8,7 +8,7 @@ import pytest
 import memscal
 from memscal.cli import main
 from memscal.errors import MemscalError
-from memscal.formats.laboratory import NEEDED, Measured, read_laboratory
+from memscal.extensions.certificate.laboratory import NEEDED, Measured, read_laboratory
 
 SHIPPED = Path(__file__).parents[2] / "calibration_data" / "lab.toml"
 

@@ -12,8 +12,8 @@ from helpers.builders import make_film
 from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, write
 
 from memscal.errors import FormatError, InputError, UnitError
-from memscal.formats.meshes.mesh_files import read_mesh, write_mesh
-from memscal.formats.meshes.reference_mesh import read_reference_mesh
+from memscal.extensions.meshes.mesh_files import read_mesh, write_mesh
+from memscal.extensions.meshes.reference_mesh import read_reference_mesh
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress

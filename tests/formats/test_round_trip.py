@@ -15,8 +15,8 @@ from hypothesis.extra import numpy as hnp
 
 from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, UnitError
+from memscal.extensions.meshes.mesh_files import write_mesh
 from memscal.formats.artifact import write_artifact
-from memscal.formats.meshes.mesh_files import write_mesh
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.model.apparatus import ParameterSet

@@ -21,13 +21,13 @@ from helpers.interface_points import (
 )
 
 from memscal.errors import InputError
-from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import likelihood
-from memscal.friction.model_comparison import (
+from memscal.extensions.interface_laws.model_comparison import (
     compare_interface,
     weigh_normal_compliance,
     weigh_slip_length,
 )
+from memscal.friction.family import ProfileFamily
+from memscal.friction.likelihood import likelihood
 from memscal.friction.results import LawComparison
 
 

@@ -9,14 +9,14 @@ from scipy.stats import binom, chi2
 
 import memscal
 from memscal import ApparatusFunction, Experiment, LoadCell, MeasuredStress
+from memscal.extensions.simulation.experiment import PAPER_SPHERE, simulate_contacts
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import Predicted, load_points, points_at, predict, sensor_of
 from memscal.measurement.measure_stress import pooled_force
 from memscal.model.arrays import FloatArray
-from memscal.simulation.experiment import PAPER_SPHERE, simulate_contacts
-from memscal.simulation.rod_scan import PAPER_FILM
 
 SEEDS = range(8)
 CHANCE = 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 
 import memscal
 from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
-from memscal.calibration.sweep import Sweep
+from memscal.extensions.monte_carlo.sweep import Sweep
 from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,

@@ -9,10 +9,10 @@ import numpy as np
 from helpers.paper import LOADS, SPHERE
 
 from memscal import ElasticFilm
+from memscal.extensions.interface_laws.model_comparison import Measured
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import LoadPoints, Sensor
-from memscal.friction.model_comparison import Measured
 
 MACROSCOPIC = 1.6
 FILM = ElasticFilm(

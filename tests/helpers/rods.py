@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from memscal import ElasticFilm, Rod
-from memscal.mechanics.finite_strain.solve import follow_depths
-from memscal.mechanics.finite_strain.table import tabulated_rod
+from memscal.extensions.finite_strain.solve import follow_depths
+from memscal.mechanics.tabulated_rod import tabulated_rod
 
 H = 2e-3
 

@@ -11,7 +11,7 @@ import pytest
 from helpers.nexus import definitions_folder, violations
 
 import memscal
-from memscal.formats.laboratory import read_laboratory
+from memscal.extensions.certificate.laboratory import read_laboratory
 
 pytestmark = pytest.mark.judges
 

@@ -7,7 +7,7 @@ from helpers.paper import FILM, ROD
 from helpers.rods import compare_with_the_table
 
 from memscal import Rod
-from memscal.mechanics.finite_strain.table import largest_tabulated_load, tabulated_rod
+from memscal.mechanics.tabulated_rod import largest_tabulated_load, tabulated_rod
 
 RUBBER = replace(FILM, law="neo-hookean")
 

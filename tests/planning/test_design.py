@@ -13,8 +13,8 @@ from memscal import Plan
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.smoothing import find_band, smooth_profile
-from memscal.planning.design import Design, expected_calibration, varied_designs
-from memscal.simulation.rod_scan import PAPER_FILM
+from memscal.extensions.planning.design import Design, expected_calibration, varied_designs
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 

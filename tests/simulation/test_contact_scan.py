@@ -12,10 +12,10 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.errors import DomainError, InputError
+from memscal.extensions.simulation.experiment import PAPER_SPHERE, Reality, drawn, simulate_contacts
+from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, blurred_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
-from memscal.simulation.experiment import PAPER_SPHERE, Reality, drawn, simulate_contacts
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, blurred_stress
 
 STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}

@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from memscal import GaussianMixture, RadialKernel, SmoothedDisc, simulate
 from memscal.errors import InputError
+from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.arrays import FloatArray
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 LINEAR = replace(PAPER_FILM, law="linear")
 STILL = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}

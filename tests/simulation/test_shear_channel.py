@@ -9,8 +9,8 @@ from helpers.machine import assert_same_to_rounding
 import memscal
 from memscal import GaussianMixture, simulate_experiment
 from memscal.errors import InputError
-from memscal.simulation.experiment import simulate_contacts
-from memscal.simulation.rod_scan import PAPER_FILM
+from memscal.extensions.simulation.experiment import simulate_contacts
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 KERNEL = GaussianMixture(sigmas=(400e-6,))
 QUIET = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}

@@ -9,9 +9,9 @@ from helpers.paper import FILM, ROD, SPHERE, film
 
 from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.errors import ConvergenceError
-from memscal.mechanics.finite_strain.film_elements import FilmElements, Rubber
-from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
-from memscal.mechanics.finite_strain.solve import solve_finite_strain
+from memscal.extensions.finite_strain.film_elements import FilmElements, Rubber
+from memscal.extensions.finite_strain.pressing import RodFace, SphereFace
+from memscal.extensions.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Depth, Load
 from memscal.progress import reporting
 

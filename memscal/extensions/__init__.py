@@ -1,0 +1,112 @@
+"""The table of what is loaded when it is asked for: commands, views, hooks, and public names.
+
+Names stand as text, so that reading the table loads no extension.  The core calls what stands above
+it by a hook, and never imports it; an extension is one folder here, and its lines in this table.
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+COMMANDS = {
+    "calibrate": ("cli.calibrate", "Find a sensor's apparatus function from a rod scan."),
+    "batch": (
+        "extensions.fleet.batch_command",
+        "Calibrate a folder of scans, or those of a manifest.",
+    ),
+    "summary": (
+        "extensions.fleet.summary_command",
+        "Summarise the results of a batch: distributions, outliers, map.",
+    ),
+    "reference": ("cli.reference", "Solve the stress at the base of a film under an indenter."),
+    "apply": ("cli.apply", "Turn contact scans into measured stress, load by load."),
+    "restore": ("cli.restore", "Restore the stress at the base of a film from a scan."),
+    "compare": ("cli.compare", "Compare measured with calculated stress: effective friction."),
+    "certificate": (
+        "extensions.certificate.command",
+        "Write a certificate of calibration (HTML, PDF, XML).",
+    ),
+    "design": (
+        "extensions.planning.command",
+        "Predict the uncertainties of a scan before it is made.",
+    ),
+    "simulate": (
+        "extensions.simulation.command",
+        "Make a synthetic scan, or the scans of an experiment.",
+    ),
+    "import": ("cli.import_", "Convert a table or a mesh to a scan or a reference."),
+    "inspect": ("cli.inspect", "Show what a file holds."),
+    "check": ("cli.check", "Check a file's safety, schema, digest and content."),
+    "explain": (
+        "cli.explain",
+        "Explain what a quality check tests, and what to do if it fails.",
+    ),
+    "completion": ("cli.completion", "Print the shell's completion script."),
+}
+"""Command: its module, and what it does."""
+
+VIEWS = {
+    "ApparatusFunction": ("summaries.calibration", "figures.calibration.calibration_figure"),
+    "Calibration": ("summaries.calibration", "figures.calibration.calibration_figure"),
+    "Contact": ("summaries.contact", "figures.stress.contact_figure"),
+    "FrictionComparison": ("summaries.comparison", "figures.friction.comparison_figure"),
+    "Holds": ("", "figures.holds.holds_figure"),
+    "MeasuredStress": ("summaries.stress", "figures.stress.measured_stress_figure"),
+    "Restoration": ("summaries.restoration", "figures.stress.restoration_figure"),
+    "ShearComparison": ("summaries.comparison", ""),
+    "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
+    "FleetCalibration": ("extensions.fleet.calibration_summary", ""),
+    "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),
+    "InterfaceComparison": (
+        "extensions.interface_laws.summary",
+        "figures.friction.interface_figure",
+    ),
+    "MonteCarlo": ("extensions.monte_carlo.summary", ""),
+    "Sweep": (
+        "extensions.monte_carlo.sweep_summary",
+        "extensions.monte_carlo.sweep_figure.sweep_figure",
+    ),
+}
+"""Class of a result: the module with its tables, and the function that draws it."""
+
+HOOKS = {
+    "html_report": "figures.report",
+    "text_of": "summaries.table",
+    "scan_of_arrays": "formats.tables.scan",
+    "write_artifact": "formats.artifact",
+    "write_stress": "formats.stress",
+    "compare_interface": "extensions.interface_laws.model_comparison",
+    "is_mesh": "extensions.meshes.mesh_files",
+    "monte_carlo": "extensions.monte_carlo.monte_carlo",
+    "press_at_finite_strain": "extensions.finite_strain.solve",
+    "read_laboratory": "extensions.certificate.laboratory",
+    "read_reference_mesh": "extensions.meshes.reference_mesh",
+    "sweep_noise": "extensions.monte_carlo.sweep",
+    "with_drawn_in": "extensions.meshes.mesh_files",
+    "write_mesh": "extensions.meshes.mesh_files",
+}
+"""Function by which a room calls what stands above it, or an extension: its module."""
+
+PUBLIC = {
+    "extensions.fleet.many": ["FleetCalibration", "calibrate_many"],
+    "extensions.monte_carlo.monte_carlo": ["BudgetComparison", "MonteCarlo", "monte_carlo"],
+    "extensions.monte_carlo.sweep": ["Sweep"],
+    "extensions.planning.design": ["Design", "Plan", "design"],
+    "extensions.simulation.experiment": ["Experiment", "simulate_experiment"],
+    "extensions.simulation.rod_scan": ["simulate"],
+}
+"""Module of an extension: its names that are public as ``memscal.NAME``."""
+
+USES = {"planning": ["simulation"]}
+"""Extension: the other ones that it imports."""
+
+
+def module(name: str) -> Any:
+    """Import a module that the table names."""
+    return import_module(f"memscal.{name}")
+
+
+def hook(name: str) -> Callable[..., Any]:
+    """Import a function that the table names."""
+    function: Callable[..., Any] = getattr(module(HOOKS[name]), name)
+    return function

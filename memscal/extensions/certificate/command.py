@@ -1,0 +1,76 @@
+"""``memscal certificate``: an artifact and a laboratory's file to a certificate of calibration."""
+
+from pathlib import Path
+
+import click
+
+from memscal.cli import output as out
+from memscal.cli.failures import exit_code_of
+from memscal.cli.options import FILE, option, output_options
+from memscal.summaries.table import Table
+
+EXAMPLES = """\b
+Examples:
+  memscal certificate scan.apparatus.h5 --lab lab.toml -o certificate.pdf
+  memscal certificate scan.apparatus.h5 --lab lab.toml -o certificate.html -o certificate.xml
+
+\b
+docs/certificate.md describes lab.toml; calibration_data has an example.
+A PDF needs the extra certificate: pip install "memscal[certificate]".
+"""
+
+_FORM = out.FigurePath((".html", ".pdf", ".xml"))
+
+
+@click.command("certificate", epilog=EXAMPLES)
+@click.argument("artifact", type=FILE)
+@option("--lab laboratory", FILE, required=True, metavar="lab.toml")(
+    "Laboratory's file: laboratory, customer, sensor, equipment, conditions, decision rule."
+)
+@option("-o --output outputs", _FORM, multiple=True, required=True, metavar="FILE.html|pdf|xml")(
+    "Certificate to write: a page, a tagged PDF/A-3 that holds the XML, or a Digital Calibration "
+    "Certificate (DCC). May be repeated."
+)
+@output_options
+def command(
+    artifact: Path, laboratory: Path, outputs: tuple[Path, ...], as_json: bool, force: bool
+) -> int:
+    """Write a certificate of calibration, if nothing that is mandatory is missing.
+
+    Values with expanded uncertainties (k = 2), correlations, G(r) and budget; and, if the
+    laboratory's file gives tolerances, a statement of conformity by its decision rule. It is no
+    accredited certificate unless that file states an accreditation.
+    """
+    out.prove_writable(outputs, force=force, inputs=[artifact, laboratory])
+    from memscal.apparatus import load_apparatus
+    from memscal.extensions.certificate.certificate import certify
+    from memscal.extensions.certificate.dcc import certificate_xml
+    from memscal.extensions.certificate.laboratory import read_laboratory
+
+    certificate = certify(load_apparatus(artifact), read_laboratory(laboratory))
+    forms = {path.suffix.lower() for path in outputs}
+    made = {".xml": certificate_xml(certificate)} if forms - {".html"} else {}
+    if forms - {".xml"}:
+        from memscal.extensions.certificate.page import certificate_page, certificate_pdf
+
+        with out.working("Drawing"):
+            page = certificate_page(certificate)
+            made[".html"] = page.encode("utf-8")
+            if ".pdf" in forms:
+                made[".pdf"] = certificate_pdf(certificate, page, made[".xml"])
+    out.write_files({path: made[path.suffix.lower()] for path in outputs}, force=force)
+    result = {"number": certificate.number, "issued": certificate.issued}
+    if as_json:
+        decided = [
+            {"name": of.of.quantity.name, "conforms": of.accepted, "probability": of.probability}
+            for of in certificate.conformity
+        ]
+        written = {"schema_version": "1", "outputs": [str(path) for path in outputs]}
+        out.emit_json({**written, **result, "conformity": decided})
+    else:
+        words = [(of.of.quantity.words, of.statement) for of in certificate.conformity]
+        out.emit_tables(Table("Certificate", ("", ""), [*result.items(), *words]))
+    if certificate.synthetic:
+        out.note("The data are synthetic: the certificate says so on every page.")
+    out.message(f"Written: {', '.join(map(str, outputs))}")
+    return exit_code_of(certificate.apparatus.checks, then=" The certificate says so.")

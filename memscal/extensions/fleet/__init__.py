@@ -1,0 +1,1 @@
+"""Fleets: many scans calibrated in shards, their tables, summary and figure."""

@@ -1,0 +1,158 @@
+"""``memscal batch``: many scans, each by itself, in shards, to Parquet tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack
+from operator import attrgetter
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from memscal.cli import output as out
+from memscal.cli.calibrate import calibration_options, calibration_settings
+from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.options import FILE, json_option, option, report_option
+from memscal.errors import MemscalError
+from memscal.formats.files import together
+from memscal.summaries.table import Table
+
+if TYPE_CHECKING:
+    from memscal.extensions.fleet.batch import Batch, ShardOutcome
+
+EXAMPLES = """\b
+Examples:
+  memscal batch scans -o results --report scans.html
+  memscal batch wafer.csv -o results --resume --method bayesian --artifacts none
+  memscal batch wafer.csv -o results --resume --scheduler tcp://node1:8786
+  memscal summary results
+"""
+
+
+@click.command("batch", epilog=EXAMPLES)
+@click.argument("source", type=FILE, metavar="FOLDER|MANIFEST")
+@option("-o --output results", FILE, metavar="RESULTS", required=True)(
+    "Folder of the results, which must not exist yet: tables (Parquet) in RESULTS/shards, "
+    "artifacts in RESULTS/artifacts."
+)
+@option("--resume", is_flag=True)(
+    "Continue in RESULTS: shards stay if their file is whole and is of the same scans, options and "
+    "version; the others are calibrated."
+)
+@option("--workers", click.IntRange(1, 512), metavar="N")(
+    "Processes on this machine.  [default: one for each core]"
+)
+@option("--scheduler", metavar="ADDRESS")(
+    "Scheduler of a Dask cluster, such as tcp://node1:8786, whose workers see the same files."
+)
+@option("--shard-size", click.IntRange(min=2), metavar="SCANS")(
+    "Scans of a shard: a task, and a table. What is under way when a batch is killed is lost.  "
+    "[default: a 64th of the scans, 4 to 256; with --resume as before]"
+)
+@option("--artifacts", click.Choice(("failed", "all", "none")), "failed")(
+    "Of which calibrations artifacts are written, too: of those with a failed check, all, or none."
+)
+@calibration_options
+@report_option
+@option("--force", is_flag=True)("Replace the page of --report; results are never replaced.")
+@json_option
+@debug_option
+def command(
+    source: Path,
+    results: Path,
+    resume: bool,
+    workers: int | None,
+    scheduler: str | None,
+    shard_size: int | None,
+    artifacts: str,
+    report: Path | None,
+    force: bool,
+    as_json: bool,
+    **settings: Any,
+) -> int:
+    """Calibrate with every scan in a folder, or with those that a manifest lists.
+
+    A manifest is a text file with the path of a scan a line, relative to its own folder, or a CSV
+    file with a column path and optional wafer_x, wafer_y (mm), the sensor's place on its wafer.
+
+    Each scan is a row of a table: A, widths, uncertainties, checks, G(r), digests, by the method
+    alone that is asked for; a scan that cannot be calibrated has its error there, and the exit
+    code is 1. What is done stays when the program is interrupted or killed: --resume does the
+    rest.
+    """
+    if workers and scheduler:
+        raise click.UsageError("--workers and --scheduler exclude each other: give one of them.")
+    from memscal.extensions.fleet.batch import Batch
+    from memscal.extensions.fleet.shards import manifest_scans, read_fleet, shard_paths
+    from memscal.progress import span
+
+    chosen = calibration_settings(**settings)
+    source, results = (Path(os.path.realpath(path)) for path in (source, results))
+    batch = Batch(source, results, chosen, artifacts, shard_size)
+    if report is not None and results not in Path(os.path.realpath(report)).parents:
+        scans = manifest_scans(source) if report.exists() else ()
+        inputs = [source, *(batch.folder / scan.path for scan in scans)]
+        out.prove_writable([report], force=force, inputs=inputs)
+    batch = batch.prepare(resume=resume)
+    start = monotonic()
+    out.prove_writable([report], force=force)  # in the folder of results, too, which is there now
+    total = batch.count
+    try:
+        outcomes = list(_outcomes(batch, workers, scheduler))
+    except (KeyboardInterrupt, MemscalError):
+        if shard_paths(results):
+            out.note("The shards that are done stay: --resume does the rest.")
+        raise
+    errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
+    kept = sum(outcome.kept for outcome in outcomes)
+    seconds = round(monotonic() - start, 1)
+    counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
+    counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
+    page = dict[Path, bytes]()
+    problem = None
+    try:
+        page = {} if report is None else out.reported(read_fleet(results), report)
+    except MemscalError as failure:  # is told after what the batch has done
+        problem = failure
+    with together():
+        out.write_files(page, force=force)
+        if as_json:
+            stated = {"schema_version": "1", "results": str(results), **counts}
+            out.emit_json(stated | {"time": {"value": seconds, "unit": "s"}})
+        else:
+            rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
+            rows.append(("time", span(seconds)))
+            out.emit_tables(Table(f"Batch of {source.name}", ("", ""), rows))
+    for path in (results, *page):
+        out.message(f"Written: {path}")
+    if problem:
+        raise problem
+    if not errors + failed:
+        return DONE
+    what = f"{errors} of {total} scans were not calibrated, {failed} failed a quality check"
+    out.warn(f"{what}: memscal summary {results}")
+    return CHECK_FAILED
+
+
+def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:
+    """Yield the outcomes of a batch, and show how far it is."""
+    from memscal.parallel import cluster, cores, worker_pool
+    from memscal.progress import counted
+
+    with ExitStack() as stack:
+        if scheduler:
+            executor, most = stack.enter_context(cluster(scheduler))
+        else:
+            count = workers or cores()
+            executor = stack.enter_context(worker_pool(count))
+
+            def most() -> int:
+                return 2 * count
+
+        stack.enter_context(out.working("Calibrating", rate=True))
+        size = attrgetter("scans")
+        kept = attrgetter("kept")
+        yield from counted(batch.run(executor, most), "scans", batch.count, size, kept)

@@ -1,0 +1,168 @@
+"""Calibration of many scans, in processes: a result or an error for each."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from inspect import signature
+from os import PathLike
+from typing import Any, TypeVar
+
+from memscal.calibration.calibrate import calibrate
+from memscal.deconvolution.division import chosen_method
+from memscal.errors import InputError, MemscalError
+from memscal.formats.opened import Scans
+from memscal.model.apparatus import ApparatusRadial, ParameterSet
+from memscal.model.checks import Message, QualityCheck
+from memscal.model.result import Result
+from memscal.model.scan import Scan
+from memscal.parallel import cores, shared
+from memscal.progress import Listener, counted, reported
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class FleetCalibration(Result):
+    """The calibration of one scan of many, without its fields, or its error.
+
+    ``pandas.concat(result.to_dataframe() for result in results)`` is the table of all scans; of
+    some hundred thousand files ``memscal batch`` writes one.
+
+    Parameters
+    ----------
+    index : int
+        Its place among the scans.
+    parameters : ParameterSet or None
+        A and all other parameters with their covariance, in SI units.
+    radial_profile : ApparatusRadial or None
+        G with its standard uncertainty.
+    resolved_wavenumber : float or None
+        Up to which wavenumber the scan determines G, in rad/m.
+    budget : mapping
+        Standard uncertainties by source.
+    checks : tuple of QualityCheck
+        Quality checks.
+    messages : tuple of Message
+        Notes and warnings.
+    error : MemscalError or None
+        Why there is no result.
+    """
+
+    index: int
+    parameters: ParameterSet | None = None
+    radial_profile: ApparatusRadial | None = None
+    resolved_wavenumber: float | None = None
+    budget: Mapping[str, Mapping[str, float]]
+    checks: tuple[QualityCheck, ...] = ()
+    messages: tuple[Message, ...] = ()
+    error: MemscalError | None = None
+
+    def __repr__(self) -> str:
+        """Return A, or the error."""
+        if self.parameters is None:
+            problem = self.error.problem if self.error is not None else "no result"
+            return f"<FleetCalibration {self.index}: {problem}>"
+        a = self.parameters.reading.constant(self.parameters["conversion_constant"])
+        return f"<FleetCalibration {self.index}: A = {a}>"
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is a result, and every quality check passed."""
+        return self.error is None and all(check.passed for check in self.checks)
+
+
+@reported
+def calibrate_many(
+    scans: Iterable[Scans],
+    executor: Executor | None = None,
+    *,
+    progress: Listener = None,  # noqa: ARG001 - @reported
+    **options: Any,
+) -> Iterator[FleetCalibration]:
+    """Calibrate with many scans, each by itself.
+
+    Scans are taken as workers become free, a few at a time, so that their number does not count
+    in memory.  A script needs no ``if __name__ == "__main__":``.
+
+    Parameters
+    ----------
+    scans : iterable of Scan, path, or sequence of them
+        Scans or their files, which a generator may yield; a sequence within counts as one, and is
+        fitted together.
+    executor : concurrent.futures.Executor, optional
+        What calibrates: a pool of processes or threads, or that of a cluster, such as
+        ``dask.distributed.Client(...).get_executor()``.  By default a process for each core.
+    progress : callable or True, optional
+        Told how many scans are done, where their number is known: :class:`memscal.Progress`.
+    **options
+        Options of :func:`memscal.calibrate`, the same for all.
+
+    Returns
+    -------
+    iterator of FleetCalibration
+        One for each scan, in their order.  A scan that cannot be used has its error in place.
+
+    Raises
+    ------
+    InputError
+        If the method, one of its options, or the executor is wrong.
+    MemscalError
+        From the iterator, if a worker process is killed.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> scans = [memscal.simulate(noise=0.005, seed=seed) for seed in range(3)]
+    >>> results = memscal.calibrate_many([*scans, "missing.h5"], method="bayesian")
+    >>> [result.passed for result in results]
+    [True, True, True, False]
+    """
+    if isinstance(scans, Scan | str | PathLike):
+        cure = "Give a list of scans; calibrate one with memscal.calibrate(scan)."
+        raise InputError("calibrate_many() was given one scan.", cure=cure)
+    if not (executor is None or callable(getattr(executor, "submit", None))):
+        problem = f"The executor is a {type(executor).__name__}, which takes no tasks."
+        raise InputError(problem, cure="Give a concurrent.futures.Executor, or leave it out.")
+    method = options.get("method", "white-noise")
+    seed = options.get("seed", 0)
+    of_calibrate = signature(calibrate).parameters
+    of_method = {name: value for name, value in options.items() if name not in of_calibrate}
+    chosen_method(method, of_method, seed=seed)
+    task = partial(_calibrated, options=options)
+    items = enumerate(scans)
+    sized = list(items) if isinstance(scans, Sized) else items
+    results = shared(task, sized, workers=cores(), executor=executor)
+    return counted(results, "scans", len(sized)) if isinstance(sized, list) else results
+
+
+def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:
+    """Return a result, or the error of the scan of that name, which is a result too."""
+    try:
+        return work()
+    except MemscalError as failure:
+        return failure
+    except Exception as failure:  # noqa: BLE001 - the rest must go on
+        return MemscalError(
+            f"{name} met {type(failure).__name__}: {failure}",
+            why="This should have been refused with a reason.",
+            cure="Please report it, with the scan.",
+        )
+
+
+def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:
+    """Calibrate one scan; an error is part of its result."""
+    index, scan = item
+    options = {**options, "other": False}
+    apparatus = attempted(f"Scan {index}", lambda: calibrate(scan, **options).apparatus)
+    if isinstance(apparatus, MemscalError):
+        return FleetCalibration(index=index, budget={}, error=apparatus)
+    return FleetCalibration(
+        index=index,
+        parameters=apparatus.parameters,
+        radial_profile=apparatus.radial_profile,
+        resolved_wavenumber=apparatus.resolved_wavenumber,
+        budget=apparatus.budget,
+        checks=apparatus.checks,
+        messages=apparatus.process.messages,
+    )

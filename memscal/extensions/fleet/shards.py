@@ -1,0 +1,355 @@
+"""Files of a fleet: the manifest of its scans, and the Parquet tables of its results."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError, MemscalError
+from memscal.extensions.fleet.results import FleetResults
+from memscal.formats.files import atomic_write_bytes, read_bytes
+from memscal.model.apparatus import ApparatusData
+from memscal.model.checks import OVERRIDE, Message
+from memscal.model.notation import VOLTS, Reading
+from memscal.model.quantities import ESTIMATED, parameter_quantity
+from memscal.version import __version__
+
+FLEET_SCHEMA = "memscal-fleet"
+FLEET_SCHEMA_VERSION = "1.1.0"
+DIGEST = "memscal_shard_sha256"
+#: What states the batch, and the bytes that it may have; scans that a message names.
+_BATCH = "batch.json"
+_MOST_STATED = 10_000
+_NAMED = 5
+_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
+#: What memscal writes beside scans.
+_RESULTS = (".apparatus", ".stress")
+
+
+@dataclass(frozen=True)
+class FleetScan:
+    """A scan of a manifest: its path as listed, and the sensor's place on its wafer, in mm."""
+
+    path: str
+    wafer_x: float | None = None
+    wafer_y: float | None = None
+
+
+def manifest_scans(source: Path) -> Iterator[FleetScan]:
+    """Yield the scans of a folder, by their names, or those that a manifest lists, in its order."""
+    if source.is_dir():
+        yield from _folder_scans(source)
+        return
+    if not source.is_file():
+        cure = "Give a folder of scans, or a text file that lists one scan a line."
+        raise InputError(f"{source} is neither a folder nor a regular file.", cure=cure)
+    try:
+        with source.open(encoding="utf-8-sig", newline="") as lines:
+            yield from _listed_scans(source.name, lines)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(f"{source} is not a table of text: {error}.") from error
+    except OSError as error:
+        cure = "Give a manifest that you may read."
+        raise InputError(f"{source} cannot be read: {error.strerror}.", cure=cure) from error
+
+
+def _folder_scans(folder: Path) -> Iterator[FleetScan]:
+    for place, folders, files in os.walk(folder):
+        folders.sort()
+        for path in (Path(place, name) for name in sorted(files)):
+            if path.suffix.lower() in _SUFFIXES and not path.stem.endswith(_RESULTS):
+                yield FleetScan(path.relative_to(folder).as_posix())
+
+
+def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
+    """Read a table with a column ``path``, or without a head a path a line, commas included."""
+    head: list[str] = []
+    for number, line in enumerate(lines, start=1):
+        if not (text := line.strip()) or text.startswith("#"):
+            continue
+        cells = [cell.strip() for cell in next(csv.reader([text]))]
+        if not head:
+            head = [cell.lower().removesuffix("(mm)").rstrip() for cell in cells]
+            if "path" in head:
+                _require_places(name, head)
+                continue
+            head = ["path"]
+        row = dict(zip(head, cells if len(head) > 1 else [text], strict=False))
+        try:
+            place = [float(row[key]) if row.get(key) else None for key in ("wafer_x", "wafer_y")]
+        except ValueError as error:
+            cure = "Give the place on the wafer in mm, or leave it empty."
+            raise FormatError(f"{name}, line {number}: {error}.", cure=cure) from error
+        if not row.get("path"):
+            raise FormatError(f"{name}, line {number} has no path.", cure="Add it.")
+        yield FleetScan(row["path"], *place)
+
+
+def _require_places(name: str, head: Sequence[str]) -> None:
+    for place in ("wafer_x", "wafer_y"):
+        other = next((cell for cell in head if cell.startswith(place) and cell != place), None)
+        if other is not None:
+            cure = f"Give places on the wafer in mm, in a column {place}."
+            raise FormatError(f"{name} has a column {other!r}, which is not read.", cure=cure)
+
+
+#: Those that a calibration may estimate, with columns of their own.
+_PARAMETERS = tuple(n for n in ESTIMATED if n not in ("baseline_slope", "force", "maximum"))
+_TEXTS = (
+    "path",
+    "sensor",
+    "model",
+    "serial_number",
+    "channel",
+    "start_time",
+    "calibrated_at",
+    "method",
+    "artifact",
+    "error_class",
+    "error",
+    "input_sha256",
+    "options_sha256",
+    "version",
+    "unit",
+)
+_CHECK = ("value", "limit", "p_value")
+_UNCERTAINTY = ("quantity", "source")
+
+
+def arrow() -> Any:
+    """Return the module pyarrow, or say how to get it."""
+    try:
+        import pyarrow.parquet
+    except ModuleNotFoundError as error:
+        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
+        raise MemscalError("pyarrow, which writes Parquet, is not installed.", cure=cure) from error
+    return pyarrow
+
+
+def _schema(readings: Iterable[Reading]) -> Any:
+    """Return names, types and units of the columns, for sensors with readings in some units."""
+    pa = arrow()
+    single = pa.float32()
+    text = pa.string()
+    double = pa.float64()
+    check = {"name": text, "passed": pa.bool_(), **dict.fromkeys(_CHECK, single)}
+    source = {**dict.fromkeys(_UNCERTAINTY, text), "errors": single}
+    columns = {"place": pa.int64(), **dict.fromkeys(_TEXTS, text), "passed": pa.bool_()}
+    columns |= dict.fromkeys(("wafer_x", "wafer_y", "resolved_wavenumber"), double)
+    columns |= {name: pa.list_(single) for name in ("r", "g", "g_errors", "correlation")}
+    columns |= {"correlated": pa.list_(text), "checks": pa.list_(pa.struct(check))}
+    columns |= {"messages": pa.list_(pa.struct(dict.fromkeys(("kind", "text"), text)))}
+    columns |= {"budget": pa.list_(pa.struct(source))}
+    units = {"wafer_x": "mm", "wafer_y": "mm", "r": "mm", "resolved_wavenumber": "rad/mm"}
+    units |= {"g": "1/mm^2", "g_errors": "1/mm^2", "correlation": "1"}
+    for name in _PARAMETERS:
+        stated = " or ".join(sorted({ESTIMATED[name].read_in(r).unit_text for r in readings}))
+        columns |= {name: double, f"{name}_errors": double}
+        units |= {name: stated, f"{name}_errors": stated}
+    about = {name: {"units": unit} for name, unit in units.items()}
+    return pa.schema([pa.field(n, kind, metadata=about.get(n)) for n, kind in columns.items()])
+
+
+def fleet_row(data: ApparatusData) -> dict[str, Any]:
+    """Return an apparatus function as a row, in the units of files."""
+    parameters = data.parameters
+    radial = data.radial_profile
+    scales = {name: parameter_quantity(parameters, name).scale for name in parameters.names}
+    names = [name for name in _PARAMETERS if name in scales]
+    row: dict[str, Any] = {"passed": data.passed, "calibrated_at": data.process.date}
+    row |= {"method": data.process.configuration["method"], "reading": data.reading}
+    row["unit"] = parameter_quantity(parameters, "conversion_constant").unit_text
+    row["messages"] = [{"kind": m.kind, "text": m.text} for m in data.process.messages]
+    row |= {name: parameters[name] / scales[name] for name in names}
+    row |= {f"{name}_errors": parameters.uncertainty(name) / scales[name] for name in names}
+    covariance = parameters.only(names).covariance
+    above = np.triu_indices(len(names), 1)
+    u = np.sqrt(np.diag(covariance))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        row |= {"correlated": names, "correlation": (covariance / np.outer(u, u))[above]}
+    row["budget"] = [
+        {"quantity": name, "source": source, "errors": u / scales[name]}
+        for name, sources in data.budget.items()
+        for source, u in sources.items()
+        if u > 0
+    ]
+    of_check = ("name", "passed", *_CHECK)
+    row["checks"] = [{key: getattr(check, key) for key in of_check} for check in data.checks]
+    row["resolved_wavenumber"] = data.resolved_wavenumber * 1e-3
+    return row | {"r": radial.r * 1e3, "g": radial.g * 1e-6, "g_errors": radial.g_errors * 1e-6}
+
+
+def write_shard(path: Path, rows: Sequence[Mapping[str, Any]], digest: str) -> None:
+    """Write a table whole or not at all; its metadata state the digest of what it is made from."""
+    pa = arrow()
+    about = {"memscal_schema": FLEET_SCHEMA, "memscal_schema_version": FLEET_SCHEMA_VERSION}
+    about |= {"memscal_version": __version__, DIGEST: digest}
+    readings = {row["reading"] for row in rows if "reading" in row} or {VOLTS}
+    table = pa.Table.from_pylist(list(rows), _schema(readings).with_metadata(about))
+    packing = {"compression": "zstd", "use_dictionary": False, "write_page_checksum": True}
+    sink = pa.BufferOutputStream()
+    pa.parquet.write_table(table, sink, **packing)
+    atomic_write_bytes(path, memoryview(sink.getvalue()), overwrite=True)
+
+
+def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
+    """Read columns of a table, by default all; refuse a file that is damaged or another's."""
+    pa = arrow()
+    try:
+        buffer = pa.BufferReader(read_bytes(path))
+        file = pa.parquet.ParquetFile(buffer, page_checksum_verification=True)
+        stated = file.schema_arrow.metadata or {}
+        if stated.get(b"memscal_schema") != FLEET_SCHEMA.encode():
+            raise FormatError(f"{path} is a Parquet file, but none of memscal batch.")
+        if missing := set(columns or ()) - set(file.schema_arrow.names):
+            cure = "Run memscal batch --resume with this one."
+            problem = f"{path} was written by an earlier memscal."
+            raise FormatError(problem, why=f"It lacks {', '.join(sorted(missing))}.", cure=cure)
+        return file.read(columns)
+    except (pa.ArrowException, OSError) as error:
+        reason = " ".join(str(error).split())[:200]
+        cure = "Remove it, and run memscal batch --resume."
+        raise FormatError(f"{path} is damaged: {reason}", cure=cure) from error
+
+
+def shard_paths(results: Path) -> list[Path]:
+    """Return the tables in a folder of results, in their order."""
+    return sorted((results / "shards").glob("shard-*.parquet"))
+
+
+def write_batch(results: Path, stated: Mapping[str, Any]) -> None:
+    """State what a batch is, for those that continue or summarise it."""
+    text = json.dumps({"schema": FLEET_SCHEMA, "version": FLEET_SCHEMA_VERSION, **stated}, indent=2)
+    atomic_write_bytes(results / _BATCH, f"{text}\n".encode(), overwrite=True)
+
+
+def read_batch(results: Path) -> dict[str, Any]:
+    """Return what the batch of some results states of itself; nothing where that is not known."""
+    with suppress(MemscalError, ValueError, RecursionError):
+        stated = json.loads(read_bytes(results / _BATCH, limit=_MOST_STATED))
+        if isinstance(stated, dict) and all(
+            isinstance(stated.get(key), int) and 0 < stated[key] < 2**31
+            for key in ("scans", "shard_size")
+        ):
+            return stated
+    return {}
+
+
+_NUMBERS = (
+    "conversion_constant",
+    "conversion_constant_errors",
+    "gaussian_sigma",
+    "gaussian_sigma_errors",
+    "wafer_x",
+    "wafer_y",
+)
+_OF_SUMMARY = (
+    *_NUMBERS,
+    "path",
+    "passed",
+    "error_class",
+    "error",
+    "checks",
+    "unit",
+    "messages",
+    "input_sha256",
+    "options_sha256",
+    "version",
+)
+
+
+@dataclass
+class _Told:
+    """What the rows of a batch say beside their numbers; scans by their numbers."""
+
+    paths: list[str] = field(default_factory=list)
+    failed: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    errors: dict[int, tuple[str, str]] = field(default_factory=dict)
+    units: dict[str, int] = field(default_factory=dict)  # the first scan in each
+    done_with: dict[tuple[str, ...], int] = field(default_factory=dict)  # and with each setting
+    overridden: dict[int, str] = field(default_factory=dict)
+    contents: set[int] = field(default_factory=set)
+    repeated: list[int] = field(default_factory=list)
+
+    def add(self, table: Any) -> None:
+        """Add the rows of a shard."""
+        start = len(self.paths)
+        self.paths += table["path"].to_pylist()
+        for place in np.flatnonzero(~table["passed"].to_numpy().astype(bool)):
+            row = table.slice(place, 1).to_pylist()[0]
+            checks = row["checks"] or ()
+            number = start + int(place)
+            self.failed[number] = tuple(c["name"] for c in checks if not c["passed"])
+            if row["error"]:
+                self.errors[number] = row["error_class"], row["error"]
+        settings = zip(*(table[n].to_pylist() for n in ("options_sha256", "version")), strict=True)
+        for i, setting in enumerate(settings, start):
+            self.done_with.setdefault(setting, i)
+        for i, unit in enumerate(table["unit"].to_pylist(), start):
+            if unit:
+                self.units.setdefault(unit, i)
+        for i, messages in enumerate(table["messages"].to_pylist(), start):
+            for message in messages or ():
+                if message["kind"] == OVERRIDE:
+                    self.overridden.setdefault(i, message["text"])
+        for i, digest in enumerate(table["input_sha256"].to_pylist(), start):
+            if digest and (short := int(digest[:15], 16)) in self.contents:
+                self.repeated.append(i)
+            elif digest:
+                self.contents.add(short)
+
+    def messages(self, scans: int) -> Iterator[Message]:
+        """Yield what is missing of so many scans, mixed, repeated or overridden."""
+        if len(self.paths) < scans:
+            text = f"The batch is not finished: {len(self.paths)} of {scans} scans are done."
+            yield Message("unfinished", f"{text} memscal batch --resume does the rest.", "warning")
+        if (kinds := len(self.done_with)) > 1:
+            first = ", ".join(self.paths[i] for i in self.done_with.values())
+            text = f"The scans were calibrated with {kinds} different options or versions"
+            yield Message("mixed", f"{text}; the first of each: {first}.", "warning")
+        if self.repeated:
+            named = ", ".join(self.paths[i] for i in self.repeated[:_NAMED])
+            more = len(self.repeated) - _NAMED
+            tail = f" and {more} more" if more > 0 else ""
+            text = f"{len(self.repeated)} scans have the content of another one and count again"
+            yield Message("repeated", f"{text}: {named}{tail}.", "warning")
+        if self.overridden:
+            i, text = next(iter(self.overridden.items()))
+            text = f"{len(self.overridden)} scans, the first {self.paths[i]}: {text}"
+            yield Message(OVERRIDE, text, "warning")
+
+
+def read_fleet(results: Path) -> FleetResults:
+    """Read what a summary needs of the tables of a batch, one after the other."""
+    if not (shards := shard_paths(results)):
+        cure = "Give the folder that memscal batch -o wrote."
+        raise InputError(f"{results} holds no results of a batch.", cure=cure)
+    told = _Told()
+    numbers = []
+    for shard in shards:
+        table = read_shard(shard, _OF_SUMMARY)
+        numbers.append([table[name].to_numpy().astype(np.float64) for name in _NUMBERS])
+        told.add(table)
+    if len(told.units) > 1:
+        kinds = ", ".join(f"{unit} (as {told.paths[i]})" for unit, i in told.units.items())
+        cure = "Run a batch for each unit of readings."
+        why = f"The conversion constants are in {kinds}."
+        raise FormatError(f"{results} holds sensors of several kinds.", why=why, cure=cure)
+    columns = dict(zip(_NUMBERS, np.concatenate(numbers, axis=1), strict=True))
+    return FleetResults(
+        paths=told.paths,
+        failed=told.failed,
+        errors=told.errors,
+        unit=next(iter(told.units), ""),
+        name=os.path.basename(os.path.realpath(results)),
+        messages=tuple(told.messages(read_batch(results).get("scans", 0))),
+        **columns,
+    )

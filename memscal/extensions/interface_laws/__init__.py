@@ -1,0 +1,1 @@
+"""Laws of the interface compared by how well each explains the measured stress."""

@@ -1,0 +1,383 @@
+"""Import of a stress profile from the mesh of any FEM program."""
+
+import os
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from memscal.errors import InputError
+from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
+from memscal.formats.tables import reference
+from memscal.formats.units import to_si
+from memscal.model.arrays import FloatArray
+from memscal.model.checks import Message, import_notes
+from memscal.model.notation import printable
+
+AXES = "xyz"
+# Of the largest coordinate: meshes are often stored in single precision.
+_TOLERANCE = 1e-6
+_FEWEST = 4
+_CIRCLES = 501
+_DIRECTIONS = 72
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """How a mesh lies in space: ``points`` (n, 3) and ``tolerance`` in m, and its axes."""
+
+    points: FloatArray
+    radial: tuple[int, ...]
+    vertical: int
+    tolerance: float
+    notes: tuple[Message, ...]
+
+    @property
+    def height(self) -> FloatArray:
+        """Coordinate across the film, in m."""
+        return np.asarray(self.points[:, self.vertical])
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """Nodes on the base, cells with a side there and that side's middle; 1 or -1 is outward."""
+
+    nodes: NDArray[np.int64]
+    cells: tuple[tuple[Cells, NDArray[np.int64], FloatArray], ...]
+    outward: int
+    note: str
+
+
+def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
+    """Find which coordinates are radial and which is vertical; ``points`` (n, 3) are in m."""
+    name = mesh.source.file_name
+    inside = points[mesh.used]
+    tolerance = _TOLERANCE * float(np.abs(inside).max())
+    varying = [i for i in range(3) if np.ptp(inside[:, i]) > tolerance]
+    if len(varying) < 2:
+        cure = "Give a section of the film from the axis outward, or the film in 3-D."
+        raise InputError(f"{name} holds a mesh that is a line or a point.", cure=cure)
+    up = varying[-1] if vertical is None else [*AXES, vertical].index(vertical)
+    if up not in varying:
+        raise InputError(
+            f"The vertical axis is {vertical!r}, but the mesh in {name} extends along "
+            f"{' and '.join(AXES[i] for i in varying)}.",
+            cure="Name the axis that points across the film, from base to surface.",
+        )
+    radial = tuple(i for i in varying if i != up)
+    across = f"{AXES[up]} across the film"
+    if len(radial) > 1:
+        text = f"The mesh is a body in 3-D: {across} was taken, and its base in the other two."
+    else:
+        text = f"The mesh is a section: {AXES[radial[0]]} as the radius and {across} were taken."
+    notes = import_notes([text])
+    wide, high = (float(np.ptp(inside[:, i])) * 1e3 for i in (radial[0], up))
+    if high > wide:
+        text = (
+            f"the mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
+            f"{AXES[radial[0]]}. A film is wider than thick: if the axis across it is "
+            f"{AXES[radial[0]]}, say so (vertical; --vertical)."
+        )
+        notes.append(Message("vertical_axis", text, "warning"))
+    return Frame(points, radial, up, tolerance, tuple(notes))
+
+
+def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
+    """Find what lies on the base, at a level of the vertical axis in m: by default the lowest."""
+    heights = frame.height[mesh.used]
+    lowest = float(heights.min())
+    highest = float(heights.max())
+    position = lowest if level is None else level
+    # Only where nothing lies above it is the base the upper face of the film.
+    outward = 1 if position >= highest - frame.tolerance else -1
+    on_base = np.abs(frame.height - position) <= frame.tolerance
+    sides = []
+    nodes = []
+    for block in mesh.solid:
+        touching = on_base[block.nodes]
+        middle = frame.height[block.nodes].mean(axis=1)
+        # An indenter or a substrate may be in the mesh too, on the other side of the base.
+        film = touching.any(axis=1) & (outward * (middle - position) < 0)
+        nodes.append(block.nodes[film][touching[film]])
+        of_side = np.flatnonzero(film & (touching.sum(axis=1) > len(frame.radial)))
+        weight = touching[of_side][..., None]
+        corners = frame.points[block.nodes[of_side]]
+        sides.append((block, of_side, (weight * corners).sum(axis=1) / weight.sum(axis=1)))
+    base_nodes = np.unique(np.concatenate(nodes))
+    level_text = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
+    if base_nodes.size < _FEWEST:
+        nearest = float(heights[np.argmin(np.abs(heights - position))])
+        raise InputError(
+            f"Only {base_nodes.size} nodes of the film in {mesh.source.file_name} lie on its base, "
+            f"at {level_text}.",
+            why=f"The mesh reaches from {AXES[frame.vertical]} = {lowest * 1e3:.6g} mm to "
+            f"{highest * 1e3:.6g} mm, and its nearest node is at {nearest * 1e3:.6g} mm.",
+            cure="Name the axis across the film (vertical; --vertical) or the position of the "
+            "flat base on it (base; --base).",
+        )
+    which = ", its lowest level" if level is None else ""
+    note = f"The base was taken at {level_text}{which}: {base_nodes.size} nodes."
+    return Base(base_nodes, tuple(sides), outward, note)
+
+
+def average_over_circles(
+    places: FloatArray, columns: dict[str, FloatArray]
+) -> tuple[dict[str, FloatArray], str]:
+    """Interpolate between places (n, 2), in m from the axis, and average over circles."""
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import QhullError
+
+    reach = float(np.hypot(*places.T).max()) or 1.0
+    r = np.linspace(0.0, reach, _CIRCLES)
+    # On the axis and along an edge of the mesh, rounding decides what is inside.
+    directions = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    circles = np.maximum(r, 1e-6 * reach)[:, None]
+    points = np.stack([circles * np.cos(directions), circles * np.sin(directions)], axis=-1)
+    distinct, index = np.unique(np.round(places / reach, 7), axis=0, return_inverse=True)
+    number = np.bincount(index.ravel())
+    try:
+        nodes = {name: np.bincount(index.ravel(), v) / number for name, v in columns.items()}
+        fields = {n: LinearNDInterpolator(distinct * reach, v)(points) for n, v in nodes.items()}
+    except QhullError as error:
+        cure = "Name the axis across the film (vertical; --vertical)."
+        raise InputError("The nodes on the base of the film lie on one line.", cure=cure) from error
+    # Circles of which less than half as much is inside as of others are left out: the corners.
+    share = np.isfinite(next(iter(fields.values()))).sum(axis=1)
+    kept = share >= max(1, share.max() / 2)
+    means = {name: np.nansum(values[kept], axis=1) / share[kept] for name, values in fields.items()}
+    first = next(iter(columns))
+    spread = np.nanmax(np.abs(fields[first][kept] - means[first][:, None]))
+    peak = float(np.abs(means[first]).max())
+    note = (
+        f"Means over {kept.sum()} circles about the axis, interpolated linearly between "
+        f"{distinct.shape[0]} places in the base; on a circle the normal stress differs from its "
+        f"mean by up to {spread / peak if peak else 0:.2g} of the maximum."
+    )
+    return {"r": r[kept], **means}, note
+
+
+# VTK's order of a symmetric tensor, and that of axisymmetric elements in FEM programs.
+_SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")
+_SCALAR = 1
+_AXISYMMETRIC = 4
+_SIX = 6
+_NINE = 9
+_MOST_LISTED = 30
+
+
+@dataclass(frozen=True)
+class Component:
+    """One component of a field: of its values at the points, or in the cells."""
+
+    field: str
+    at_points: bool
+    column: int
+    meaning: str
+    tensor: bool = False
+
+
+def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
+    """Return the stress along an axis on the base; ``name:number`` takes a component, from 1."""
+    at_points = {name: values.shape[1] for name, values in mesh.point_data.items()}
+    in_cells = {
+        name: values.shape[1] for block in mesh.solid for name, values in block.data.items()
+    }
+    counts = in_cells | at_points
+    name, _, number = field.rpartition(":")
+    if field not in counts and name in counts and number.isdecimal():
+        if not 1 <= int(number) <= counts[name]:
+            problem = f"The field {name!r} in {mesh.source.file_name} has no component {number}."
+            raise InputError(problem, why=f"It has {counts[name]}, counted from 1.")
+        return Component(name, name in at_points, int(number) - 1, f"component {number}")
+    if field not in counts:
+        raise _no_such_field(mesh, field, at_points, in_cells)
+    if counts[field] == _SCALAR:
+        return Component(field, field in at_points, 0, "the value")
+    column, meaning = _of_tensor(mesh, frame, field, counts[field], (axis, frame.vertical))
+    return Component(field, field in at_points, column, meaning, tensor=True)
+
+
+def _of_tensor(
+    mesh: Mesh, frame: Frame, field: str, count: int, pair: tuple[int, int]
+) -> tuple[int, str]:
+    """Return the column of a tensor's component, and what it is called."""
+    axes = "".join(AXES[i] for i in sorted(pair))
+    if count == _NINE:
+        return 3 * pair[0] + pair[1], f"the component {axes}"
+    if count == _SIX and mesh.tensor_order:
+        return _SYMMETRIC.index(axes), f"the component {axes} (of {', '.join(_SYMMETRIC)})"
+    if count == _AXISYMMETRIC and len(frame.radial) == 1 and not _is_plane(mesh, field):
+        normal = pair[0] == pair[1]
+        return (1 if normal else 3), (
+            f"component {2 if normal else 4} of 4 (radial, vertical, hoop, shear)"
+        )
+    raise InputError(
+        f"The field {field!r} in {mesh.source.file_name} has {count} components, and which of "
+        "them is meant is not plain.",
+        why="In an XDMF file the order of a tensor's six components depends on the program."
+        if count == _SIX
+        else "A stress is one value, or a tensor of 4 components (radial, vertical, hoop and shear "
+        "in a section), 6 or 9.",
+        cure=f'Name one, counted from 1, such as "{field}:2".',
+    )
+
+
+def _is_plane(mesh: Mesh, field: str) -> bool:
+    """Return whether four components are xx, xy, yx, yy: the middle ones are the same."""
+    fields = [mesh.point_data, *(block.data for block in mesh.solid)]
+    tensors = [values[field] for values in fields if field in values]
+    return all(np.array_equal(tensor[:, 1], tensor[:, 2]) for tensor in tensors)
+
+
+def _no_such_field(
+    mesh: Mesh, field: str, points: dict[str, int], cells: dict[str, int]
+) -> InputError:
+    def listed(fields: dict[str, int], where: str) -> str:
+        names = [f"{name} ({count})" for name, count in list(fields.items())[:_MOST_LISTED]]
+        more = len(fields) - len(names)
+        return f"{where}: " + ", ".join(names) + (f" and {more} more" if more else "")
+
+    places = {"at the nodes": points, "in the cells": cells}
+    lists = "; ".join(listed(fields, where) for where, fields in places.items() if fields)
+    has = f"has, with their numbers of components, {lists}" if lists else "has no fields at all"
+    problem = f"{mesh.source.file_name} has no field {printable(field, 80)!r}."
+    cure = "Give the name of the stress among them, or save the mesh with its stress."
+    return InputError(problem, why=f"It {has}.", cure=cure)
+
+
+_FEWEST_RADII = 3
+
+
+def read_reference_mesh(
+    path: str | os.PathLike[str],
+    *,
+    sigma: str,
+    r_unit: str,
+    sigma_unit: str,
+    sign: int = -1,
+    shear: str | None = None,
+    shear_sign: int | None = None,
+    vertical: str | None = None,
+    base: float | None = None,
+    centre: tuple[float, float] | None = None,
+    **stated: Any,
+) -> reference.ImportedProfile:
+    """Read the stress at the base of the film from a mesh; ``stated`` are the profile's fields."""
+    # sigma is a field of the normal stress or of a tensor of 4, 6 or 9 components, "name:2" its
+    # component 2. Base and centre are in m. Without shear_sign the shear is taken for the stress
+    # component rz; with 1, for the radial traction of the base on the film.
+    reference.require_sign("sign", sign)
+    if shear_sign is not None:
+        reference.require_sign("shear sign", shear_sign)
+    mesh = read_mesh(path)
+    name = mesh.source.file_name
+    frame = find_frame(mesh, to_si(mesh.points, r_unit, "length", name), vertical)
+    normal = _find(mesh, frame, sigma, frame.vertical)
+    section = len(frame.radial) == 1
+    _require_meaning(name, section, shear, centre)
+    tangential = _shear_component(mesh, frame, normal, shear) if section else None
+    footing = find_base(mesh, frame, base)
+    places, values = _at_base(mesh, frame, footing, normal)
+    columns = {"sigma_zz": sign * to_si(values, sigma_unit, "stress", f"{name}: {sigma}")}
+    treatment = "compression negative" if sign < 0 else "as it is"
+    notes = [
+        *import_notes([f"Imported from {name} (sha256 {mesh.source.sha256}).", *mesh.notes]),
+        *frame.notes,
+        *import_notes([footing.note]),
+        _component_note(normal, "Normal stress", treatment),
+    ]
+    if tangential is not None:
+        turned = footing.outward if shear_sign is None else shear_sign
+        values = _at_base(mesh, frame, footing, tangential)[1]
+        columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
+        notes.append(_component_note(tangential, "Radial shear", f"times {turned}"))
+    size = f"{len(mesh.points)} nodes, {sum(len(block.nodes) for block in mesh.solid)} cells"
+    samples = reference.Samples(
+        columns=columns,
+        source=mesh.source,
+        notes=notes,
+        kind="mesh",
+        item="base node" if normal.at_points else "base cell",
+        units=(r_unit, sigma_unit),
+        sign=sign,
+        spacing=frame.tolerance,
+        discretisation=f"{size}, {len(footing.nodes)} nodes on the base",
+    )
+    samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
+    return reference.profile_of(samples, stated)
+
+
+def _along_radius(
+    samples: reference.Samples, frame: Frame, places: FloatArray, centre: tuple[float, float]
+) -> reference.Samples:
+    """Give samples their radii: those of a section as they are, those of a plane by circles."""
+    if len(frame.radial) == 1:
+        r = np.where(np.abs(places[:, 0]) <= frame.tolerance, 0.0, places[:, 0])
+        distinct = 1 + np.count_nonzero(np.diff(np.sort(r)) > frame.tolerance)
+        if distinct < _FEWEST_RADII:
+            problem = f"The base in {samples.source.file_name} has values at {distinct} radii only."
+            cure = "Name the axis across the film (vertical; --vertical), or give a finer mesh."
+            raise InputError(problem, cure=cure)
+        return replace(samples, columns={"r": r, **samples.columns})
+    reference.require_numbers(samples)  # a mean would leave out what is missing
+    columns, note = average_over_circles(places - np.array(centre), samples.columns)
+    return replace(samples, columns=columns, notes=[*samples.notes, *import_notes([note])])
+
+
+def _require_meaning(
+    name: str, section: bool, shear: str | None, centre: tuple[float, float] | None
+) -> None:
+    if section and centre is not None:
+        problem = f"A centre was given, but the mesh in {name} is a section."
+        cure = "Leave out the centre (--centre), or shift the mesh."
+        raise InputError(problem, why="The axis of a section is at radius 0.", cure=cure)
+    if not section and shear is not None:
+        problem = f"A shear field was given, but the mesh in {name} is a body in 3-D."
+        cure = "Leave it out (shear; --shear), or give a section of the film."
+        raise InputError(problem, why="The radial shear is read from sections only.", cure=cure)
+
+
+def _shear_component(
+    mesh: Mesh, frame: Frame, normal: Component, shear: str | None
+) -> Component | None:
+    """Return the shear that is asked for, or the one that comes with a stress tensor."""
+    if shear is not None:
+        component = _find(mesh, frame, shear, frame.radial[0])
+        if component.at_points != normal.at_points:
+            raise InputError(
+                f"In {mesh.source.file_name}, one of {normal.field!r} and {component.field!r} is "
+                "given at the nodes and the other in the cells.",
+                cure="Give both in the same way.",
+            )
+        return component
+    return _find(mesh, frame, normal.field, frame.radial[0]) if normal.tensor else None
+
+
+def _at_base(
+    mesh: Mesh, frame: Frame, base: Base, component: Component
+) -> tuple[FloatArray, FloatArray]:
+    """Return places in the base and the values there: at nodes, or at the middles of sides."""
+    radial = list(frame.radial)
+    if component.at_points:
+        places = frame.points[base.nodes][:, radial]
+        return places, mesh.point_data[component.field][base.nodes, component.column]
+    blocks = [block for block in base.cells if component.field in block[0].data]
+    if not sum(len(cells) for _, cells, _ in blocks):
+        raise InputError(
+            f"No cell with a value of {component.field!r} has a side on the base in "
+            f"{mesh.source.file_name}.",
+            cure="Name the position of the base (base; --base), or save the stress at the nodes.",
+        )
+    places = np.concatenate([middles for _, _, middles in blocks])[:, radial]
+    values = [block.data[component.field][cells, component.column] for block, cells, _ in blocks]
+    return places, np.concatenate(values)
+
+
+def _component_note(component: Component, name: str, treatment: str) -> Message:
+    place = "at the nodes" if component.at_points else "of the cells"
+    field = f"{component.meaning} of the field {component.field!r} {place}"
+    text = f"{name}: {field}, {treatment}"
+    if not component.at_points:
+        text += "; each value is taken at the middle of its cell's side on the base"
+    return Message("import", f"{text}.")

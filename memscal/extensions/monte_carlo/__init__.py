@@ -1,0 +1,1 @@
+"""Monte Carlo over the stated inputs, and sweeps of the white noise."""

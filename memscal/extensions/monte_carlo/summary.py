@@ -1,0 +1,60 @@
+"""Monte Carlo draws of a calibration as a table, a mapping and a data frame."""
+
+from typing import Any
+
+from memscal.extensions.monte_carlo.monte_carlo import BudgetComparison, MonteCarlo
+from memscal.model.quantities import estimated_quantity
+from memscal.model.records import DRAWN
+from memscal.summaries.declared import DataFrame, plain
+from memscal.summaries.table import Table, texts_of
+
+
+def tables(result: MonteCarlo) -> list[Table]:
+    """Return each parameter's standard uncertainty by the budget and by draws."""
+    rows = []
+    for comparison in result.comparisons:
+        quantity = estimated_quantity(comparison.name).read_in(result.reading)
+        scale = quantity.scale
+        low, high = (end / scale for end in comparison.symmetric)
+        first = comparison.first_order / scale
+        draws = comparison.uncertainty / scale
+        cells = (f"{first:.2g}", f"{draws:.2g}", f"{low:.4g} to {high:.4g}")
+        agrees = "yes" if comparison.agrees else "no"
+        rows.append((f"{quantity.words} ({quantity.unit})", *cells, agrees))
+    disagreeing = frozenset(i for i, row in enumerate(rows) if row[-1] == "no")
+    *others, last = (source.replace("_", " ") for source in result.sources)
+    sources = f"{', '.join(others)} and {last}" if others else last
+    title = f"What scatters, by {result.draws} draws of {sources} (seed {result.seed})"
+    head = ("", "u by the budget", "u of the draws", "95 % interval", "agrees")
+    return [Table(title, head, rows, disagreeing)]
+
+
+def mapping(result: MonteCarlo) -> dict[str, Any]:
+    """Return the comparison of every parameter."""
+    return {
+        "draws": result.draws,
+        "seed": result.seed,
+        "sources": list(result.sources),
+        "agrees": result.agrees,
+        "parameters": {c.name: _comparison_json(c, result) for c in result.comparisons},
+        "messages": texts_of(result.messages),
+    }
+
+
+def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> dict[str, Any]:
+    quantity = estimated_quantity(comparison.name).read_in(result.reading)
+    return {
+        **{q.label or q.name: plain(getattr(comparison, q.name), quantity.scale) for q in DRAWN},
+        "unit": quantity.unit_text,
+        "agrees": comparison.agrees,
+        "reason": comparison.reason,
+    }
+
+
+def frame(result: MonteCarlo) -> DataFrame:
+    """Return the drawn parameters, one row for each draw that could be calibrated."""
+    import pandas as pd
+
+    names = [comparison.name for comparison in result.comparisons]
+    quantities = [estimated_quantity(name).read_in(result.reading) for name in names]
+    return pd.DataFrame(result.samples, columns=[f"{q.name} ({q.si_unit})" for q in quantities])

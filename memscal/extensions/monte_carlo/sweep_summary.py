@@ -1,0 +1,68 @@
+"""A sweep over the noise amplitude as a table, a mapping and arrays."""
+
+from typing import Any
+
+import numpy as np
+
+from memscal.extensions.monte_carlo.sweep import Sweep
+from memscal.model.quantities import ESTIMATED, MM, Quantity
+from memscal.summaries.declared import Dataset, plain, power_of_ten
+from memscal.summaries.table import Table
+
+#: Results of a sweep, with the attribute of their draws.
+_RESULTS = (
+    (ESTIMATED["conversion_constant"], "seed_conversion_constant"),
+    (ESTIMATED["gaussian_sigma_deconvolved"], "seed_gaussian_sigma"),
+    (Quantity("relative_rms", "dimensionless", "rms over the largest signal"), "seed_relative_rms"),
+)
+
+
+def tables(result: Sweep) -> list[Table]:
+    """Return every second amplitude: the exact expectation, and the median of the draws."""
+    constant = _RESULTS[0][0].read_in(result.reading)
+    power = power_of_ten(result.conversion_constant / constant.scale)
+    scales = (constant.scale * 10.0**power, MM, 0.01)
+    forms = (".4f", ".4f", ".3g")
+    columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
+    for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
+        columns.append([_number(value, form) for value in getattr(result, quantity.name) / scale])
+    for (_, name), scale, form in zip(_RESULTS, scales, forms, strict=True):
+        drawn = (draws[np.isfinite(draws)] for draws in getattr(result, name))
+        medians = [float(np.median(draws)) if draws.size else np.nan for draws in drawn]
+        columns.append([_number(median / scale, form) for median in medians])
+    title = (
+        "Dependence on the noise amplitude (1 is the rule's choice): the expectation, and the "
+        f"median of {result.seed_relative_rms.shape[1]} draws"
+    )
+    head = ("amplitude", f"A (1e{power} {constant.unit})", "σ(G) (mm)", "rms (%)")
+    rows = list(zip(*columns, strict=True))[::2]
+    return [Table(title, (*head, "A, draws", "σ(G), draws", "rms, draws"), rows)]
+
+
+def mapping(result: Sweep) -> dict[str, Any]:
+    """Return the whole sweep: lists over amplitudes, and lists of draws within them."""
+    return {"amplitude": {"value": plain(result.amplitude), "unit": "1"}} | {
+        quantity.name: {
+            "value": plain(getattr(result, quantity.name), quantity.scale),
+            "draws": plain(getattr(result, draws), quantity.scale),
+            "unit": quantity.unit_text,
+        }
+        for quantity, draws in ((q.read_in(result.reading), name) for q, name in _RESULTS)
+    }
+
+
+def dataset(result: Sweep) -> Dataset:
+    """Return the results over amplitude, and those of the draws over amplitude and draw."""
+    import xarray
+
+    axes = ("amplitude", "draw")
+    variables: dict[str, Any] = {"amplitude": (axes[:1], result.amplitude, {"units": "1"})}
+    for quantity, draws in _RESULTS:
+        attributes = {"units": quantity.read_in(result.reading).si_unit}
+        variables[quantity.name] = (axes[:1], getattr(result, quantity.name), attributes)
+        variables[draws] = (axes, getattr(result, draws), attributes)
+    return xarray.Dataset(variables)
+
+
+def _number(value: float, form: str) -> str:
+    return f"{value:{form}}" if np.isfinite(value) else "-"

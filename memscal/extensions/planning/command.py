@@ -1,0 +1,121 @@
+"""``memscal design``: the uncertainties to expect of a scan that is not made yet."""
+
+from functools import partial
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from memscal.cli import options as common
+from memscal.cli import output as out
+from memscal.cli.failures import DONE
+from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
+from memscal.formats.files import together
+
+_VARIED = ("step", "half-range", "repeats")
+#: Options in other units than SI, by the power of ten.
+_IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
+_SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
+
+EXAMPLES = """\b
+Examples:
+  memscal design
+  memscal design --step 0.5 --half-range 10 --repeats 4 --noise 1
+  memscal design --load 0.5 --noise-voltage 0.05 --figure design.png
+  memscal design --noise 1 --want A=1.3% --vary step
+  memscal design --thickness-uncertainty 0.005 --want sigma=1.2% --vary repeats --json
+  memscal design --disc-radius 800 --sigma 300 --want resolved=4.5 --vary repeats
+"""
+
+
+def _target(value: str) -> tuple[str, float]:
+    """Read a target, ``sigma=1%`` or ``resolved=4`` in rad/mm; the library checks the name."""
+    name, equals, text = value.partition("=")
+    percent = text.strip().endswith("%")
+    try:
+        number = float(text.strip().removesuffix("%"))
+    except ValueError:
+        equals = ""
+    if not equals:
+        raise click.BadParameter(f"{value!r} is no target: write sigma=1% or resolved=4 (rad/mm).")
+    name = name.strip()
+    if percent == (name == "resolved"):
+        unit = "in rad/mm, without %" if percent else "in percent: write the %"
+        raise click.BadParameter(f"{value!r}: {name} is given {unit}.")
+    return name, si(number, -2) if percent else si(number, 3)
+
+
+@click.command("design", epilog=EXAMPLES)
+@common.kernel_options
+@option("--load", Quantity("N"), 1.0)("Normal load, in N.")
+@option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
+    "Standard uncertainty (k = 1) of the load, in percent."
+)
+@common.radius_options(default=0.25, uncertainty=0.0025)
+@common.film_options(defaults=PAPER_FILM)
+@option("--step", Quantity("mm"), 0.25)("Distance of neighbouring positions, in mm.")
+@option("--half-range", Quantity("mm"), 8.0)("Positions run from minus to plus this, in mm.")
+@option("--repeats", click.IntRange(min=1), 1)("How often the line is scanned.")
+@option("--noise", Quantity("percent"), 0.5)(
+    "Standard deviation of one voltage, in percent of the signal with the rod right above the "
+    "sensor."
+)
+@option("--noise-voltage", Quantity("mV"))("The same in mV, in place of --noise.")
+@option("--centre", Quantity("mm", low=-float("inf")), 0.0)(
+    "Expected position of the sensor along the scan, in mm."
+)
+@option("--method", default="bayesian")(
+    "Method of memscal calibrate with which the scan would be evaluated."
+)
+@option("--want targets", _target, multiple=True, metavar="TARGET")(
+    "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
+    "uncertainty, or resolved=4 at least, in rad/mm. Repeated: all are to be reached."
+)
+@option("--vary", click.Choice(_VARIED))(
+    "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
+)
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
+    "Figure of the expected result (.png, .svg or .pdf). May be repeated."
+)
+@output_options
+def command(as_json: bool, force: bool, **options: Any) -> int:
+    """Predict the uncertainties of a calibration before its scan is made.
+
+    They follow, without simulation, from the Fisher information of the planned scan, the prior of
+    the estimate and the uncertainties of film, rod and load. Defaults are the paper's. With --want
+    and --vary, the smallest scan that reaches the targets is found.
+    """
+    common.require_one_kernel(options)
+    targets, figures, vary = (options[name] for name in ("targets", "figures", "vary"))
+    source = click.get_current_context().get_parameter_source("noise")
+    if options["noise_voltage"] is not None and source == ParameterSource.COMMANDLINE:
+        raise click.UsageError("--noise and --noise-voltage both state the noise: give one.")
+    if bool(targets) != (vary is not None):
+        raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
+    out.prove_writable(figures, force=force)
+    vary = None if vary is None else vary.replace("-", "_")
+
+    from memscal.extensions.planning.design import design
+
+    settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
+    settings |= {name: options[name] for name in ("load", "repeats", "method")}
+    settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
+    settings |= {"kernel": common.kernel_from(options), "want": dict(targets)}
+    with out.working("Planning"):
+        planned = design(vary=vary, **settings)
+    with out.working("Drawing"):
+        drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
+    with together():
+        out.write_files(drawn, force=force)
+        if as_json:
+            out.emit_json({"schema_version": "1", **planned.to_dict()})
+        else:
+            out.emit_tables(*planned.tables())
+    beyond = "G follows from the prior" if planned.method == "bayesian" else "the window hides G"
+    out.note(
+        f"Beyond the resolved band {beyond}: the uncertainty there does not scatter from scan to "
+        "scan, and repeats do not show it."
+    )
+    for path in figures:
+        out.message(f"Written: {path}")
+    return DONE

@@ -1,0 +1,112 @@
+"""Figure of a planned scan: expected G, its transfer function, uncertainties along a variation."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+from memscal.errors import InputError
+from memscal.extensions.planning.design import Design, varied_designs
+from memscal.figures.style import (
+    ALONG_RADIUS,
+    COLOURS,
+    EXPANDED,
+    legend_above,
+    on_axis,
+    panels_of,
+)
+from memscal.model.quantities import MM, PER_MM, PER_MM2
+
+#: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
+_WIDTHS = 4.0
+_BANDS = 2.0
+_FINE = 401
+#: Factors on the planned number at which the third panel is evaluated.
+_FACTORS = np.geomspace(0.25, 4.0, 9)
+#: No variation has more positions than this, unless the plan itself does.
+_MOST_POSITIONS = 1025
+_AXES = {
+    "step": ("step (mm)", MM),
+    "half_range": ("half range (mm)", MM),
+    "repeats": ("repeats", 1),
+}
+_CURVES = (
+    ("conversion_constant", "A", "deconvolved", "o"),
+    ("gaussian_sigma", "σ", "gaussian", "s"),
+)
+
+
+def design_figure(planned: Design, vary: str = "step") -> Figure:
+    """Draw G, its transfer function, and uncertainties of A and sigma against what is varied."""
+    if vary not in _AXES:
+        problem = f"The figure is to vary {vary!r}, which cannot be varied."
+        raise InputError(problem, cure=f"Choose from {', '.join(_AXES)}.")
+    with panels_of(2.9, 1, 3) as (figure, panels):
+        _draw_radial(panels[0], planned)
+        _draw_transfer(panels[1], planned)
+        _draw_varied(panels[2], planned, vary)
+    return figure
+
+
+def _draw_radial(axes: Axes, planned: Design) -> None:
+    r = np.linspace(0.0, _WIDTHS * planned.parameters["gaussian_sigma"], _FINE)
+    g, error = on_axis(planned.r, np.stack([planned.g, EXPANDED * planned.g_errors]), r) / PER_MM2
+    assumed = planned.plan.kernel.radial(r) / PER_MM2
+    r = r / MM
+    colour = COLOURS["deconvolved"]
+    axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="±2u")
+    axes.plot(r, g, color=colour, label="G expected")
+    axes.plot(r, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
+    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    axes.set(xlim=(0, r[-1]), xlabel=ALONG_RADIUS, ylabel="$G_{zz}$ (1/mm$^2$)")
+    legend_above(axes, columns=2)
+
+
+def _draw_transfer(axes: Axes, planned: Design) -> None:
+    resolved = planned.resolved_wavenumber
+    k = np.linspace(0.0, min(_BANDS * resolved, planned.k[-1]), _FINE)
+    samples = np.stack([planned.transfer, EXPANDED * planned.transfer_errors])
+    transfer, error = on_axis(planned.k, samples, k)
+    k = k / PER_MM
+    colour = COLOURS["deconvolved"]
+    axes.axvspan(0, resolved / PER_MM, color=COLOURS["window"], alpha=0.12, lw=0)
+    axes.axvline(resolved / PER_MM, color=COLOURS["window"], ls=":", label="resolved")
+    axes.fill_between(k, transfer - error, transfer + error, color=colour, alpha=0.25, lw=0)
+    axes.plot(k, transfer, color=colour, label="modulus for G")
+    axes.set_xlim(0, k[-1])
+    axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)", ylim=(0, None))
+    legend_above(axes)
+
+
+def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
+    label, scale = _AXES[vary]
+    designs = varied_designs(planned, vary, _values(planned, vary))
+    along = np.array([getattr(varied.plan, vary) for varied in designs]) / scale
+    for name, symbol, colour, marker in _CURVES:
+        share = np.array([varied.relative_uncertainty(name) for varied in designs])
+        noise = [varied.budget[name]["noise"] / abs(varied.parameters[name]) for varied in designs]
+        shown: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
+        axes.plot(along, 100 * EXPANDED * share, label=symbol, **shown)
+        axes.plot(along, 100 * EXPANDED * np.array(noise), ls="--", mfc="none", **shown)
+    axes.plot([], [], color="0.4", ls="--", label="noise alone")
+    axes.axvline(getattr(planned.plan, vary) / scale, color=COLOURS["muted"], ls=":", lw=0.8)
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty, 2u (%)")
+    # 0.5 and 20 in place of powers of ten: the axes span a decade or two.
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    legend_above(axes, columns=3)
+
+
+def _values(planned: Design, vary: str) -> list[float]:
+    number = getattr(planned.plan, vary)
+    if vary == "repeats":
+        return sorted({max(1, round(number * factor)) for factor in _FACTORS})
+    most = max(_MOST_POSITIONS, planned.plan.positions) / planned.plan.positions
+    factors = [f for f in _FACTORS if (1 / f if vary == "step" else f) <= most]
+    values = [float(number * factor) for factor in factors]
+    # The scan has to reach over the sensor.
+    return [v for v in values if vary == "step" or v > abs(planned.plan.centre)]

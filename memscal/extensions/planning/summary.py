@@ -1,0 +1,134 @@
+"""A planned scan as tables, mapping and arrays, as ``memscal design`` prints it."""
+
+import math
+from typing import Any
+
+from memscal.extensions.planning.design import Design
+from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity
+from memscal.model.records import EXPECTED, PLAN, RADIAL, TRANSFER
+from memscal.summaries import declared
+from memscal.summaries.table import Table
+
+#: Words and symbol of the parameters that are shown.
+_SHOWN = {
+    "conversion_constant": ("conversion constant A", "A"),
+    "gaussian_sigma": ("Gaussian width sigma", "sigma"),
+    "fwhm": ("full width at half maximum", "FWHM"),
+}
+#: Contributions below this share of the largest are shown as zero.
+_NEGLIGIBLE = 5e-3
+_WORDS = {
+    "regularisation": "what the film hides of G",
+    "window": "what the window hides of G",
+    "misfit": "misfit of the Gaussian",
+    "thickness": "film thickness",
+    "poisson_ratio": "Poisson's ratio",
+    "young_modulus": "Young's modulus",
+}
+_QUANTITIES = (
+    *RADIAL.quantities[:3],
+    *TRANSFER.quantities[:1],
+    Quantity("transfer", "dimensionless", "transfer function of G", axes=("k",)),
+    Quantity("transfer_errors", "dimensionless", "standard uncertainty of it", axes=("k",)),
+)
+
+
+def tables(planned: Design) -> list[Table]:
+    """Return the plan, the expected parameters, and the sources of their uncertainties."""
+    plan = planned.plan
+    words = {quantity.name: quantity.words for quantity in PLAN}
+    noise = f"{plan.point_noise / MV:.3g} mV ({plan.point_noise / plan.signal * 100:.3g} %)"
+    rows = [
+        (words["positions"], f"{plan.positions}, every {plan.step / MM:.4g} mm"),
+        (words["half_range"], f"{plan.half_range / MM:.4g} mm"),
+        (words["repeats"], f"{plan.repeats}"),
+        (words["load"], f"{plan.load:.4g} N"),
+        (words["signal"], f"{plan.signal / MV:.4g} mV"),
+        (words["point_noise"], noise),
+    ]
+    title = f"A planned scan (nothing was measured), for method {planned.method}"
+    head = ("", "value", "uncertainty", "relative")
+    return [
+        Table(title, ("", ""), rows),
+        Table("Expected, with standard uncertainties (k = 1)", head, _expected_rows(planned)),
+        _contributions_table(planned),
+    ]
+
+
+def _expected_rows(planned: Design) -> list[tuple[str, str, str, str]]:
+    rows = []
+    for name, (words, _) in _SHOWN.items():
+        shown = ESTIMATED[name]
+        share = planned.relative_uncertainty(name)
+        value = f"{planned.parameters[name] / shown.scale:.4g} {shown.unit}"
+        error = f"{planned.parameters.uncertainty(name) / shown.scale:.2g}"
+        rows.append((words, value, error, _percent(share)))
+    g = planned.g[0] / PER_MM2
+    u = planned.g_errors[0] / PER_MM2
+    rows.append(("G at the axis", f"{g:.4g} 1/mm^2", f"{u:.2g}", _percent(u / abs(g))))
+    band = planned.resolved_wavenumber / PER_MM
+    detail = f"detail of {2 * math.pi / band:.3g} mm"
+    rows.append(("resolved up to", f"{band:.4g} rad/mm", detail, ""))
+    return rows
+
+
+def _percent(share: float) -> str:
+    return f"{share * 100:.3g} %"
+
+
+def _contributions_table(planned: Design) -> Table:
+    shares = {
+        name: {s: u / abs(planned.parameters[name]) for s, u in planned.budget[name].items()}
+        for name in _SHOWN
+    }
+    largest = {name: max(contributions.values()) for name, contributions in shares.items()}
+    rows = []
+    for source in shares["conversion_constant"]:
+        parts = [(shares[name].get(source, 0.0), largest[name]) for name in shares]
+        cells = [f"{part * 100:.2g}" if part > _NEGLIGIBLE * top else "0" for part, top in parts]
+        if any(cell != "0" for cell in cells):
+            rows.append([_WORDS.get(source, source.replace("_", " ")), *cells])
+    head = ("source", *(symbol for _, symbol in _SHOWN.values()))
+    return Table("Contributions, in percent", head, rows)
+
+
+def mapping(planned: Design) -> dict[str, Any]:
+    """Return the object of ``design --json``; the contract fixes its form."""
+    axis = {"g_at_axis": planned.g[0], "g_at_axis_uncertainty": planned.g_errors[0]}
+    return {
+        "planned": True,
+        "method": planned.method,
+        "plan": declared.members(PLAN, planned.plan),
+        "wanted": {name: _wanted(name, value) for name, value in planned.want.items()},
+        "expected": {
+            name: {
+                **declared.parameter_json(planned.parameters, name),
+                "relative_uncertainty": planned.relative_uncertainty(name),
+                "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
+            }
+            for name in _SHOWN
+        },
+        **declared.members(EXPECTED, planned, **axis),
+    }
+
+
+def _wanted(name: str, value: float) -> dict[str, Any]:
+    resolved = name == "resolved"
+    return {"value": value / (PER_MM if resolved else 1), "unit": "rad/mm" if resolved else "1"}
+
+
+def dataset(planned: Design) -> declared.Dataset:
+    """Return G along r and its transfer function along k, with standard uncertainties."""
+    values = {quantity.name: getattr(planned, quantity.name) for quantity in _QUANTITIES}
+    return declared.labelled_dataset(_QUANTITIES, values)
+
+
+def frame(planned: Design) -> declared.DataFrame:
+    """Return one row for each radius at which G is expected."""
+    names = ("r", "g", "g_errors")
+    return declared.data_frame(_QUANTITIES[:3], {name: getattr(planned, name) for name in names})
+
+
+def correlated(planned: Design) -> dict[str, Any]:
+    """Return the expected parameters with their joint covariance."""
+    return declared.correlated_parameters(planned.parameters)

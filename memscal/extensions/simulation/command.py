@@ -1,0 +1,324 @@
+"""``memscal simulate``: a synthetic scan, or a whole experiment, whose truth is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from memscal.cli import options as common
+from memscal.cli.failures import DONE
+from memscal.cli.options import FILE, PAPER_FILM, Quantity, option, options_of, output_options, si
+from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable, working
+from memscal.cli.reference import interface_of, interface_options
+from memscal.formats.files import together
+from memscal.summaries.table import Table
+
+if TYPE_CHECKING:
+    from memscal.model import quantities
+    from memscal.model.scan import Scan
+
+FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
+"""The files of an experiment; a test compares them with the names of its scans."""
+
+#: Options of a sphere whose values are given on as they are.
+_OF_SPHERE = (
+    *("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "one_load_cell"),
+    "gain",
+)
+_SPHERE_NAMES = (
+    *_OF_SPHERE,
+    *("sphere_radius", "sphere_radius_uncertainty", "slip_length", "greenwood_tripp"),
+    *("exponential", "contacts", "spacing", "load_scatter", "position_error", "thickness_factor"),
+)
+"""The options that only an experiment with a sphere has."""
+
+_LOADS = (0.34, 0.69, 1.37, 2.75)
+
+
+_sphere_options = options_of(
+    option("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75), multiple=True)(
+        "Sphere: load of the lubricated contacts, in N. May be repeated."
+    ),
+    option("--sphere-radius", Quantity("mm"), 128.8)("Sphere: radius of curvature, in mm."),
+    option("--sphere-radius-uncertainty", Quantity("mm", open_low=False), 0.5)(
+        "Sphere: standard uncertainty (k = 1) of its radius, in mm."
+    ),
+    option("--friction", Quantity("ratio", open_low=False, infinite=True), 0.2, metavar="MU")(
+        "Sphere: friction coefficient of the dry contacts; inf: they stick wherever they touch."
+    ),
+    option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+        "Sphere: a point sticks where it first touched, or as if loaded in one step."
+    ),
+    interface_options,
+    option("--contacts", click.IntRange(min=2, max=4096), 33)("Sphere: contacts in a row."),
+    option("--spacing", Quantity("mm"), 0.5)("Sphere: distance of neighbouring contacts, in mm."),
+    option("--load-scatter", Quantity("percent", high=10.0, open_low=False), 2.0)(
+        "Sphere: standard deviation of each contact's own load, in percent."
+    ),
+    option("--record-loads", is_flag=True)(
+        "Sphere: record the load that each contact had, read to 0.2 percent, in place of "
+        "the nominal one."
+    ),
+    option("--position-error", Quantity("um", open_low=False), 10.0)(
+        "Sphere: standard deviation of each contact's own position, in um."
+    ),
+    option("--draw-inputs", is_flag=True)(
+        "Sphere: draw the true film, radii and loads from their uncertainties; the files "
+        "state the nominal ones, and the truth beside."
+    ),
+    option("--one-load-cell", is_flag=True)(
+        "Sphere: its loads and the rod's have one common error, and the scans name one load cell."
+    ),
+    option("--gain", Quantity("ratio"), 1.0)(
+        "Sphere: a deliberate error, a factor on the voltages of the sphere's scans only."
+    ),
+    option("--thickness-factor", Quantity("ratio"), 1.0)(
+        "Sphere: a deliberate error, the film's true thickness over the one stated."
+    ),
+)
+
+
+#: Options whose values are given on as they are, and those in other units, by the power of ten.
+_SHARED = ("repeats", "state_noise", "state_law", "rod_friction", "seed")
+_SCALED = {"conversion_constant": -3} | dict.fromkeys(
+    ("noise", "baseline", "drift", "load_uncertainty"), -2
+)
+
+
+def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what describes a rod scan and an experiment alike."""
+    return {
+        "film": common.film_from(options),
+        "rod": common.indenter_from("rod", options),
+        "kernel": common.kernel_from(options),
+        "centre": (si(options["centre"], -3), si(options["centre_y"], -3)),
+        **{name: si(options[name], power) for name, power in _SCALED.items()},
+        **{name: options[name] for name in _SHARED},
+    }
+
+
+def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
+    """Print the truth of scans, one column for each."""
+    truths = [dict(scan.synthetic or {}) for scan in scans.values()]
+    names = dict.fromkeys(name for truth in sorted(truths, key=len, reverse=True) for name in truth)
+    rows: list[Sequence[str]] = [
+        ("kind", *(scan.kind for scan in scans.values())),
+        ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
+    ]
+    for name in names:
+        words = next(_entry(name, truth[name])[0] for truth in truths if name in truth)
+        values = (_entry(name, truth[name])[1] if name in truth else "-" for truth in truths)
+        rows.append((words, *values))
+    head = ("", *(path.name if len(scans) > 1 else "" for path in scans))
+    emit_tables(Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows))
+
+
+def _described(scan: Scan, path: Path) -> dict[str, Any]:
+    return {
+        "scan": str(path),
+        "synthetic": True,
+        "kind": scan.kind,
+        "shape": list(scan.u_zz.shape),
+        "truth": {name: _member(name, value) for name, value in (scan.synthetic or {}).items()},
+    }
+
+
+def _member(name: str, value: float | str) -> Any:
+    """Return a truth as JSON holds it: text, also of what is infinite, or a number and its unit."""
+    if isinstance(value, str) or value == math.inf or name == "seed":
+        return int(value) if name == "seed" else str(value)
+    quantity = _quantity(name)
+    return {"value": value / quantity.scale, "unit": quantity.unit_text}
+
+
+def _entry(name: str, value: float | str) -> tuple[str, str]:
+    """Return a truth in words, and with its unit."""
+    if isinstance(value, str):
+        return name.replace("_", " "), value
+    shown = _quantity(name)
+    return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()
+
+
+def _quantity(name: str) -> quantities.Quantity:
+    from memscal.model.quantities import TRUTH, estimated_quantity
+
+    if name.startswith("load_") and name.removeprefix("load_").isdigit():
+        return replace(TRUTH["load"], words=f"true load {name.removeprefix('load_')}")
+    return TRUTH.get(name) or estimated_quantity(name)
+
+
+_ROD_NAMES = ("half_range", "raster", "laboratory")
+"""The options that only a rod scan alone has."""
+
+EXAMPLES = """\b
+Examples:
+  memscal simulate -o scan.h5
+  memscal simulate -o scan.h5 --points 33 --noise 0.5 --seed 7
+  memscal simulate -o loads.h5 --load 0.1 --load 0.3 --load 1 --repeats 3
+  memscal simulate -o raster.h5 --raster --points 33 --half-range 6
+  memscal simulate -o ring.h5 --sigma 700 --weight 1.5 --sigma 400 --weight -0.5
+  memscal simulate -o disc.h5 --disc-radius 800 --sigma 300
+
+\b
+Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts to measure:
+  memscal simulate --experiment sphere -o experiment
+  memscal simulate --experiment sphere -o sticky --friction inf --draw-inputs --seed 7
+  memscal simulate --experiment sphere -o rough --friction 1.6 --slip-length 1.82
+  memscal simulate --experiment sphere -o wrong --gain 1.05
+"""
+
+
+@click.command("simulate", epilog=EXAMPLES)
+@option("--experiment", click.Choice(["rod", "sphere"]), "rod")(
+    "A rod scan; or a whole experiment with a sphere: a rod scan, and scans of the sphere's "
+    "contacts, dry and lubricated."
+)
+@option("-o --output", FILE, metavar="SCAN|FOLDER")(
+    "Scan to write (memscal-scan), or the folder of an experiment's three scans.  "
+    "[default: synthetic_scan.h5, or synthetic_experiment]"
+)
+@common.kernel_options
+@option("--load loads", Quantity("N"), multiple=True)(
+    "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
+    "0.34, 0.69, 1.37 and 2.75]"
+)
+@common.radius_options(default=0.25, uncertainty=0.0025)
+@common.film_options(defaults=PAPER_FILM)
+@common.rod_friction_option(common.FREE_OR_STUCK)
+@option("--half-range", Quantity("mm"), 8.0)(
+    "Rod scan alone: positions run from minus to plus this, in mm."
+)
+@option("--points", click.IntRange(min=2, max=4096), 65)("Positions of the rod along each axis.")
+@option("--repeats", click.IntRange(min=1, max=4096), 1)(
+    "Repeats at each load; with a sphere, of its contacts."
+)
+@option("--raster", is_flag=True)("Rod scan alone: a square instead of a line.")
+@option("--noise", Quantity("percent", open_low=False), 0.5)(
+    "Standard deviation of the noise, in percent of the largest signal."
+)
+@option("--centre", Quantity("mm", low=-math.inf), 0.14)(
+    "Position of the sensor along the scan, in mm."
+)
+@option("--centre-y", Quantity("mm", low=-math.inf), 0.0)("Its position across the scan, in mm.")
+@option("--baseline", Quantity("percent", low=-math.inf), 1.0)(
+    "Offset of the voltage, in percent of the largest signal."
+)
+@option("--drift", Quantity("percent", low=-math.inf), 0.5)(
+    "Change of the offset across the scan, in percent of the largest signal."
+)
+@option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
+    "Standard uncertainty to state for the load, in percent."
+)
+@option("--state-noise/--no-state-noise", default=True)(
+    "Whether the scan states its noise (u_zz_errors)."
+)
+@option("--state-law/--no-state-law", default=True)(
+    "Whether the scan states the film's law and the rod's friction."
+)
+@option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
+@common.laboratory_option("Rod scan alone: ")
+@_sphere_options
+@output_options
+def command(
+    experiment: str, output: Path | None, as_json: bool, force: bool, **options: Any
+) -> int:
+    """Make a synthetic scan, or the scans of an experiment, from a known apparatus function.
+
+    The base stress of a rod on the bonded film, or of a sphere's contacts, is convolved with the
+    apparatus function; noise, an offset and a drift are added. Under the rod the film follows
+    --film-law, under the sphere linear elasticity. Every file is labelled as synthetic and holds
+    its truth. Defaults are the paper's.
+    """
+    _check_usage(experiment, options)
+    if experiment == "sphere":
+        return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
+    output = output or Path("synthetic_scan.h5")
+    laboratory = options["laboratory"]
+    prove_writable([output], force=force, inputs=[laboratory] if laboratory else [])
+
+    from memscal.extensions.simulation.rod_scan import simulate
+    from memscal.formats.scan import write_scan
+    from memscal.model.instrument import StressSensor
+
+    loads = options["loads"] or (1.0,)
+    with working("Simulating"):
+        scan = simulate(
+            load=loads[0] if len(loads) == 1 else loads,
+            half_range=si(options["half_range"], -3),
+            points=options["points"],
+            raster=options["raster"],
+            **_shared_settings(options),
+        )
+    if laboratory:
+        scan = common.with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
+    with together():
+        write_scan(scan, output, overwrite=force)
+        if as_json:
+            emit_json({"schema_version": "1", **_described(scan, output)})
+        else:
+            _print_truth({output: scan}, "scan")
+    note("The scan is synthetic: nothing in it was measured.")
+    message(f"Written: {output}")
+    return DONE
+
+
+def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
+    context = click.get_current_context()
+    typed = ParameterSource.COMMANDLINE
+    others = _SPHERE_NAMES if experiment == "rod" else _ROD_NAMES
+    misplaced = [name for name in others if context.get_parameter_source(name) == typed]
+    if misplaced:
+        names = [
+            option.opts[0]
+            for option in context.command.params
+            if isinstance(option, click.Option) and option.name in misplaced
+        ]
+        other = "sphere" if experiment == "rod" else "rod"
+        belongs = "belongs" if len(names) == 1 else "belong"
+        raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
+    common.require_one_kernel(options)
+    if options["raster"] and max(len(options["loads"]), 1) * options["repeats"] > 1:
+        raise click.UsageError("A raster has one repeat at one load.")
+    for name in ("loads", "lubricated_loads"):
+        if experiment == "sphere" and len(set(options[name])) < len(options[name]):
+            problem = "A load of the sphere is given twice: give it once, and --repeats."
+            raise click.UsageError(problem)
+
+
+def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
+    from memscal.extensions.simulation.experiment import simulate_experiment
+    from memscal.formats.scan import ensure_folder_writable, write_scans
+
+    ensure_folder_writable(folder, FILES, overwrite=force)
+    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
+    of_sphere = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
+    settings["sphere"] = common.indenter_from("sphere", of_sphere)
+    with working("Simulating"):
+        made = simulate_experiment(
+            interface=interface_of(options),
+            rod_points=options["points"],
+            loads=options["loads"] or _LOADS,
+            points=options["contacts"],
+            spacing=si(options["spacing"], -3),
+            load_scatter=si(options["load_scatter"], -2),
+            position_error=si(options["position_error"], -6),
+            thickness_factor=options["thickness_factor"],
+            **settings,
+        )
+    scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
+    with together(folder):
+        write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
+        if as_json:
+            described = [_described(scan, path) for path, scan in scans.items()]
+            emit_json({"schema_version": "1", "synthetic": True, "scans": described})
+        else:
+            _print_truth(scans, "experiment")
+    note("The scans are synthetic: nothing in them was measured.")
+    message(f"Written: {', '.join(map(str, scans))}")
+    return DONE
