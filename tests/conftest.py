@@ -4,9 +4,11 @@ import gc
 import logging
 import os
 import secrets
+import shutil
 import signal
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 # Before numpy loads: threads on matrices as small as ours cost ten times the work itself.
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -17,9 +19,13 @@ if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 import pytest  # noqa: E402
+from helpers.console import Outcome, Run  # noqa: E402
 from helpers.nexus import definitions_folder, structure, violations  # noqa: E402
+from helpers.scans import known_apparatus  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
+import memscal  # noqa: E402
+from memscal.cli import main  # noqa: E402
 from memscal.formats.hdf5 import writer  # noqa: E402
 
 # A deadline is a clock: on a busy machine it would fail what is right.
@@ -93,3 +99,55 @@ def _forget_what_was_solved(request: pytest.FixtureRequest) -> Iterator[None]:
             if hasattr(value, "cache_clear"):
                 value.cache_clear()
     gc.collect()
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run ``memscal`` with arguments."""
+
+    def run_(*arguments: object) -> Outcome:
+        capsys.readouterr()
+        code = main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return Outcome(code, printed.out, printed.err)
+
+    return run_
+
+
+@pytest.fixture(scope="session")
+def good_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scan with nothing wrong in it."""
+    path = tmp_path_factory.mktemp("good") / "scan.h5"
+    memscal.write_scan(memscal.simulate(seed=1), path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def drifting_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scan whose baseline drifts by far more than the quality check allows."""
+    path = tmp_path_factory.mktemp("drifting") / "scan.h5"
+    memscal.write_scan(memscal.simulate(seed=1, drift=0.2), path)
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in."""
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    return work
+
+
+@pytest.fixture
+def scan(good_scan: Path, folder: Path) -> Path:
+    """A copy of the good scan in the folder."""
+    return Path(shutil.copy(good_scan, folder / "scan.h5"))
+
+
+@pytest.fixture
+def artifact(folder: Path) -> Path:
+    """A sensor whose G and A are known, in the folder."""
+    path = folder / "sensor.apparatus.h5"
+    known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(path)
+    return path

@@ -24,7 +24,7 @@ from memscal.model.indenter import Sphere
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import LoadCell, StressSensor
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 
 SCANS = tuple(
     MeasuredScan(

@@ -39,7 +39,7 @@ HERE = Path(__file__).parent
 TOP = HERE.parents[1]
 OUTPUTS = HERE / "outputs"
 SIGNATURES = HERE / "signatures.txt"
-LINKS = {"data": TOP / "calibration_data", "meshes": TOP / "tests" / "formats" / "data"}
+LINKS = {"data": TOP / "calibration_data", "meshes": TOP / "tests" / "data"}
 """Folders of the repository by the names that they have where the commands run."""
 
 LINES = (HERE / "commands.txt").read_text(encoding="utf-8").splitlines()

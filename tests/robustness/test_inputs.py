@@ -95,7 +95,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Good:
     rows = zip(scan.x * 1e3, scan.u_zz * 1e3, strict=True)
     lines = ["x (mm),u_zz (mV)", *(f"{x:.4f},{u:.6f}" for x, u in rows)]
     (folder / "table").write_text("\n".join(lines))
-    meshes = Path(__file__).parents[1] / "formats" / "data"
+    meshes = Path(__file__).parents[1] / "data"
     (folder / "mesh").write_bytes((meshes / "getfem_film.vtu").read_bytes())
     return Good({path.name: path.read_bytes() for path in folder.iterdir()})
 

@@ -20,8 +20,8 @@ import pytest
 from helpers.meshes import section, write
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.extensions.meshes import mesh_files
 from memscal.extensions.meshes.mesh_files import Mesh, read_mesh
-from memscal.formats.meshes import mesh_files
 
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
 BOMB = "".join(
@@ -419,7 +419,7 @@ def test_an_endless_reader_ends(hostile: Callable[[str], Path], monkeypatch: pyt
 def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path: Path, name):
     path = tmp_path / name
     if name == "vtk_film.vtu":
-        path.write_bytes((Path(__file__).with_name("data") / name).read_bytes())
+        path.write_bytes((Path(__file__).parents[2] / "data" / name).read_bytes())
     else:
         small(path)
     good = path.read_bytes()

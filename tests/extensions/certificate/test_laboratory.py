@@ -10,7 +10,7 @@ from memscal.cli import main
 from memscal.errors import MemscalError
 from memscal.extensions.certificate.laboratory import NEEDED, Measured, read_laboratory
 
-SHIPPED = Path(__file__).parents[2] / "calibration_data" / "lab.toml"
+SHIPPED = Path(__file__).parents[3] / "calibration_data" / "lab.toml"
 
 
 def written(folder: Path, text: str) -> Path:

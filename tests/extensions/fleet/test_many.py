@@ -17,7 +17,7 @@ from helpers.scans import simulated
 
 import memscal
 from memscal import FleetCalibration, Scan
-from memscal.calibration import many as fleet
+from memscal.extensions.fleet import many as fleet
 from memscal.parallel import shared, worker_pool
 
 

@@ -22,7 +22,7 @@ from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
-DATA = Path(__file__).with_name("data")
+DATA = Path(__file__).parents[2] / "data"
 QUADRATIC = [(0, 1), (1, 2), (2, 0)]
 
 

@@ -9,7 +9,7 @@ import memscal
 from memscal.extensions.certificate.certificate import Certificate, certify
 from memscal.extensions.certificate.laboratory import LaboratoryFile, read_laboratory
 
-DATA = Path(__file__).parents[2] / "calibration_data"
+DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from helpers.console import Run, names
 
-DATA = Path(__file__).parents[2] / "calibration_data"
+DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from helpers.meshes import RADII, block, pressure, section
 
 import memscal
 
-DATA = Path(__file__).parents[1] / "formats" / "data"
+DATA = Path(__file__).parents[2] / "data"
 MESH = ["--format", "reference", "--r-unit", "mm", "--sigma-unit", "MPa", "--load", 1]
 
 
