@@ -1,7 +1,7 @@
 """Save closed-form numbers with VTK as ParaView does: compressed, in appended raw bytes.
 
 Needs the package vtk; nothing of memscal is in it.  In mm and MPa: a section with a stress
-tensor whose component yy carries 1 N at the base, texts beside it, and the stress in the cells.
+tensor whose component yy carries 1 N at the base, and the stress in the cells.
 """
 
 import sys
@@ -34,10 +34,6 @@ def main(path: str) -> None:
     middle = (radii[1:] + radii[:-1]) / 2
     each = -np.exp(-(middle**2) / 2) / (2 * np.pi)
     add(grid.GetCellData(), "S33", np.tile(each, heights.size - 1))
-    names = vtk.vtkStringArray()
-    names.SetName("about")
-    names.InsertNextValue("closed-form numbers")
-    grid.GetFieldData().AddArray(names)
     writer = vtk.vtkXMLUnstructuredGridWriter()
     writer.SetFileName(path)
     writer.SetInputData(grid)

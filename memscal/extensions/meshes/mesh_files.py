@@ -51,8 +51,8 @@ _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 # The address of an array in another file, such as film.h5:/data0, where XDMF has numbers.
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
 _AS_VTU = (
-    "Open it in ParaView and save it as an unstructured grid (.vtu), or get it again from where "
-    "it came from."
+    "Save it from ParaView as an unstructured grid (.vtu) in one piece, of data mode ASCII or "
+    "Binary and without texts, or as legacy VTK (.vtk)."
 )
 
 

@@ -4,7 +4,6 @@ It imports nothing of memscal.  Request and mesh come on standard input; the ans
 arrays in numpy's format, the first of which is text in JSON.
 """
 
-import base64
 import builtins
 import contextlib
 import io
@@ -14,15 +13,9 @@ import re
 import sys
 import types
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
-from xml.etree import ElementTree as ET
-from xml.etree.ElementTree import Element, SubElement
 
-_SECTIONS = ("Points", "Cells", "PointData", "CellData")
-_NUMBERS = re.compile("U?Int(8|16|32|64)|Float(32|64)")
-# Bytes that are not XML follow the first underscore of a raw section.
-_RAW = re.compile(rb"""<AppendedData[^>]*encoding\s*=\s*["']raw["'][^>]*>\s*_""")
 _MOST_FILES = 32
 _MOST_PRINTED = 300
 _FORBIDDEN = {"ctypes", "ftplib", "pickle", "pty", "shutil", "socket", "subprocess", "urllib"}
@@ -68,7 +61,8 @@ def _failure(error: BaseException, memory: int) -> dict[str, Any]:
     words = " ".join(str(error).split())[:_MOST_PRINTED]
     if isinstance(error, ValueError | PermissionError) and words:
         return {"error": words, "unsafe": isinstance(error, PermissionError)}
-    return {"error": f"{type(error).__name__}: {words}", "unsafe": False}
+    form = f"{type(error).__name__}: {words}" if words else "it is of a form that is not known"
+    return {"error": form, "unsafe": False}
 
 
 def _limit(memory: int, seconds: int) -> bool:
@@ -148,16 +142,19 @@ def _read(meshio: Any, kind: str, given: Any) -> tuple[str, Any]:
         warnings.simplefilter("ignore")
         # numpy only warns of text that is not a number, and cuts the array short.
         warnings.filterwarnings("error", message="string or file could not be read")
-        if kind != "vtk":
-            root = {"vtu": _tidy_vtu, "xdmf": _tidy_xdmf}[kind](given.read())
-            # meshio parses with this function: it is given the tidy tree.
-            ET.parse = lambda *_: ET.ElementTree(root)
         path = f"mesh.{kind}"
+        # The mesh has no name: it is what stands in the standard input. numpy reads binary VTK
+        # from a file alone, and a VTU file is opened a second time where it holds raw bytes.
+        data = b"" if kind == "vtk" else given.read()
+        _require_plain(data)
         opener = builtins.open
-        # The mesh has no name: it is what stands in the standard input.
-        vars(builtins)["open"] = lambda file, *a, **k: (
-            given if file == path else opener(file, *a, **k)
-        )
+
+        def stand_in(file: Any, *arguments: Any, **options: Any) -> Any:
+            if file != path:
+                return opener(file, *arguments, **options)
+            return given if kind == "vtk" else io.BytesIO(data)
+
+        vars(builtins)["open"] = stand_in
         try:
             mesh = getattr(meshio, kind).read(path)
         except SystemExit as error:
@@ -165,97 +162,13 @@ def _read(meshio: Any, kind: str, given: Any) -> tuple[str, Any]:
     return " ".join(printed.getvalue().split())[:_MOST_PRINTED], mesh
 
 
-def _tidy_vtu(data: bytes) -> Element:
-    """Return a VTU file as meshio can read it: without texts, version 2 and raw bytes."""
-    raw = None
-    if begin := _RAW.search(data):
-        end = data.rfind(b"</AppendedData>")
-        if end < begin.end():
-            raise ValueError("it ends inside its appended data")
-        raw = data[begin.end() : end]
-        data = data[: begin.end()] + data[end:]
-    root = ET.fromstring(data)
-    if root.tag != "VTKFile" or root.get("type") != "UnstructuredGrid":
-        raise ValueError(f"it holds {root.get('type', root.tag)}, not an unstructured grid")
-    pieces = root.findall("UnstructuredGrid/Piece")
-    if len(pieces) != 1:
-        raise ValueError(f"it holds {len(pieces)} pieces, and only a mesh in one piece is read")
-    piece = pieces[0]
-    piece[:] = [section for section in piece if section.tag in _SECTIONS]
-    for section in piece:
-        section[:] = [array for array in section if _NUMBERS.fullmatch(array.get("type", ""))]
-    if raw is not None:
-        _put_inline(root, raw)
-    appended = [] if raw is not None else root.findall("AppendedData")
-    grid = Element("UnstructuredGrid")
-    grid.append(piece)
-    root[:] = [grid, *appended]
-    # Version 2 differs in polyhedra only.
-    root.set("version", "1.0")
-    return root
-
-
-def _put_inline(root: Element, raw: bytes) -> None:
-    """Move raw bytes as base64 into their arrays (VTK File Formats, section "XML formats")."""
-    import numpy as np
-
-    order = ">" if root.get("byte_order") == "BigEndian" else "<"
-    size = np.dtype(f"{order}u{8 if root.get('header_type') == 'UInt64' else 4}")
-    for array in root.iterfind("UnstructuredGrid/Piece/*/DataArray[@format='appended']"):
-        begin = int(array.get("offset", ""))
-        count = body = int(np.frombuffer(raw, size, 1, begin)[0])
-        middle = begin + size.itemsize
-        array.set("format", "binary")
-        if count and root.get("compressor"):
-            body = int(np.frombuffer(raw, size, count, begin + 3 * size.itemsize).sum())
-            middle = begin + (3 + count) * size.itemsize
-            # meshio decodes the header by itself.
-            chunks = [raw[begin:middle], raw[middle : middle + body]]
-        else:
-            chunks = [raw[begin : middle + body]]
-        if not count:
-            array.set("format", "ascii")
-            chunks = []
-        array.text = b"".join(map(base64.b64encode, chunks)).decode()
-
-
-def _tidy_xdmf(data: bytes) -> Element:
-    """Return an XDMF file as meshio can read it: one grid with its mesh and its fields."""
-    root = ET.fromstring(data)
-    if root.tag != "Xdmf":
-        raise ValueError(f"it holds {root.tag}, not an XDMF grid")
-    all_grids = list(root.iter("Grid"))
-    grids = [grid for grid in all_grids if grid.find("Topology") is not None]
-    # The only grid with a mesh may be the only one of a collection.
-    if len(grids) != 1 or len(all_grids) > 2:
-        raise ValueError(
-            f"it holds {len(all_grids)} grids, {len(grids)} of them with a mesh: only one mesh "
-            "with its fields is read, no series in time and no parts"
-        )
-    tidy = Element("Xdmf", Version=root.get("Version", "3.0"))
-    grid = SubElement(SubElement(tidy, "Domain"), "Grid", GridType="Uniform")
-    grid.extend(_mesh_and_fields(grids[0]))
-    for item in grid.iter("DataItem"):
-        if "Reference" in item.attrib or item.get("ItemType", "Uniform") != "Uniform":
-            raise ValueError("it has a data item that is calculated from others or points to them")
-    return tidy
-
-
-def _mesh_and_fields(grid: Element) -> Iterator[Element]:
-    """Yield the elements of a grid that are its mesh or a field on it, with XDMF's defaults."""
-    for element in grid:
-        element[:] = element.findall("DataItem")
-        if element.tag == "Attribute":
-            centre = element.get("Center", "Node")
-            element.set("Center", centre)
-            if element.get("Name") and centre in ("Node", "Cell") and len(element) == 1:
-                yield element
-        elif element.tag == "Geometry":
-            if not {"Type", "GeometryType"} & set(element.attrib):
-                element.set("GeometryType", "XYZ")
-            yield element
-        elif element.tag == "Topology":
-            yield element
+def _require_plain(data: bytes) -> None:
+    """Refuse XML that declares entities, and pieces, of which meshio would keep the last one."""
+    if b"<!ENTITY" in data:
+        raise PermissionError("it declares entities, which no mesh needs")
+    pieces = len(re.findall(rb"<Piece\s", data))
+    if pieces > 1:
+        raise ValueError(f"it holds {pieces} pieces, and only a mesh in one piece is read")
 
 
 def _described(mesh: Any, arrays: list[Any]) -> dict[str, Any]:

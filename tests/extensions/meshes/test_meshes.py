@@ -109,7 +109,7 @@ def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path: Path, com
 
     text = re.sub(r'format="binary">([^<]*)</DataArray>', append, path.read_text())
     head, end, _ = text.partition("</VTKFile>")
-    appended = b'<AppendedData encoding="raw">_' + raw + b"</AppendedData>"
+    appended = b'<AppendedData encoding="raw">\n _' + raw + b"\n</AppendedData>"
     path.write_bytes(head.encode() + appended + end.encode())
     assert_is_the_section(imported(path, "S9"))
 
