@@ -1,8 +1,83 @@
 """memscal: calibration of stress sensors under an elastic film, and what they measure.
 
-``__init__.pyi`` lists the public names; each is loaded when it is first used.
+Each public name is loaded when it is first used; ``__init__.pyi`` repeats them for type checkers.
 """
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from memscal import extensions
+
+PUBLIC = {
+    "apparatus": ["ApparatusFunction", "load_apparatus"],
+    "axisymmetry.grids": ["EvenGrid", "FieldGrid", "Lattice"],
+    "axisymmetry.kernels": ["GaussianMixture", "RadialKernel", "SmoothedDisc"],
+    "calibration.calibrate": ["Calibration", "calibrate"],
+    "calibration.uncertainty": ["InputEffect"],
+    "deconvolution.fourier_ratio": [
+        "Field",
+        "Quotient",
+        "divide",
+        "fit_gaussian",
+        "lift",
+        "normalise",
+        "reconvolve",
+    ],
+    "errors": ["MemscalError"],
+    "estimation.points": ["ScanPoints"],
+    "formats.reference": ["read_reference", "write_reference"],
+    "formats.scan": ["read_scan", "write_scan"],
+    "formats.stress": ["read_stress"],
+    "formats.tables.scan": ["ImportedScan", "import_table"],
+    "friction.compare": ["compare", "compare_shear"],
+    "friction.results": [
+        "BoundedEstimate",
+        "DryAgainstLubricated",
+        "FrictionComparison",
+        "ImpliedFriction",
+        "InterfaceComparison",
+        "InterfaceLaw",
+        "Interval",
+        "LawComparison",
+        "LoadComparison",
+        "PriorChoice",
+        "ShearComparison",
+    ],
+    "measurement.measure_stress": ["measure_stress"],
+    "measurement.restoration": ["Restoration", "StressComparison"],
+    "measurement.restore": ["restore"],
+    "mechanics.contact": ["Contact"],
+    "mechanics.film_response": ["InterfaceTraction"],
+    "mechanics.indent": ["indent"],
+    "mechanics.interface": ["ExponentialCompliance", "GreenwoodTripp", "Interface", "NormalLaw"],
+    "mechanics.surface": ["FilmField"],
+    "model.apparatus": [
+        "ApparatusField",
+        "ApparatusRadial",
+        "OtherEstimate",
+        "ParameterSet",
+        "Reconvolution",
+        "TransferFunction",
+    ],
+    "model.bayes_factor": ["BayesFactor"],
+    "model.checks": ["Message", "QualityCheck"],
+    "model.field_mesh": ["FieldMesh"],
+    "model.film": ["ElasticFilm"],
+    "model.indenter": ["Cone", "Indenter", "Profile", "Rod", "RoundIndenter", "Sphere"],
+    "model.instrument": ["Equipment", "LoadCell", "StressSensor", "User"],
+    "model.measured_stress": [
+        "MeasuredPoints",
+        "MeasuredProfile",
+        "MeasuredScan",
+        "MeasuredStress",
+    ],
+    "model.positions": ["Places"],
+    "model.provenance": ["Process", "SourceFile"],
+    "model.scan": ["Scan"],
+    "model.stress": ["IdealReference", "StressField", "StressProfile"],
+    "progress": ["Progress"],
+    "version": ["__version__"],
+    **extensions.PUBLIC,
+}
+"""Module: its public names."""
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, submod_attrs=PUBLIC)
