@@ -14,9 +14,7 @@ from matplotlib.figure import Figure
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.calibrate import Calibration
-from memscal.extensions import VIEWS
-from memscal.extensions.fleet import results_summary as fleet_results
-from memscal.extensions.fleet.results import FleetResults
+from memscal.extensions import VIEWS, module
 from memscal.figures.calibration import values_text
 from memscal.figures.friction import comparison_figures
 from memscal.figures.style import render_figure
@@ -146,11 +144,15 @@ def _image(figure: Figure, file_format: str, dpi: float) -> str:
 
 @singledispatch
 def report_of(result: Result) -> Report:
-    """Return what the page of a result says beside its tables."""
+    """Return what the page of a result says beside its tables; its figure's module may state it."""
+    drawn_in = VIEWS[type(result).__name__][1].rpartition(".")[0]
+    if drawn_in.startswith("extensions.") and hasattr(module(drawn_in), "report"):
+        report: Report = module(drawn_in).report(result)
+        return report
     tables: list[Table] = result.tables()
     checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
     title = tables[0].title if tables else type(result).__name__
-    pictures = [Picture(result.plot, title, title)] if VIEWS[type(result).__name__][1] else []
+    pictures = [Picture(result.plot, title, title)] if drawn_in else []
     return Report(title=title, pictures=pictures, checks=checks, messages=messages)
 
 
@@ -282,21 +284,6 @@ def _of_comparison(compared: FrictionComparison | ShearComparison) -> Report:
         checks=checks,
         messages=messages,
         **_of_measurement(measured),
-    )
-
-
-@report_of.register
-def _of_fleet(fleet: FleetResults) -> Report:
-    counts = fleet_results.verdict(fleet)
-    caption = (
-        "a, b: distributions of A and of the Gaussian width fitted to the scan. c: sensors that "
-        "failed each check, and errors by class. d: A over the wafer, or along the batch."
-    )
-    picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
-    title = f"Calibrations of {fleet.name}"
-    failed = bool(fleet.failed)
-    return Report(
-        title=title, verdict=counts, failed=failed, pictures=[picture], messages=fleet.messages
     )
 
 

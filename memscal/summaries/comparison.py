@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.extensions.interface_laws import summary as interface_laws
-from memscal.extensions.interface_laws.summary import friction_name
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import (
     BoundedEstimate,
@@ -24,8 +22,8 @@ from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
-from memscal.model.quantities import MM, measured
-from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members
+from memscal.model.quantities import MM, Quantity, measured
+from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members, plain
 from memscal.summaries.table import (
     Table,
     checks_json,
@@ -74,7 +72,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
             members(records.DRY_AGAINST_LUBRICATED, pair)
             for pair in comparison.dry_against_lubricated
         ],
-        "interface": None if laws is None else interface_laws.mapping(laws),
+        "interface": None if laws is None else laws.to_dict(),
         "macroscopic": None if sliding is None else _sliding(*sliding),
         "checks": checks_json(comparison.checks),
         "overridden": list(comparison.measured.overridden),
@@ -205,7 +203,7 @@ def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
     fit: dict[str, Any] = {} if tested else {"least": None, "p_value": None}
     return {
-        **interface_laws.bounded_json(records.FRICTION, estimate),
+        **bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate, **fit),
         "lubricated_beside": estimate.beside,
         "profile_likelihood": {
@@ -299,7 +297,7 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
-        *([] if comparison.interface is None else interface_laws.tables(comparison.interface)),
+        *([] if comparison.interface is None else comparison.interface.tables()),
         checks_table(worst_checks(comparison.checks)),
     ]
 
@@ -442,3 +440,25 @@ def _lubrication_table(comparison: FrictionComparison) -> Table:
     ]
     head = [load.heading, maximum.heading, relative.words, "χ²/ν of no difference", "p"]
     return Table("Dry less lubricated stress (± standard uncertainty)", head, rows)
+
+
+def friction_name(friction: float) -> str:
+    """Return a friction coefficient as it is typed: ``0.15`` or ``inf``."""
+    return "inf" if math.isinf(friction) else f"{friction:.4g}"
+
+
+def bounded_json(quantity: Quantity, estimate: BoundedEstimate) -> dict[str, Any]:
+    """Return an estimate with its interval; without a value there is a reason."""
+    interval = estimate.interval
+    scale = quantity.scale
+    return {
+        "value": plain(estimate.value, scale),
+        "standard_uncertainty": plain(estimate.standard_uncertainty, scale),
+        "unit": quantity.unit_text,
+        "interval": {
+            "low": plain(interval.low, scale),
+            "high": plain(interval.high, scale),
+            "level": interval.level,
+        },
+        "reason": estimate.reason or None,
+    }

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from memscal.extensions.fleet.results import FleetResults, robust_limit, robust_spread
-from memscal.extensions.fleet.results_summary import error_classes, failures
+from memscal.extensions.fleet.results_summary import error_classes, failures, verdict
+from memscal.figures.report import Picture, Report
 from memscal.figures.style import COLOURS, drawable, legend_above, panels_of
 from memscal.model.arrays import FloatArray
 from memscal.summaries.declared import power_of_ten
@@ -123,3 +124,18 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
                 shown |= {"color": COLOURS[colour], "label": f"{name} ({some.sum()})"}
                 axes.scatter(x[some], y[some], s=max(size, 6.0), marker="x", **shown)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=7)
+
+
+def report(fleet: FleetResults) -> Report:
+    """Return what the page of a fleet says beside its tables."""
+    counts = verdict(fleet)
+    caption = (
+        "a, b: distributions of A and of the Gaussian width fitted to the scan. c: sensors that "
+        "failed each check, and errors by class. d: A over the wafer, or along the batch."
+    )
+    picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
+    title = f"Calibrations of {fleet.name}"
+    failed = bool(fleet.failed)
+    return Report(
+        title=title, verdict=counts, failed=failed, pictures=[picture], messages=fleet.messages
+    )

@@ -1,20 +1,14 @@
 """Laws of the interface and their evidence, as tables and as JSON."""
 
-import math
 from typing import Any
 
 from memscal.friction import results
 from memscal.friction.results import percent
-from memscal.model.quantities import KPA, Quantity
+from memscal.model.quantities import KPA
 from memscal.model.records import BAYES_FACTOR, COMPARED_LAWS, IMPLIED, LAW, PRIOR, SLIP_LENGTH
-from memscal.summaries.declared import members, plain
+from memscal.summaries.comparison import bounded_json, friction_name
+from memscal.summaries.declared import members
 from memscal.summaries.table import Table, texts_of
-
-
-def friction_name(friction: float) -> str:
-    """Return a friction coefficient as it is typed: ``0.15`` or ``inf``."""
-    return "inf" if math.isinf(friction) else f"{friction:.4g}"
-
 
 _STIFFNESS = IMPLIED[-1]
 
@@ -119,20 +113,3 @@ def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:
     names = [quantity.name for quantity in IMPLIED]
     rows = zip(implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True)
     return [members(IMPLIED, implied, **dict(zip(names, row, strict=True))) for row in rows]
-
-
-def bounded_json(quantity: Quantity, estimate: results.BoundedEstimate) -> dict[str, Any]:
-    """Return an estimate with its interval; without a value there is a reason."""
-    interval = estimate.interval
-    scale = quantity.scale
-    return {
-        "value": plain(estimate.value, scale),
-        "standard_uncertainty": plain(estimate.standard_uncertainty, scale),
-        "unit": quantity.unit_text,
-        "interval": {
-            "low": plain(interval.low, scale),
-            "high": plain(interval.high, scale),
-            "level": interval.level,
-        },
-        "reason": estimate.reason or None,
-    }
