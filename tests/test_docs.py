@@ -117,6 +117,16 @@ def test_every_public_name_has_an_example_that_runs_and_a_place_in_the_reference
     assert sorted(listed) == sorted(public)
 
 
+def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, capsys) -> None:
+    monkeypatch.chdir(DOCS.with_name("calibration_data"))
+    names: dict[str, object] = {"__name__": "own_method"}
+    for block in blocks("own_method.md", "python"):
+        exec(compile(block, "own_method.md", "exec"), names)
+    assert "(method richardson-lucy)" in capsys.readouterr().out
+    spiked = memscal.calibrate(names["scan"], method=names["UnsupervisedWiener"]()).apparatus
+    assert [c.name for c in spiked.checks if not c.passed and c.name.startswith("shape_")]
+
+
 @pytest.mark.filterwarnings("ignore:It is not known whether this device:FutureWarning")  # drivers
 def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int

@@ -109,7 +109,7 @@ Examples:
   memscal calibrate scan.h5 --reference fem.h5 --json --sweep
   memscal calibrate scan.h5 --reference disc:0.5mm
   memscal calibrate scan.h5 --reference beam.png --pixel-size 5um
-  memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
+  memscal calibrate scan.h5 --method tikhonov --option amplitude=0.5
   memscal calibrate scan.h5 --method bayesian --monte-carlo 1000
   memscal calibrate scan.h5 --channel xz
 """
@@ -158,8 +158,8 @@ calibration_options = options_of(
         "Whose A and G are written: bayesian (from the scan's points: the more precise, for "
         "friction), or a division of the smoothed voltages by the stress: white-noise (the "
         "paper's, as its exact expectation), white-noise-draw (one seeded draw, as published), "
-        "tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a plug-in's. The other of "
-        "bayesian and division is computed, too, and stands beside it.  [default: white-noise]"
+        "tikhonov, wiener, or a plug-in's. The other of bayesian and division is computed, too, "
+        "and stands beside it.  [default: white-noise]"
     ),
     option("--centre", click.Choice(("common", "per-repeat")))(
         "Whether the repeats of a scan share their centre, or each has a centre, baseline and "

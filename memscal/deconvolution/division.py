@@ -1,8 +1,8 @@
 r"""Methods of division, for the paper's :math:`A\hat G = \hat U_{zz}/\hat\sigma_{zz}` (Eq. 2).
 
 Both transforms vanish at large wavenumbers, and methods differ in their quotient there: by a
-window on the spectra (the paper's white noise, Tikhonov's), or by a classical restoration of an
-image, by scikit-image or its algorithm.  Other packages add methods under an entry point.
+window on the spectra (the paper's white noise, Tikhonov's), or by scikit-image's Wiener filter of
+an image.  Other packages add methods under an entry point: docs/own_method.md.
 The voltage is the measured one, smoothed (:mod:`memscal.estimation.smoothing`).  Method
 ``bayesian`` divides nothing (:mod:`memscal.estimation.bayesian`).
 """
@@ -54,6 +54,15 @@ class DivisionProblem:
     def reference_spectrum(self) -> FloatArray:
         """Transform of the base stress, dimensionless."""
         return self.grid.forward(self.reference) if self.transform is None else self.transform
+
+    def images(self) -> tuple[FloatArray, FloatArray, float]:
+        """Image of order one, point spread function of sum one, and the scale of their quotient."""
+        image = self.grid.to_image(self.voltage)
+        spread = self.grid.to_image(self.reference)
+        peak = float(np.abs(image).max())
+        total = float(spread.sum())
+        # u = sum(g * spread) * cell area, with image / peak and spread / total.
+        return image / peak, spread / total, peak / (total * self.grid.cell_area)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +137,8 @@ class _Own:
                 "number.",
                 cure="It is a factor on the rule's own choice: 1 keeps that, 2 doubles the noise.",
             )
-        for option, least in (("seed", 0), ("iterations", 1)):
-            if option in options:
-                require_count(self.name, option, options[option], least)
+        if "seed" in options:
+            require_count(self.name, "seed", options["seed"], 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,17 +206,6 @@ class Tikhonov(_Own):
         return filtered_division(problem, power / (power + alpha))
 
 
-def _images(problem: DivisionProblem) -> tuple[FloatArray, FloatArray, float]:
-    """Image of order one, point spread function of sum one, and the scale of their quotient."""
-    grid = problem.grid
-    image = grid.to_image(problem.voltage)
-    spread = grid.to_image(problem.reference)
-    peak = float(np.abs(image).max())
-    total = float(spread.sum())
-    # u = sum(g * spread) * cell area, with image / peak and spread / total.
-    return image / peak, spread / total, peak / (total * grid.cell_area)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Wiener(_Own):
     """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
@@ -225,7 +222,7 @@ class Wiener(_Own):
         from skimage.restoration import wiener
         from skimage.restoration.uft import laplacian
 
-        blurred, spread, scale = _images(problem)
+        blurred, spread, scale = problem.images()
         penalty = np.abs(laplacian(2, blurred.shape)[0])
         spectrum = np.abs(np.fft.rfft2(np.fft.ifftshift(spread)))
         weakest = problem.weakest_reference / (
@@ -237,62 +234,13 @@ class Wiener(_Own):
         return image_division(problem, wiener(blurred, spread, balance, clip=False) * scale)
 
 
-@dataclass(frozen=True, kw_only=True)
-class UnsupervisedWiener(_Own):
-    """Wiener-Hunt restoration whose two precisions are sampled with the image."""
-
-    seed: int = 0  # seed of the Gibbs sampler
-    name: ClassVar[str] = "unsupervised-wiener"
-    assumes: ClassVar[str] = "The noise of the field is white, and G is smooth."
-    fails: ClassVar[str] = (
-        "The noise of a lifted line scan is not white: almost no regularisation may be chosen."
-    )
-
-    def divide(self, problem: DivisionProblem) -> Division:
-        """Divide by scikit-image's unsupervised Wiener-Hunt restoration."""
-        from skimage.restoration import unsupervised_wiener
-
-        blurred, spread, scale = _images(problem)
-        restored, _ = unsupervised_wiener(blurred, spread, clip=False, rng=self.seed)
-        return image_division(problem, restored * scale)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RichardsonLucy(_Own):
-    """Richardson-Lucy restoration: multiplicative steps that keep G positive."""
-
-    iterations: int = 50  # number of steps; more of them resolve finer detail, then noise
-    name: ClassVar[str] = "richardson-lucy"
-    assumes: ClassVar[str] = "G is nowhere negative; the noise is a counting noise."
-    fails: ClassVar[str] = (
-        "Stopping is the regularisation: too early is too wide, too late is ripples."
-    )
-
-    def divide(self, problem: DivisionProblem) -> Division:
-        """Divide by steps on the grid's own transforms: 20 times faster than scikit-image's."""
-        # Periodic, where scikit-image pads with zeros: G differs by 0.5 % of its maximum.
-        grid = problem.grid
-        reference = problem.reference
-        voltage = np.maximum(problem.voltage, 0.0)
-        backward = np.conj(problem.reference_spectrum) / grid.integrate(reference)
-        field = np.full_like(voltage, voltage.max())
-        for _ in range(self.iterations):
-            predicted = grid.convolve(field, reference)
-            # Pixels that are dark beside the brightest are left out of a step.
-            positive = predicted > 1e-12 * voltage.max()
-            ratio = np.divide(voltage, predicted, out=np.zeros_like(voltage), where=positive)
-            field = field * grid.inverse(backward * grid.forward(ratio))
-        return image_division(problem, grid.to_image(field))
-
-
 ENTRY_POINT_GROUP = "memscal.regularisers"
-_METHODS: tuple[Any, ...] = (
-    *(WhiteNoise, Bayesian, WhiteNoiseDraw, Tikhonov),
-    *(Wiener, UnsupervisedWiener, RichardsonLucy),
-)
+_METHODS: tuple[Any, ...] = (WhiteNoise, Bayesian, WhiteNoiseDraw, Tikhonov, Wiener)
 _OWN = {method.name: method for method in _METHODS}
 #: Former names, which are accepted but no longer printed.
 _ALIASES = {"evidence": "bayesian"}
+#: Methods of earlier versions, whose artifacts are still read.
+_LEFT = ("unsupervised-wiener", "richardson-lucy")
 
 
 def regulariser_names() -> tuple[str, ...]:
@@ -335,8 +283,10 @@ def _factory(name: str) -> Any:
         return _OWN[name]
     points = [point for point in _plug_ins() if point.name == name]
     if not points:
-        problem = f"There is no method named {name}."
-        raise InputError(problem, cure=f"Choose from {', '.join(regulariser_names())}.")
+        cure = f"Choose from {', '.join(regulariser_names())}."
+        if name in _LEFT:
+            cure = f"{cure} docs/own_method.md adds {name} again, by scikit-image."
+        raise InputError(f"There is no method named {name}.", cure=cure)
     try:
         return points[0].load()
     except Exception as error:

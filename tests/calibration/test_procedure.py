@@ -267,12 +267,11 @@ def shapely(scan: memscal.Scan, method: str, seed: int = 0) -> bool:
     return all(passed)
 
 
-@pytest.mark.parametrize("method", ["white-noise-draw", "unsupervised-wiener"])
-def test_ripples_and_spikes_are_no_sound_shape(method: str) -> None:
-    # All of 450 and 225 simulated scans failed, while A and the reconvolution were right.
+def test_ripples_are_no_sound_shape() -> None:
+    # All of 450 simulated scans failed, while A and the reconvolution were right.
     kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
     for seed in range(3):
-        assert not shapely(simulated(kernel=kernel, seed=seed), method, seed)
+        assert not shapely(simulated(kernel=kernel, seed=seed), "white-noise-draw", seed)
 
 
 def test_a_raster_may_miss_whole_rows_and_columns() -> None:

@@ -59,8 +59,6 @@ CASES: dict[str, tuple[Sequence[Scan], dict[str, object]]] = {
     "white-noise-draw": ([simulated(**LINE)], {"method": "white-noise-draw", "seed": 3}),
     "tikhonov": ([simulated(**LINE)], {"method": "tikhonov"}),
     "wiener": ([simulated(**LINE, kernel=TAILS)], {"method": "wiener"}),
-    "unsupervised-wiener": ([simulated(**LINE)], {"method": "unsupervised-wiener"}),
-    "richardson-lucy": ([simulated(**LINE)], {"method": "richardson-lucy", "iterations": 2}),
     "raster": ([simulated(**LINE, raster=True, points=15)], {}),
     "loads": ([simulated(**LINE, load=[0.5, 1.0], repeats=2)], {"method": "evidence"}),
     "films": ([simulated(**LINE), simulated(**(LINE | {"film": THICKER}), seed=1)], {}),
