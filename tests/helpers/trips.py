@@ -1,4 +1,4 @@
-"""Functions of the package that the main jobs run, counted in a process that has run none before."""
+"""Functions of the package that each main job runs, counted in a process that ran none before."""
 
 import importlib
 import json
