@@ -70,7 +70,7 @@ PUBLIC = {
         "MeasuredScan",
         "MeasuredStress",
     ],
-    "model.positions": ["Places"],
+    "model.places": ["Places"],
     "model.provenance": ["Process", "SourceFile"],
     "model.scan": ["Scan"],
     "model.stress": ["IdealReference", "StressField", "StressProfile"],

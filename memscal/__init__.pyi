@@ -89,7 +89,7 @@ from .model.measured_stress import MeasuredPoints as MeasuredPoints
 from .model.measured_stress import MeasuredProfile as MeasuredProfile
 from .model.measured_stress import MeasuredScan as MeasuredScan
 from .model.measured_stress import MeasuredStress as MeasuredStress
-from .model.positions import Places as Places
+from .model.places import Places as Places
 from .model.provenance import Process as Process
 from .model.provenance import SourceFile as SourceFile
 from .model.scan import Scan as Scan

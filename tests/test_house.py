@@ -27,6 +27,7 @@ FLOW = [
     "parallel",
     "progress",
     "model",
+    "readings",
     "axisymmetry",
     "mechanics",
     "estimation",
@@ -127,7 +128,7 @@ def without_types(tree: ast.Module) -> ast.Module:
 
 def allowed_rooms(importer: str) -> set[str]:
     if importer == "formats":
-        return {"version", "errors", "parallel", "progress", "model", "formats"}
+        return {*FLOW[: FLOW.index("readings") + 1], "formats"}
     earlier = set(FLOW[: FLOW.index(importer) + 1])
     return earlier | ({"formats"} if importer in USERS_OF_FORMATS else set())
 

@@ -24,8 +24,8 @@ from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Rod
-from memscal.model.positions import mistaken_unit
 from memscal.model.scan import Scan
+from memscal.readings.mistaken_unit import mistaken_unit
 
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
 _MISFIT = 0.03

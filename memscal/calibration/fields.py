@@ -21,7 +21,8 @@ from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
 from memscal.estimation.smoothing import Band, SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
-from memscal.model.positions import EvenAxis, even_lattice
+from memscal.model.places import EvenAxis
+from memscal.readings.find_places import even_lattice
 
 _POINTS_PER_WIDTH = 6.0
 #: Points within the support are multiples of this, so that scans of one layout share their grid.

@@ -20,13 +20,15 @@ from numpy.typing import NDArray
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
 from memscal.model.arrays import FloatArray
-from memscal.model.correlation import across, of_points, root_of
+from memscal.model.correlation import is_banded, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.positions import Places, places_of, rise_of
+from memscal.model.places import Places
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Record
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_LINES, MOST_OF_RASTER, too_large
+from memscal.readings.find_places import places_of
+from memscal.readings.mistaken_unit import rise_of
 
 #: Channels that measure the shear along x and along y.
 TANGENTIAL = ("xz", "yz")
@@ -468,3 +470,11 @@ def accepted_differences(
             "command line): that is recorded.",
         )
     return list(dict.fromkeys(differences))
+
+
+def across(correlation: FloatArray, group: NDArray[np.intp]) -> bool:
+    """Whether points of different groups (n,) are correlated."""
+    if not is_banded(correlation):
+        return bool(correlation[np.not_equal.outer(group, group)].any())
+    columns = range(1, correlation.shape[1])
+    return any(bool(correlation[:-j, j][group[j:] != group[:-j]].any()) for j in columns)

@@ -18,11 +18,11 @@ from memscal.mechanics.tabulated_rod import largest_tabulated_load
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.indenter import Rod
-from memscal.model.positions import require_plausible
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan, SetUp
 from memscal.model.stress import StressProfile
 from memscal.progress import counted
+from memscal.readings.mistaken_unit import require_plausible
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0

@@ -26,8 +26,8 @@ from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED, channel_indic
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, Reconvolution
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import failed_check_messages
-from memscal.model.positions import even_lattice
 from memscal.model.quantities import ESTIMATED, KPA, MM, PER_MM, PER_MM2, measured_text
+from memscal.readings.find_places import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
 _MOST_DRAWN = 5_000  # points of lines

@@ -19,12 +19,12 @@ from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
-from memscal.model.positions import require_span
 from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CORRELATED_CONTACT
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, counted, reported
+from memscal.readings.mistaken_unit import require_span
 
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale", "load")

@@ -35,7 +35,7 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Load
 from memscal.model.arrays import FloatArray
-from memscal.model.correlation import scaled
+from memscal.model.correlation import is_banded
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
@@ -458,3 +458,15 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     budget = {source: float(np.linalg.norm(change)) for source, change in changes.items()}
     noise = float(row @ posterior.covariances["scan"][:nodes, :nodes] @ row)
     return maximum, {"noise": float(np.sqrt(max(noise, 0.0))), **budget}
+
+
+def scaled(correlation: FloatArray, factors: FloatArray) -> FloatArray:
+    """Multiply the correlation of each pair of points by a factor (n,) of both."""
+    if not is_banded(correlation):
+        product = correlation * np.outer(factors, factors)
+        np.fill_diagonal(product, 1.0)
+        return product
+    product = correlation.copy()
+    for j in range(1, correlation.shape[1]):
+        product[:-j, j] *= factors[:-j] * factors[j:]
+    return product

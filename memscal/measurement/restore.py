@@ -25,12 +25,12 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
-from memscal.model.positions import require_span
 from memscal.model.provenance import accepted_alterations
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CONTACT, too_large
 from memscal.parallel import single_threaded
+from memscal.readings.mistaken_unit import require_span
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
 _OF_THE_FILM = (

@@ -88,26 +88,6 @@ def of_points(correlation: FloatArray, kept: NDArray[np.intp]) -> FloatArray:
     return whole
 
 
-def scaled(correlation: FloatArray, factors: FloatArray) -> FloatArray:
-    """Multiply the correlation of each pair of points by a factor (n,) of both."""
-    if not is_banded(correlation):
-        product = correlation * np.outer(factors, factors)
-        np.fill_diagonal(product, 1.0)
-        return product
-    product = correlation.copy()
-    for j in range(1, correlation.shape[1]):
-        product[:-j, j] *= factors[:-j] * factors[j:]
-    return product
-
-
-def across(correlation: FloatArray, group: NDArray[np.intp]) -> bool:
-    """Whether points of different groups (n,) are correlated."""
-    if not is_banded(correlation):
-        return bool(correlation[np.not_equal.outer(group, group)].any())
-    columns = range(1, correlation.shape[1])
-    return any(bool(correlation[:-j, j][group[j:] != group[:-j]].any()) for j in columns)
-
-
 def root_of(correlation: FloatArray) -> FloatArray:
     """Lower Cholesky factor L: (n, n), or its diagonals (w, n), the main one first."""
     from scipy.linalg import cholesky_banded

@@ -7,8 +7,8 @@ import pytest
 
 import memscal
 from memscal.errors import InputError
-from memscal.model.holds import find_holds
 from memscal.model.notation import VOLTS
+from memscal.readings.find_holds import find_holds
 
 PLACES = np.linspace(-8e-3, 8e-3, 33)
 SIGNAL = 15e-3 * np.exp(-((PLACES / 1.2e-3) ** 2))

@@ -34,11 +34,11 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
-from memscal.model.positions import require_plausible
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 from memscal.progress import counted, counter, hushed
+from memscal.readings.mistaken_unit import require_plausible
 
 #: As many as a simulated scan may have.
 MOST_POSITIONS = 4096

@@ -14,14 +14,15 @@ from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.text_table import Wanted
 from memscal.formats.units import reading_of, to_si
 from memscal.model.checks import Message, import_notes, marked_texts
-from memscal.model.holds import find_holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
-from memscal.model.positions import places_of, require_plausible, require_recorded, require_span
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
+from memscal.readings.find_holds import find_holds
+from memscal.readings.find_places import places_of
+from memscal.readings.mistaken_unit import require_plausible, require_recorded, require_span
 
 Column = str | int
 Columns = dict[str, NDArray[Any]]

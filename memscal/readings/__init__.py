@@ -1,0 +1,1 @@
+"""Readings of a scan, before anything is fitted: holds of a log, places, lengths and units."""

@@ -1,0 +1,140 @@
+"""Holds in the log of an instrument: rows in which the indenter presses at rest, averaged."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from memscal.errors import InputError
+from memscal.model.arrays import FloatArray
+from memscal.model.holds import Holds
+from memscal.model.notation import Reading
+
+#: The indenter moves where its position changes, from one row to the next, by more than this share
+#: of the whole way, and presses where the load is above this share of the way from lifted to held.
+_MOVING = 1e-3
+_PRESSED = 0.05
+#: A load that never falls below this share of the largest is never lifted.
+_LIFTED = 0.5
+#: Load and reading are steady within this share, or so many standard deviations of their noise.
+_STEADY = 0.02
+_NOISE = 5.0
+_TO_SIGMA = 1.4826 / np.sqrt(2)
+#: Fewer rows do not tell the scatter.
+_FEWEST = 5
+_LOGGED = ("x", "y", "u_zz", "normal_load")
+_CURE = (
+    "Check the columns of position, load and reading; name the column of the load "
+    "(load_column=...; --load-column COLUMN), which tells best when the indenter presses."
+)
+
+
+def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: Reading) -> Holds:
+    """Find the holds in the columns of a log, which are in the order of time."""
+    whole = np.logical_and.reduce([np.isfinite(columns[n]) for n in _LOGGED if n in columns])
+    columns = {name: values[whole] for name, values in columns.items()}
+    line = line[whole]
+    u = columns["u_zz"]
+    load = columns.get("normal_load")
+    if u.size < _FEWEST:
+        raise InputError(f"The log has {u.size} rows without gaps.", cure=_CURE)
+    position = columns["x"] + 1j * columns.get("y", np.zeros(u.size))
+    way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
+    dwell = np.append(0, np.cumsum(np.abs(np.diff(position)) > _MOVING * way))
+    pressed = _timed(u, dwell) if load is None else _loaded(load)
+    level = float(np.median(u[~pressed])) if not pressed.all() else 0.0
+    starts = np.flatnonzero(np.diff(np.where(pressed, dwell, -1), prepend=-1))
+    runs = [run for run in np.split(np.arange(u.size), starts) if run.size and pressed[run[0]]]
+    for values, lifted, share in ((load, 0.0, 0.75), (u, level, 0.5)):
+        if values is not None:  # of a load's run the ramps are below the hold
+            near = _NOISE * _noise(values[pressed])
+            runs = [run[_steady(values[run], lifted, share, near)] for run in runs if run.size]
+    held = [run for run in runs if run.size >= _FEWEST]
+    if not held:
+        why = f"A hold is {_FEWEST} rows or more in which position, load and reading are steady."
+        raise InputError("The log has no hold.", why=why, cure=_CURE)
+    return _averaged(columns, line, held, len(runs) - len(held), reading)
+
+
+def _averaged(
+    columns: Mapping[str, FloatArray],
+    line: NDArray[Any],
+    held: list[NDArray[np.intp]],
+    left_out: int,
+    reading: Reading,
+) -> Holds:
+    """Average all columns over the rows of each hold, and say what the readings scatter by."""
+    first, stop = np.array([(run[0], run[-1] + 1) for run in held]).T
+    u = columns["u_zz"]
+    mean = {
+        name: np.array([values[run].mean() for run in held]) for name, values in columns.items()
+    }
+    for name in mean.keys() & {"repeat", "branch"}:
+        mean[name] = columns[name][first]
+    apart = [u[run] - u[run].mean() for run in held]
+    size = stop - first
+    scatter = np.array([np.std(e, ddof=1) for e in apart])
+    # Noise of neighbouring rows is correlated where an amplifier filters it (autoregression).
+    total = sum(float(e @ e) for e in apart) or 1.0
+    correlation = sum(float(e[1:] @ e[:-1]) for e in apart) / total + 1 / np.median(size)
+    correlation = float(np.clip(correlation, 0.0, 0.95))
+    # A few rows may agree by chance: no hold counts as less noisy than the typical one.
+    single = np.maximum(scatter, np.median(scatter)) * np.sqrt(
+        (1 + correlation) / (1 - correlation)
+    )
+    errors = single / np.sqrt(size)
+    change = np.array([u[r[-(r.size // 3) :]].mean() - u[r[: r.size // 3]].mean() for r in held])
+    usual, u_mean, changes = (reading.text(np.median(v)) for v in (scatter, errors, change))
+    found = (
+        f"{len(held)} holds of {size.min()} to {size.max()} rows, the first in lines "
+        f"{line[first[0]]} to {line[stop[0] - 1]}, are averaged to one reading each; "
+        f"{left_out} presses of fewer than {_FEWEST} steady rows are left out."
+    )
+    scatters = (
+        f"Within a hold the readings scatter by {usual}, neighbouring rows correlate by "
+        f"{correlation:.2g}, and the mean has the standard uncertainty {u_mean} (medians)."
+    )
+    changed = (
+        f"From the first to the last third of a hold the readings change by {changes} (median; at "
+        f"most by {reading.text(np.abs(change).max())})."
+    )
+    log = {name: columns[name] for name in _LOGGED if name in columns}
+    return Holds(log, line, first, stop, mean, errors, reading, (found, scatters, changed))
+
+
+def _loaded(load: FloatArray) -> NDArray[np.bool_]:
+    """Tell from the load in which rows the indenter presses."""
+    lifted, held = np.quantile(load, [0.01, 0.99])
+    return np.asarray((lifted > _LIFTED * held) | (load > lifted + _PRESSED * (held - lifted)))
+
+
+def _timed(u: FloatArray, dwell: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Tell from the readings when the indenter presses, after it came to rest at a place."""
+    # Far from the sensor no reading tells: the times at the others' places, all alike, do.
+    starts = np.flatnonzero(np.diff(dwell, prepend=-1))
+    size = np.diff(starts, append=u.size)
+    time = (np.arange(u.size) - starts[dwell]) / size[dwell]
+    spans = []
+    for a, n in zip(starts, size, strict=True):
+        low, high = np.quantile(u[a : a + n], [0.05, 0.95])
+        if n >= _FEWEST and high - low > 2 * _NOISE * _noise(u[a : a + n]):
+            spans.append(time[a : a + n][u[a : a + n] > (low + high) / 2][[0, -1]])
+    begins, ends = np.array(spans or [(0.0, 1.0)]).T
+    begin = np.quantile(begins, 0.9)
+    end = np.quantile(ends, 0.1)
+    if end - begin < _PRESSED:
+        why = "The readings rise at other times at each place."
+        raise InputError("The log does not show when the indenter presses.", why=why, cure=_CURE)
+    return np.asarray((time >= begin) & (time <= end) & (size[dwell] >= _FEWEST))
+
+
+def _noise(values: FloatArray) -> float:
+    return float(np.median(np.abs(np.diff(values)))) * _TO_SIGMA if values.size > 1 else 0.0
+
+
+def _steady(values: FloatArray, lifted: float, share: float, near: float) -> slice:
+    """Return the rows from the first to the last that is close to the quantile of a share."""
+    held = float(np.quantile(values, share))
+    inside = np.flatnonzero(np.abs(values - held) <= max(near, _STEADY * abs(held - lifted)))
+    return slice(inside[0], inside[-1] + 1) if inside.size else slice(0)
