@@ -50,7 +50,6 @@ from .friction.results import InterfaceLaw as InterfaceLaw
 from .friction.results import Interval as Interval
 from .friction.results import LawComparison as LawComparison
 from .friction.results import LoadComparison as LoadComparison
-from .friction.results import PriorChoice as PriorChoice
 from .friction.results import ShearComparison as ShearComparison
 from .measurement.measure_stress import measure_stress as measure_stress
 from .measurement.restoration import Restoration as Restoration

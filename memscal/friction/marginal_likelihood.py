@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import logsumexp
@@ -122,29 +121,16 @@ def _compressed(tables: Sequence[Tables]) -> list[Tables]:
     ]
 
 
-@dataclass(frozen=True)
-class Prior:
-    """A prior of a parameter that is not negative: its range in words, its share below values."""
-
-    words: str
-    below: Callable[[FloatArray], FloatArray]
-
-    def weights(self, edges: FloatArray) -> FloatArray:
-        """Return the prior's share of the cells between edges, shape (m + 1,) to (m,)."""
-        return np.asarray(np.diff(self.below(edges)))
+Prior: TypeAlias = Callable[[FloatArray], FloatArray]
+"""The share of a prior below values of a parameter that is not negative."""
 
 
-def bounded_prior(scale: float, words: str) -> Prior:
+def bounded_prior(scale: float) -> Prior:
     """Return the prior that is uniform in the bounded coordinate about a ``scale``."""
-    return Prior(words, lambda values: bounded(values, scale))
+    return lambda values: bounded(values, scale)
 
 
-def log_uniform_prior(low: float, high: float, words: str) -> Prior:
+def log_uniform_prior(low: float, high: float) -> Prior:
     """Return the prior that gives each decade from ``low`` to ``high`` the same share."""
     whole = math.log(high / low)
-    return Prior(words, lambda values: np.asarray(np.log(np.clip(values, low, high) / low) / whole))
-
-
-def uniform_prior(high: float, words: str) -> Prior:
-    """Return the prior that is uniform from 0 to ``high``."""
-    return Prior(words, lambda values: np.asarray(np.clip(values, 0.0, high) / high))
+    return lambda values: np.asarray(np.log(np.clip(values, low, high) / low) / whole)

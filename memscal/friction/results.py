@@ -281,19 +281,6 @@ class InterfaceLaw:
     p_value: float
 
 
-@dataclass(frozen=True)
-class PriorChoice:
-    """The logarithm of the yielding law's Bayes factor over the rigid one under another prior.
-
-    It is negative where the data favour the rigid law, ``against``; ``prior`` is in words with its
-    range.
-    """
-
-    prior: str
-    log_factor: float
-    against: str = ""
-
-
 @dataclass(frozen=True, eq=False)
 class ImpliedFriction:
     r"""What the fitted slip length means at each of ``loads`` (l,), in N, increasing.
@@ -314,9 +301,8 @@ class ImpliedFriction:
 class LawComparison:
     """Laws of the interface over all ``loads`` (l,), in N, of one lubrication.
 
-    The last of ``laws`` yields over ``length``; ``factors`` weigh it against each of the others,
-    ``priors`` do under other priors.  ``implied`` says what a slip length means at
-    each load; it is ``None`` of a normal law.
+    The last of ``laws`` yields over ``length``; ``factors`` weigh it against each of the others.
+    ``implied`` says what a slip length means at each load; it is ``None`` of a normal law.
     """
 
     lubrication: str
@@ -324,21 +310,19 @@ class LawComparison:
     laws: tuple[InterfaceLaw, ...]
     factors: tuple[BayesFactor, ...]
     length: BoundedEstimate
-    priors: tuple[PriorChoice, ...]
     implied: ImpliedFriction | None = None
 
     @property
     def yielding_preferred(self) -> bool:
-        """Whether the evidence for the law that yields is positive, by likelihood and priors, too.
+        """Whether the evidence for the law that yields is positive, and its likelihood larger.
 
-        Its largest likelihood is above that of every law with as many parameters or fewer, and no
-        other prior turns the evidence.
+        Its largest likelihood is above that of every law with as many parameters or fewer.
         """
         *others, yielding = self.laws
         evident = 2 * (yielding.log_evidence - max(law.log_evidence for law in others)) >= POSITIVE
         rivals = [law for law in others if len(law.best) <= len(yielding.best)]
         likelier = all(yielding.log_likelihood > law.log_likelihood for law in rivals)
-        return evident and likelier and all(prior.log_factor > 0 for prior in self.priors)
+        return evident and likelier
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -411,7 +411,6 @@ BAYES_FACTOR = (
     Quantity("words", "text", "evidence"),
     Quantity("log_likelihood_ratio", _COUNT, "ln of the ratio of the largest likelihoods"),
 )
-PRIOR = (Quantity("against", "text", "law"), Quantity("prior", "text", "prior"), BAYES_FACTOR[2])
 COMPARED_LAWS = (
     Quantity("lubrication", "text", "dry or lubricated"),
     Quantity("loads", "force", "loads", axes=_PER_LOAD),

@@ -211,9 +211,8 @@ def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: A
     estimate = memscal.BoundedEstimate(
         length, 0.1 * length, interval, "", lengths, chi_square, least=120.0, unit="m"
     )
-    prior = memscal.PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4)
     loads = np.array(LOADS)
-    return memscal.LawComparison(lubrication, loads, laws, (factor,), estimate, (prior,), implied)
+    return memscal.LawComparison(lubrication, loads, laws, (factor,), estimate, implied)
 
 
 def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memscal.BoundedEstimate:

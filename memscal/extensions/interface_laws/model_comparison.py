@@ -38,7 +38,6 @@ from memscal.friction.marginal_likelihood import (
     evidence_of_one,
     log_likelihood,
     log_uniform_prior,
-    uniform_prior,
 )
 from memscal.friction.results import (
     BoundedEstimate,
@@ -47,22 +46,20 @@ from memscal.friction.results import (
     InterfaceLaw,
     Interval,
     LawComparison,
-    PriorChoice,
 )
 from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
 
-#: Slip lengths that are thought possible: of the order of the roughness of surfaces that touch.
+#: Slip lengths that are thought possible, in m: about the roughness of surfaces that touch.
 _SLIP_LENGTHS = (1e-7, 1e-4)
-#: Other ranges of them, whose Bayes factors are stated beside.
-_OTHER_SLIP_LENGTHS = ((1e-6, 1e-5), (1e-8, 1e-3))
-#: Over these the likelihood is looked at.
-_WIDEST = _OTHER_SLIP_LENGTHS[-1]
-_DECADES = 81
-#: Lengths of the normal law, as shares of the largest that was calculated.
+#: Lengths of the normal law that are, as shares of the largest that was calculated.
 _NORMAL_SHARES = (1e-2, 1.0)
+#: The likelihood is calculated over a wider range, at as many lengths.
+_SLIP_LENGTHS_CALCULATED = (1e-8, 1e-3)
+_NORMAL_SHARES_CALCULATED = (1e-3, 1.0)
+_LENGTHS = 81
 _UM = 1e-6
 
 
@@ -70,28 +67,18 @@ def weigh_slip_length(
     rigid: Measured, slipping: Measured, *, macroscopic: float, lubrication: str = "dry"
 ) -> LawComparison:
     """Weigh a slip length (``slipping``) against effective coefficients of a rigid interface."""
-    of_friction = bounded_prior(rigid.family.scale, f"uniform in mu/(mu + {rigid.family.scale:g})")
-    of_length = _log_prior("slip length", *_SLIP_LENGTHS)
-    of_all = curve(rigid)
-    along = curve(slipping, also=np.geomspace(*_WIDEST, _DECADES))
+    friction_prior = bounded_prior(rigid.family.scale)
+    length_prior = log_uniform_prior(*_SLIP_LENGTHS)
     degrees = rigid.degrees
-    laws = [one_of_all("effective Amontons, one coefficient", of_all, of_friction, degrees)]
-    of_each: list[LawCurve] = []
+    name = "effective Amontons, one coefficient"
+    laws = [one_of_all(name, curve(rigid), friction_prior, degrees)]
     if len(rigid.points) > 1:
         of_each = [curve(rigid, load=j) for j in range(len(rigid.points))]
         name = "effective Amontons, one for each load"
-        laws.append(one_of_each(name, of_each, of_friction, degrees))
+        laws.append(one_of_each(name, of_each, friction_prior, degrees))
+    along = curve(slipping, also=np.geomspace(*_SLIP_LENGTHS_CALCULATED, _LENGTHS))
     name = f"elasto-plastic at {macroscopic:g}, slip length"
-    laws.append(one_of_all(name, along, of_length, degrees))
-    priors = _other_priors(
-        laws[0].name, of_all, along, of_friction, of_length, slipping.family.scale
-    )
-    if of_each:
-        evidence = along.log_evidence(of_length)
-        priors += [
-            PriorChoice(prior.words, evidence - _of_each(of_each, prior)[0], laws[1].name)
-            for prior in _OTHER_FRICTIONS
-        ]
+    laws.append(one_of_all(name, along, length_prior, degrees))
     length = interface_length(along, slipping.family, "slip length")
     return LawComparison(
         lubrication=lubrication,
@@ -99,7 +86,6 @@ def weigh_slip_length(
         laws=tuple(laws),
         factors=_factors(laws),
         length=length,
-        priors=tuple(priors),
         implied=implied_friction(rigid, slipping, length, macroscopic),
     )
 
@@ -107,18 +93,14 @@ def weigh_slip_length(
 def weigh_normal_compliance(measured: Measured) -> LawComparison:
     """Weigh a normal compliance against a rigid interface, both without friction."""
     largest = float(measured.family.values[-1])
-    low, high = (share * largest for share in _NORMAL_SHARES)
-    prior = _log_prior("length", low, high)
-    others = (
-        _log_prior("length", low / 10, high),
-        uniform_prior(high, f"length uniform up to {high / _UM:.3g} um"),
-    )
-    along = curve(measured, also=np.geomspace(low / 10, high, _DECADES))
+    prior = log_uniform_prior(*(share * largest for share in _NORMAL_SHARES))
+    low, high = (share * largest for share in _NORMAL_SHARES_CALCULATED)
+    along = curve(measured, also=np.geomspace(low, high, _LENGTHS))
     top = float(along.log_likelihood[0])
     least = float(along.chi_square[0])
     degrees = measured.degrees
-    name = "rigid, frictionless"
-    rigid = InterfaceLaw(name, (), top, top, 0.0, least, degrees, _p_value(degrees, least))
+    p_value = _p_value(degrees, least)
+    rigid = InterfaceLaw("rigid, frictionless", (), top, top, 0.0, least, degrees, p_value)
     yielding = one_of_all("normal compliance, length", along, prior, degrees)
     return LawComparison(
         lubrication="lubricated",
@@ -126,46 +108,7 @@ def weigh_normal_compliance(measured: Measured) -> LawComparison:
         laws=(rigid, yielding),
         factors=_factors([rigid, yielding]),
         length=interface_length(along, measured.family, "length of the normal law"),
-        priors=tuple(
-            PriorChoice(p.words, along.log_evidence(p) - rigid.log_evidence, name)
-            for p in (prior, *others)
-        ),
     )
-
-
-def _log_prior(what: str, low: float, high: float) -> Prior:
-    words = f"{what} log-uniform from {low / _UM:.3g} to {high / _UM:.3g} um"
-    return log_uniform_prior(low, high, words)
-
-
-_OTHER_FRICTIONS = (
-    uniform_prior(2.0, "coefficient uniform from 0 to 2"),
-    log_uniform_prior(0.01, 10, "coefficient log-uniform, 0.01 to 10"),
-)
-
-
-def _other_priors(
-    law: str,
-    rigid: LawCurve,
-    slipping: LawCurve,
-    of_friction: Prior,
-    of_length: Prior,
-    scale: float,
-) -> list[PriorChoice]:
-    """Weigh the slip length against one coefficient under the usual priors and under others."""
-    pairs = [(of_length, of_friction)]
-    pairs += [(_log_prior("slip length", *ends), of_friction) for ends in _OTHER_SLIP_LENGTHS]
-    words = f"slip length uniform in l/(l + {scale / _UM:.3g} um)"
-    pairs.append((bounded_prior(scale, words), of_friction))
-    pairs += [(of_length, other) for other in _OTHER_FRICTIONS]
-    return [
-        PriorChoice(
-            (of_slip if of_mu is of_friction else of_mu).words,
-            slipping.log_evidence(of_slip) - rigid.log_evidence(of_mu),
-            law,
-        )
-        for of_slip, of_mu in pairs
-    ]
 
 
 def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
@@ -327,7 +270,7 @@ class LawCurve:
 
     def log_evidence(self, prior: Prior) -> float:
         """Return the logarithm of the likelihood averaged over a prior."""
-        return evidence_of_one(self.log_likelihood, prior.weights(self.edges))
+        return evidence_of_one(self.log_likelihood, np.diff(prior(self.edges)))
 
 
 def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
@@ -387,7 +330,7 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
 
 def _of_each(curves: Sequence[LawCurve], prior: Prior) -> tuple[float, float]:
     """Return the log evidence of one parameter of each load under a prior, and its error."""
-    weights = [prior.weights(along.edges)[along.near] for along in curves]
+    weights = [np.diff(prior(along.edges))[along.near] for along in curves]
     return evidence_of_each([along.near_tables for along in curves], weights)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 from memscal.friction import results
 from memscal.friction.results import percent
 from memscal.model.quantities import KPA
-from memscal.model.records import BAYES_FACTOR, COMPARED_LAWS, IMPLIED, LAW, PRIOR, SLIP_LENGTH
+from memscal.model.records import BAYES_FACTOR, COMPARED_LAWS, IMPLIED, LAW, SLIP_LENGTH
 from memscal.summaries.comparison import bounded_json, friction_name
 from memscal.summaries.declared import members
 from memscal.summaries.table import Table, texts_of
@@ -17,10 +17,7 @@ def tables(comparison: results.InterfaceComparison) -> list[Table]:
     """Return evidence and lengths, and what a slip length means at each load."""
     shown = []
     for direction, compared in comparison.by_direction.items():
-        rows = [[p.against, p.prior, f"{p.log_factor:.1f}"] for p in compared.priors]
-        title = "The same under other priors"
         shown += [_law_table(direction, compared), _length_table(direction, compared)]
-        shown.append(Table(title, ["law", "prior", "ln of the factor"], rows))
         if compared.implied is not None:
             shown.append(_implied_table(compared.implied))
     return shown
@@ -104,7 +101,6 @@ def _laws_json(compared: results.LawComparison) -> dict[str, Any]:
         "laws": [members(LAW, law) for law in compared.laws],
         "bayes_factors": [members(BAYES_FACTOR, factor) for factor in compared.factors],
         "length": bounded_json(SLIP_LENGTH, compared.length),
-        "other_priors": [members(PRIOR, prior) for prior in compared.priors],
         "implied": None if compared.implied is None else _implied_json(compared.implied),
     }
 
