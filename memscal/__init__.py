@@ -39,7 +39,6 @@ PUBLIC = {
         "Interval",
         "LawComparison",
         "LoadComparison",
-        "PriorChoice",
         "ShearComparison",
     ],
     "measurement.measure_stress": ["measure_stress"],
