@@ -239,9 +239,10 @@ _MOST_NAMED = 12
 
 
 def quality_checks(
-    solution: Solution, results: Results, division: DivisionMap | None
+    solution: Solution, results: Results, other: Results | None
 ) -> tuple[QualityCheck, ...]:
-    """Run every check that applies to the scan; ``division`` is the one by either method."""
+    """Run every check that applies to the scan; ``other``: results by the other route."""
+    division = results.division or (other.division if other else None)
     model = unexplained.free_model(solution.estimate)
     estimate = solution.estimate
     residuals = unexplained.residuals_of(estimate, model)

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from memscal.calibration.drawn_scatter import draw_count, is_linear
+from memscal.calibration.film_inference import FilmLawComparison
+from memscal.calibration.prepare import Prepared
 from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import Results, changes_by, input_effects
 from memscal.estimation.bayesian import HYPOTHESES
@@ -28,12 +30,26 @@ _LEAST_TOLD = 0.001
 
 
 def calibration_messages(
-    solution: Solution, results: Results, checks: tuple[QualityCheck, ...]
+    prepared: Prepared,
+    solution: Solution,
+    results: Results,
+    checks: tuple[QualityCheck, ...],
+    laws: FilmLawComparison | None,
 ) -> tuple[Message, ...]:
-    """Return the messages that accompany a result, warnings first."""
+    """Return the messages that accompany a result: what was decided, then warnings first."""
     scan = solution.scan
     channel = solution.estimate.points.channel
-    messages = quality.failed_check_messages(checks)
+    messages = list(quality.override_messages(prepared.overridden))
+    if laws is not None:
+        messages.append(laws.message)
+    if prepared.thickness is not None:
+        messages += prepared.thickness.messages
+    loads = [s.load if s.normal_load is None else s.normal_load for s in prepared.as_stated]
+    if prepared.reading.per == "Pa" and any(load is None for load in loads):
+        load = f"{scan.stated_load:.4g} N (--relative takes none)"
+        text = f"No load is stated: it is taken to be that of the reference, {load}."
+        messages.append(Message("load_of_reference", text))
+    messages += quality.failed_check_messages(checks)
     if solution.estimate.model.order:
         text = (
             f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "

@@ -83,7 +83,7 @@ def input_effects(
     stresses: Sequence[StressProfile | Contact],
     estimate: ProfileEstimate,
     alternatives: Sequence[RadialSpectrum] | None = None,
-) -> Mapping[str, InputEffect]:
+) -> dict[str, InputEffect]:
     """Return the effect of every input whose uncertainty is stated, by its name."""
     model = estimate.model
     changes = reference_sensitivities(scans, model.references)

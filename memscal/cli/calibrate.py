@@ -351,7 +351,7 @@ def _rehearse(
     as_json: bool,
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
-    from memscal.calibration.calibrate import prepare
+    from memscal.calibration.prepare import Request, prepare
     from memscal.calibration.stages import require_channel_method
     from memscal.estimation.points import joined_points, measured_points, scans_of_repeats
     from memscal.estimation.reference import reference_spectra
@@ -361,10 +361,7 @@ def _rehearse(
     channel = settings["channel"]
     plan = (settings["method"].name, outputs)
     require_channel_method(channel, settings["method"])
-    law = settings["film_law"], settings["mooney_rivlin_ratio"], settings["rod_friction"]
-    flags = {name: settings[name] for name in ("override", "relative")}
-    references = settings["reference"], settings["alternative"]
-    prepared = prepare(scans, *references, law, pixel_size=None, **flags)
+    prepared = prepare(scans, Request(**settings))
     out.show_messages(override_messages(prepared.overridden))
     separate = list(prepared.scans)
     owners = tuple(range(len(prepared.scans)))

@@ -16,6 +16,7 @@ from PIL import Image
 
 import memscal
 from memscal.calibration import calibrate as calibration
+from memscal.calibration import prepare
 from memscal.errors import FormatError, InputError
 from memscal.estimation import points
 from memscal.formats.hdf5.reader import SafeFile
@@ -244,6 +245,6 @@ def test_a_calibration_of_too_many_points_does_nothing(monkeypatch, limit, words
         u = np.exp(-np.add.outer(axis**2, axis**2) / 1e-6)
         scans = memscal.Scan(x=axis, y=axis, u_zz=u, load=1.0, film=film, indenter=rod)
     monkeypatch.setattr(points, limit, 129)
-    monkeypatch.setattr(calibration, "reference_profile", lambda *_: pytest.fail("it went on"))
+    monkeypatch.setattr(prepare, "reference_profile", lambda *_: pytest.fail("it went on"))
     with pytest.raises(InputError, match=rf"{words}(.|\n)*Average neighbouring readings"):
         memscal.calibrate(scans)

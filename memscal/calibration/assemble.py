@@ -1,0 +1,183 @@
+"""What a calibration records: the apparatus function with its steps, checks and configuration."""
+
+from dataclasses import asdict, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from memscal.apparatus import ApparatusFunction
+from memscal.axisymmetry.kernels import unit_gaussian
+from memscal.calibration.film_inference import FilmLawComparison
+from memscal.calibration.messages import calibration_messages
+from memscal.calibration.prepare import Prepared, stress_table
+from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution
+from memscal.calibration.uncertainty import Results
+from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.points import loads_differ
+from memscal.model.apparatus import (
+    ApparatusField,
+    ApparatusRadial,
+    OtherEstimate,
+    Reconvolution,
+    TransferFunction,
+)
+from memscal.model.checks import QualityCheck
+from memscal.model.provenance import Process
+from memscal.model.scan import common_circumstances
+
+#: Parameters that differ between a division and the Bayesian estimate.
+_BY_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
+
+
+def assemble(
+    prepared: Prepared,
+    solution: Solution,
+    results: Results,
+    other: Results | None,
+    checks: tuple[QualityCheck, ...],
+    laws: FilmLawComparison | None,
+) -> ApparatusFunction:
+    """Return the apparatus function with everything that its artifact stores."""
+    # Film and indenter are as stated by the scan where nothing was calculated with them.
+    stated = prepared.as_stated[0]
+    scan = solution.scan
+    reference = stress_table(solution.stress)
+    channel = solution.estimate.points.channel
+    return ApparatusFunction(
+        plane=_plane(solution, results),
+        radial_profile=_radial(solution, solution.deconvolution, results),
+        transfer=_transfer(solution, results),
+        reconvolution=_reconvolution(solution),
+        parameters=results.parameters,
+        checks=checks,
+        film=scan.film or stated.film,
+        indenter=scan.indenter or stated.indenter,
+        sensor=scan.sensor if channel == "zz" else replace(scan.sensor, channel=channel),
+        load=scan.load if prepared.reading.per == "Pa" else None,
+        reference=reference,
+        process=Process.of_now(
+            configuration=_configuration(prepared, solution, laws),
+            messages=calibration_messages(prepared, solution, results, checks, laws),
+            input_scan=scan.source,
+            input_reference=reference.source,
+        ),
+        budget=results.budget,
+        kernel_changes=results.kernel_changes,
+        **common_circumstances(solution.scans),
+        other=_other(solution, other),
+    )
+
+
+def _configuration(
+    prepared: Prepared, solution: Solution, laws: FilmLawComparison | None
+) -> dict[str, Any]:
+    """Return what was asked for and decided; what is usual is left out."""
+    request = prepared.request
+    method: Any = request.method
+    # A method of another package may be no dataclass.
+    options = {}
+    if is_dataclass(method) and not isinstance(method, type):
+        options = asdict(method)
+    unit = prepared.reading.per
+    centre: dict[str, Any] | None = None
+    if request.centre is not None or solution.apart is not None:
+        choice = PER_REPEAT if solution.per_repeat else COMMON
+        centre = {"choice": choice, "chosen_by": "option" if request.centre else "test"}
+        if solution.apart is not None:
+            centre["p_value"] = solution.apart.p_value
+    # A scan that was split by repeats or loads has one source.
+    sources = {i: scan.source for i, scan in zip(solution.owners, solution.scans, strict=True)}
+    further = [
+        source and {"file_name": source.file_name, "sha256": source.sha256}
+        for owner, source in sources.items()
+        if owner > 0
+    ]
+    record = {
+        "method": method.name,
+        "seed": request.seed,
+        "options": options,
+        "reference_unit": None if unit == "Pa" else unit,
+        "free": prepared.thickness and prepared.thickness.record,
+        "film_laws": laws and laws.record,
+        "channel": None if request.channel == "zz" else request.channel,
+        "film_law": request.film_law,
+        "rod_friction": request.rod_friction,
+        "centre": centre,
+        "override": prepared.overridden or None,
+        "correlations": {" ".join(pair): c for pair, c in request.correlations.items()} or None,
+        "grid": dict(solution.choice.reasons),
+        "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
+        "direction": "y" if solution.scan.direction == "y" else None,
+        "further_scans": further or None,
+    }
+    return {name: value for name, value in record.items() if value is not None}
+
+
+def _plane(solution: Solution, results: Results) -> ApparatusField:
+    g = solution.deconvolution.g
+    if results.field_errors is not None:
+        scatter, errors = results.field_errors
+        return ApparatusField(g.x, g.y, g.image, errors, scatter)
+    radial = np.sqrt(np.diag(results.radial_covariance))
+    errors = g.grid.to_image(np.interp(g.grid.radius, g.r, radial))
+    return ApparatusField(g.x, g.y, g.image, errors)
+
+
+def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
+    if results is None or solution.other is None:
+        return None
+    parameters = results.parameters.only(_BY_ROUTE)
+    method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
+    return OtherEstimate(method, parameters, _radial(solution, solution.other, results))
+
+
+def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:
+    g = deconvolution.g
+    covariance = results.radial_covariance
+    gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
+    errors = np.sqrt(np.diag(covariance))
+    with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
+    scale = errors * results.parameters.uncertainty("conversion_constant")
+    correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
+    return ApparatusRadial(g.r, g.radial, errors, gaussian, covariance, correlation)
+
+
+def _transfer(solution: Solution, results: Results) -> TransferFunction:
+    fields = solution.fields
+    quotient = solution.deconvolution.quotient
+    k, transfer = fields.grid.axis_transfer(quotient.values)
+    modulus = np.abs(transfer) / solution.deconvolution.conversion_constant
+    window = fields.along_axis(quotient.window)[1]
+    return TransferFunction(k, modulus, results.transfer_errors, window, solution.band.resolved)
+
+
+def _reconvolution(solution: Solution) -> Reconvolution:
+    estimate = solution.estimate
+    points = estimate.points
+    if solution.per_repeat and not points.planar and max(solution.owners) == 0:
+        # Repeats of one line are shown with their centres at that of the first.
+        axis = int(np.argmax(points.free[0]))
+        place = estimate.offset[axis] + estimate.centre[axis]
+    elif points.scans > 1 and estimate.model.order:
+        # The sign of a shear depends on the side.
+        place = estimate.offset[estimate.model.axis]
+    elif points.scans > 1 or points.planar:
+        place = estimate.distance
+    else:
+        place = points.x if points.free[0, 0] else points.y
+    predicted = solution.deconvolution.predicted
+    columns = {
+        "x": place,
+        "u_zz": points.u,
+        "u_zz_errors": estimate.noise,
+        "u_zz_predicted": predicted,
+        "u_zz_gaussian": estimate.gaussian.predicted,
+        "residual": points.u - predicted,
+    }
+    if points.planar:
+        columns["offset_x"], columns["offset_y"] = estimate.offset
+    if points.planar or points.scans > 1 or loads_differ(list(points.load)):
+        columns["load"] = points.load
+        columns["background"] = estimate.background
+    order = np.argsort(place, kind="stable")
+    return Reconvolution(**{name: values[order] for name, values in columns.items()})

@@ -1,0 +1,195 @@
+"""What a calibration is asked for, and what it starts from: scans, film, loads and references."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from memscal.calibration.stages import COMMON, PER_REPEAT
+from memscal.deconvolution.division import Method
+from memscal.errors import InputError
+from memscal.estimation.points import require_size, scans_by_load
+from memscal.estimation.reference import (
+    at_load_of,
+    film_of,
+    reference_profile,
+    require_calibration_rod,
+    require_one_kind,
+    require_one_sensor,
+    require_same_set_up,
+    with_film_of,
+)
+from memscal.mechanics.contact import BaseStress, Contact
+from memscal.model.film import LINEAR
+from memscal.model.notation import Reading
+from memscal.model.provenance import accepted_alterations
+from memscal.model.scan import Scan
+from memscal.model.stress import IdealReference, StressField, StressProfile
+
+if TYPE_CHECKING:
+    from memscal.calibration.film_inference import FreeThickness
+
+Reference: TypeAlias = (
+    StressProfile | StressField | IdealReference | Contact | str | PathLike[str] | None
+)
+"""A base stress, an ideal reference, the path or name of one, or nothing: the rod is solved."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Request:
+    """What a calibration is asked for; :func:`memscal.calibrate` describes each."""
+
+    method: Method
+    reference: Reference | Sequence[Reference]
+    alternative: Reference | Sequence[Reference]
+    film_law: str | None
+    mooney_rivlin_ratio: float | None
+    rod_friction: float | None
+    channel: str
+    centre: str | None
+    correlations: Mapping[tuple[str, str], float]
+    pixel_size: float | None = None
+    free: str | Sequence[str]
+    seed: int
+    override: bool
+    accept_altered: bool
+    relative: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What a calibration starts from: scans with the film and loads that count, and references."""
+
+    request: Request
+    as_stated: tuple[Scan, ...]
+    scans: tuple[Scan, ...]
+    references: Sequence[BaseStress | None]  # as given
+    stresses: tuple[BaseStress, ...]  # as taken, one of each scan
+    alternatives: Sequence[BaseStress | None] | None
+    owners: Sequence[int] | None  # of scans that were split by their loads
+    reading: Reading
+    overridden: list[str]
+    thickness: "FreeThickness | None" = None  # of the films, where the scans determine it
+
+
+def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
+    """Read and solve the references, and hold them against the scans."""
+    if request.centre not in (None, COMMON, PER_REPEAT):
+        problem = f"There is no choice of centre {request.centre!r}."
+        raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
+    require_size(as_stated)
+    as_stated = require_one_sensor(as_stated)
+    references = _references(request.reference, as_stated, request)
+    for scan, given in zip(as_stated, references, strict=True):
+        require_calibration_rod(scan, given)
+    scans = [_with_law(s, r, request) for s, r in zip(as_stated, references, strict=True)]
+    stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
+    if request.relative:
+        scans = [_without_loads(s, r) for s, r in zip(scans, stated, strict=True)]
+    alternatives = None
+    if request.alternative is not None:
+        alternatives = _references(request.alternative, scans, replace(request, pixel_size=None))
+    overridden = require_same_set_up(
+        scans, references, alternatives or (), override=request.override
+    )
+    files = (*as_stated, *references, *(alternatives or ()))
+    overridden[:0] = accepted_alterations(*(getattr(file, "source", None) for file in files))
+    scans = [with_film_of(r, s) for s, r in zip(scans, references, strict=True)]
+    require_one_kind(stated, alternatives or ())
+    owners: Sequence[int] | None = None
+    if not any(stated) and any(s.set_up.film.law != LINEAR for s in scans):
+        # Under another law than the linear one each load has a stress of its own shape.
+        scans, owners = scans_by_load(scans)
+        references = [None] * len(scans)
+    stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
+    peak = None
+    if request.relative:
+        peak = float(np.abs(stress_table(stresses[0]).sigma_zz).max())
+    scans = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
+    return Prepared(
+        request=request,
+        as_stated=as_stated,
+        scans=tuple(scans),
+        references=references,
+        stresses=tuple(stresses),
+        alternatives=alternatives,
+        owners=owners,
+        reading=replace(scans[0].reading, per="relative" if request.relative else stresses[0].unit),
+        overridden=overridden,
+    )
+
+
+def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Scan:
+    """Return the scan with the law and the rod's friction that are known: asked for, or stated."""
+    law = request.film_law
+    if law is not None:
+        if reference is not None:
+            why = "A reference has been calculated by a law already."
+            cure = "Give one of them (film_law, --film-law; reference, --reference)."
+            raise InputError(f"A film law ({law}) and a reference are given.", why=why, cure=cure)
+        ratio = request.mooney_rivlin_ratio
+        film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=ratio)
+        scan = replace(scan, film=film, reference=None)
+    stress = reference or scan.reference
+    made_on = film_of(stress) if stress else None
+    if stress and made_on and made_on.law and scan.film and not scan.film.law:
+        ratio = made_on.mooney_rivlin_ratio
+        scan = replace(scan, film=replace(scan.film, law=made_on.law, mooney_rivlin_ratio=ratio))
+        friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
+        if made_on.law != LINEAR and scan.rod_friction is None and friction in (0.0, np.inf):
+            scan = replace(scan, rod_friction=friction)
+    if request.rod_friction is not None:
+        scan = replace(scan, rod_friction=request.rod_friction)
+    return scan
+
+
+def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
+    """Return the scan without loads; a rod that has to be solved keeps its nominal one."""
+    load = None if stress else scan.load
+    loads: dict[str, Any] = {"normal_load": None, "normal_load_errors": None}
+    return replace(scan, load=load, load_uncertainty=None, **loads)
+
+
+def stress_table(stress: BaseStress) -> StressProfile:
+    """Return a base stress as a table over the radius."""
+    return stress.profile() if isinstance(stress, Contact) else stress
+
+
+def _references(
+    reference: Reference | Sequence[Reference], scans: Sequence[Scan], request: Request
+) -> list[BaseStress | None]:
+    """Read a reference for each scan; a single one is that of all scans."""
+    loads = scans[0].normal_load
+    strength = scans[0].load or (1.0 if loads is None else float(np.nanmedian(loads)))
+    if isinstance(reference, Sequence) and not isinstance(reference, str):
+        if len(reference) != len(scans):
+            count = "is one scan" if len(scans) == 1 else f"are {len(scans)} scans"
+            problem = f"{len(reference)} references were given, but there {count}."
+            cure = "Give one for each scan, in their order, or one for all."
+            raise InputError(problem, cure=cure)
+        return [_read(item, strength, request) for item in reference]
+    return [_read(reference, strength, request)] * len(scans)
+
+
+def _read(reference: Reference, load: float, request: Request) -> BaseStress | None:
+    """Read a reference; a source has its own strength at the nominal load of the first scan."""
+    if isinstance(reference, str | PathLike):
+        from memscal.formats.reference import read_reference
+
+        accepted = request.accept_altered
+        size = request.pixel_size
+        reference = read_reference(reference, pixel_size=size, accept_altered=accepted)
+    elif isinstance(reference, IdealReference | StressField):
+        reference = reference.profile()
+    if isinstance(reference, StressProfile) and reference.form is not None:
+        stated = reference.form.load if isinstance(reference.form, StressField) else None
+        return replace(reference, load=stated or load)
+    if reference is None or isinstance(reference, StressProfile | Contact):
+        return reference
+    raise InputError(
+        f"The reference is a {type(reference).__name__}.",
+        cure="Give a contact from memscal.indent(), a StressProfile, a StressField, an ideal one "
+        "such as disc:0.5mm, or the path of a file.",
+    )
