@@ -5,12 +5,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from inspect import isfunction
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
 
 import memscal
 
+SCAN = str(Path(__file__).parents[1] / "calibration_data" / "rod_scan_65.h5")
 WORKING_STATE = {"Decorrelation", "Posterior", "Reading", "SetUp", "Solution"}
 """Types of attributes through which a result shows how it was computed."""
 
@@ -55,6 +57,16 @@ def test_asking_for_help_loads_click_alone(arguments: str) -> None:
 def test_calibrating_is_possible_without_the_libraries_of_other_jobs() -> None:
     loaded = libraries_after("import memscal; memscal.calibrate, memscal.read_scan")
     assert loaded.isdisjoint({"matplotlib", "meshio", "pint", "skfem", "skimage"})
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["calibrate", SCAN, "-o", "artifact.h5"]])
+def test_help_and_a_plain_calibration_load_no_extension(arguments: list[str], tmp_path) -> None:
+    listing = "print([m for m in sys.modules if m.startswith('memscal.extensions.')])"
+    code = f"import sys; from memscal.cli import main; main({arguments!r}); {listing}"
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.splitlines()[-1] == "[]"
 
 
 def classes(hint: Any) -> Iterator[type]:
