@@ -44,22 +44,19 @@ _CROWDED = 0.7
 
 def mistaken_unit(factor: float) -> str:
     """Name the mistake of a unit that a stated value needs this factor for; or nothing."""
-    return next((words for m, words in _MISTAKES.items() if abs(factor / m - 1) < _NEAR), "")
+    near = (words for mistake, words in _MISTAKES.items() if abs(factor / mistake - 1) < _NEAR)
+    return next(near, "")
 
 
 _SHORT = "So short a scan shows neither the flanks of the stress nor the baseline."
 _WIDE = "The stress at the base of a film is little wider than the film is thick: "
-_LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
 
 
 def require_span(scan: Scan) -> None:
     """Refuse positions over which no film is scanned, before anything is built on them."""
-    h = _film(scan).thickness
     lengths = _lengths(scan)
-    row = "The positions span", (span := lengths["span"])
-    short = span < _SHORTEST_SPAN * h
-    long = span > _LONGEST_SPAN * h
-    _refuse(scan, lengths, (short, *row, _SHORT), (long, *row, _LONG))
+    _refuse_short_span(scan, lengths)
+    _refuse_long_span(scan, lengths)
 
 
 def require_recorded(load: float, recorded: FloatArray) -> None:
@@ -82,27 +79,30 @@ def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
     if scan.load is not None and scan.normal_load is not None:
         require_recorded(scan.load, scan.normal_load)
-    h = _film(scan).thickness
     lengths = _lengths(scan)
+    _refuse_short_span(scan, lengths)
     span = lengths["span"]
-    rod = 2 * lengths.get("radius", 0.0)
-    of_rod = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
-    short = (span < _SHORTEST_SPAN * h, "The positions span", span, _SHORT)
-    _refuse(scan, lengths, short, (rod > span, of_rod, rod, _SHORT))
+    rod_width = 2 * lengths.get("radius", 0.0)
+    if rod_width > span:
+        words = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
+        raise _implausible(scan, lengths, words, rod_width, _SHORT)
+
     x, y = (positions.ravel() for positions in scan.positions)
     steps = places_of(x, y, scan.passes.ravel()).steps
-    lengths["step"] = step = min((s for s in steps if s > 0), default=0.0)
-    lengths["width"] = width = _voltage_width(x, y, scan.u_zz.ravel())
-    no_sensor = f"{_WIDE}no sensor is so much wider."
-    of_width = "The voltage's width at half height is"
-    _refuse(
-        scan,
-        lengths,
-        (step > _LONGEST_STEP * h, "The positions' step is", step, f"{_WIDE}the scan misses it."),
-        (span > _LONGEST_SPAN * h, "The positions span", span, _LONG),
-        (rod > h, "The rod's width is", rod, "Under such a rod the stress depends on friction."),
-        (width > _WIDEST_VOLTAGE * h, of_width, width, no_sensor),
-    )
+    lengths["step"] = min((step for step in steps if step > 0), default=0.0)
+    lengths["width"] = _voltage_width(x, y, scan.u_zz.ravel())
+    h = _film(scan).thickness
+    if lengths["step"] > _LONGEST_STEP * h:
+        why = f"{_WIDE}the scan misses it."
+        raise _implausible(scan, lengths, "The positions' step is", lengths["step"], why)
+    _refuse_long_span(scan, lengths)
+    if rod_width > h:
+        why = "Under such a rod the stress depends on friction."
+        raise _implausible(scan, lengths, "The rod's width is", rod_width, why)
+    if lengths["width"] > _WIDEST_VOLTAGE * h:
+        words = "The voltage's width at half height is"
+        why = f"{_WIDE}no sensor is so much wider."
+        raise _implausible(scan, lengths, words, lengths["width"], why)
 
 
 def _film(scan: Scan) -> ElasticFilm:
@@ -112,20 +112,32 @@ def _film(scan: Scan) -> ElasticFilm:
 
 def _lengths(scan: Scan) -> dict[str, float]:
     """Return the span of a scan and the radius of a rod, in m."""
-    span = max(float(np.ptp(along)) for along in (scan.x, scan.y) if along is not None)
-    return {"span": span} | (
-        {"radius": scan.indenter.radius} if isinstance(scan.indenter, Rod) else {}
-    )
+    lengths = {"span": max(float(np.ptp(axis)) for axis in (scan.x, scan.y) if axis is not None)}
+    if isinstance(scan.indenter, Rod):
+        lengths["radius"] = scan.indenter.radius
+    return lengths
 
 
-def _refuse(scan: Scan, lengths: dict[str, float], *rows: tuple[bool, str, float, str]) -> None:
+def _refuse_short_span(scan: Scan, lengths: dict[str, float]) -> None:
+    if lengths["span"] < _SHORTEST_SPAN * _film(scan).thickness:
+        raise _implausible(scan, lengths, "The positions span", lengths["span"], _SHORT)
+
+
+def _refuse_long_span(scan: Scan, lengths: dict[str, float]) -> None:
+    if lengths["span"] > _LONGEST_SPAN * _film(scan).thickness:
+        why = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
+        raise _implausible(scan, lengths, "The positions span", lengths["span"], why)
+
+
+def _implausible(
+    scan: Scan, lengths: dict[str, float], words: str, length: float, why: str
+) -> InputError:
+    """Return the error of a length in m that no set-up has, with the units to check."""
     h = _film(scan).thickness
     place = f"{scan.source.file_name}: " if scan.source else ""
-    for wrong, name, value, why in rows:
-        if wrong:
-            times = f"{value / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
-            problem = f"{place}{name} {value * 1e3:.4g} mm, {times}."
-            raise InputError(problem, why=why, cure=_cure(lengths, h))
+    times = f"{length / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
+    problem = f"{place}{words} {length * 1e3:.4g} mm, {times}."
+    return InputError(problem, why=why, cure=_cure(lengths, h))
 
 
 def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
@@ -156,35 +168,52 @@ def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
 
 def _cure(lengths: dict[str, float], thickness: float) -> str:
     """Name the units to check, and the values of each input that make all lengths usual ones."""
+    inputs = [
+        ("positions", "data/x", ("span", "step", "width"), 0.0),
+        ("a film thickness", "sample/film/thickness", (), thickness),
+        ("a rod radius", "indenter/radius", ("radius",), lengths.get("radius", 0.0)),
+    ]
     causes = []
-    for name, path, scaled, stated in (
-        ("positions", "data/x", ("span", "step", "width"), 1.0),
-        ("a film thickness", "sample/film/thickness", tuple(_USUAL), thickness * 1e3),
-        ("a rod radius", "indenter/radius", ("radius",), lengths.get("radius", 0.0) * 1e3),
-    ):
-        if not stated:
+    for name, path, scaled, stated in inputs:
+        low, high = _usual_factors(lengths, thickness, scaled)
+        if (name == "a rod radius" and not stated) or not 0 < low < high < np.inf:
             continue
-        low = 0.0
-        high = np.inf
-        for key in (key for key, length in lengths.items() if length > 0):
-            least, most = (limit * thickness / lengths[key] for limit in _USUAL[key])
-            if path == "sample/film/thickness":
-                least, most = 1 / most, 1 / least
-            elif key not in scaled:
-                # Not changed by this input: any factor will do, or none.
-                least, most = (0.0, np.inf) if least <= 1 <= most else (np.inf, 0.0)
-            low = max(low, least)
-            high = min(high, most)
-        if not 0 < low < high < np.inf:
-            continue
-        inside = [factor for factor in _MISTAKES if low <= factor <= high]
-        middle = np.log(low * high) / 2
-        unit = min(inside, key=lambda factor: abs(np.log(factor) - middle), default=None)
         # Two digits, without a power of ten.
-        first, last = (f"{float(f'{factor * stated:.2g}'):g}" for factor in (low, high))
-        value = f"{first} to {last} times as large" if stated == 1.0 else f"of {first} to {last} mm"
-        hint = f" ({_MISTAKES[unit]}?)" if unit else ""
-        causes.append(f"{name} (/entry/{path}) {value}{hint}")
+        millimetres = stated * 1e3 or 1.0
+        first, last = (f"{float(f'{factor * millimetres:.2g}'):g}" for factor in (low, high))
+        value = f"of {first} to {last} mm" if stated else f"{first} to {last} times as large"
+        causes.append(f"{name} (/entry/{path}) {value}{_mistake_within(low, high)}")
     if not causes:
         return "Check the units of /entry/data/x, /entry/sample/film/thickness and /entry/indenter."
     return f"Check the units. The scan would be a usual one with {'; or with '.join(causes)}."
+
+
+def _usual_factors(
+    lengths: dict[str, float], thickness: float, scaled: tuple[str, ...]
+) -> tuple[float, float]:
+    """Range of the factor on some of the lengths, or on the thickness, that makes all usual."""
+    low = 0.0
+    high = np.inf
+    for name, length in lengths.items():
+        if length <= 0:
+            continue
+        least, most = (limit * thickness / length for limit in _USUAL[name])
+        if not scaled:  # the thickness
+            least, most = 1 / most, 1 / least
+        elif name not in scaled:  # not changed by this input
+            if least <= 1 <= most:
+                continue
+            return np.inf, 0.0
+        low = max(low, least)
+        high = min(high, most)
+    return low, high
+
+
+def _mistake_within(low: float, high: float) -> str:
+    """Name the mistake of a unit whose factor is nearest to the middle of a range, or nothing."""
+    inside = [factor for factor in _MISTAKES if low <= factor <= high]
+    if not inside:
+        return ""
+    middle = np.log(low * high) / 2
+    nearest = min(inside, key=lambda factor: abs(np.log(factor) - middle))
+    return f" ({_MISTAKES[nearest]}?)"
