@@ -14,10 +14,10 @@ from .calibration.uncertainty import InputEffect as InputEffect
 from .deconvolution.fourier_ratio import Field as Field
 from .deconvolution.fourier_ratio import Quotient as Quotient
 from .deconvolution.fourier_ratio import divide as divide
-from .deconvolution.fourier_ratio import fit_gaussian as fit_gaussian
 from .deconvolution.fourier_ratio import lift as lift
 from .deconvolution.fourier_ratio import normalise as normalise
 from .deconvolution.fourier_ratio import reconvolve as reconvolve
+from .deconvolution.widths import fit_gaussian as fit_gaussian
 from .errors import MemscalError as MemscalError
 from .estimation.points import ScanPoints as ScanPoints
 from .extensions.fleet.many import FleetCalibration as FleetCalibration

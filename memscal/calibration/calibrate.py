@@ -17,13 +17,12 @@ from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import MemscalError
-from memscal.estimation.reference import (
+from memscal.estimation.reference_spectra import (
     expected_spectra,
-    is_source,
     press_neo_hookean,
-    reference_profile,
     reference_spectra,
 )
+from memscal.estimation.set_up import is_source, reference_profile
 from memscal.extensions import hook
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact

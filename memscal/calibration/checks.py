@@ -12,11 +12,12 @@ from memscal.calibration.stages import Misfit, Solution
 from memscal.calibration.uncertainty import DivisionMap, Results, route_difference
 from memscal.estimation import assumptions
 from memscal.estimation import residuals as unexplained
+from memscal.estimation.band import RESOLVED
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import carried_force, is_source
+from memscal.estimation.reference_spectra import carried_force
 from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, Residuals, TestOutcome
-from memscal.estimation.smoothing import RESOLVED
+from memscal.estimation.set_up import is_source
 from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet

@@ -16,10 +16,11 @@ import numpy as np
 
 from memscal.errors import FitError, MemscalError
 from memscal.estimation.forward import forward_model
-from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
+from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints, joined_points
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
-from memscal.estimation.reference import reference_spectra
+from memscal.estimation.reference_spectra import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray

@@ -17,9 +17,10 @@ from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import DrawnScatter, read_off
 from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw, Wiener
 from memscal.errors import FitError
+from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.smoothing import find_band, smooth_profile
+from memscal.estimation.smoothing import smooth_profile
 from memscal.model.arrays import FloatArray
 
 #: Draws: their standard deviation is known to 1/sqrt(2 n), 10 % for 50.  Restorations of large

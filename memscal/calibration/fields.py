@@ -16,9 +16,10 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field, reconvolve
 from memscal.errors import InputError
+from memscal.estimation.band import Band
 from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
-from memscal.estimation.smoothing import Band, SmoothedProfile, rounded_reach
+from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
 from memscal.model.places import EvenAxis

@@ -22,7 +22,8 @@ from memscal.errors import InputError, MemscalError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import log_marginal_likelihood
-from memscal.estimation.reference import film_of, reference_spectra
+from memscal.estimation.reference_spectra import reference_spectra
+from memscal.estimation.set_up import film_of
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor

@@ -13,7 +13,8 @@ from memscal.calibration.uncertainty import Results, changes_by, input_effects
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate, point_messages
-from memscal.estimation.reference import RECTANGLE, is_source
+from memscal.estimation.reference_spectra import RECTANGLE
+from memscal.estimation.set_up import is_source
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import is_tabulated
 from memscal.model import checks as quality

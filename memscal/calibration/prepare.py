@@ -11,7 +11,7 @@ from memscal.calibration.stages import COMMON, PER_REPEAT
 from memscal.deconvolution.division import Method
 from memscal.errors import InputError
 from memscal.estimation.points import require_size, scans_by_load
-from memscal.estimation.reference import (
+from memscal.estimation.set_up import (
     at_load_of,
     film_of,
     reference_profile,

@@ -18,14 +18,16 @@ from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFie
 from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
 from memscal.deconvolution.fourier_ratio import Field, Quotient
+from memscal.deconvolution.widths import fit_gaussian
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation import points
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
+from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
-from memscal.estimation.reference import expected_spectra, reference_spectra
-from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
+from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
+from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
@@ -125,7 +127,7 @@ def deconvolve(
     quotient = replace(quotient, values=quotient.values * fields.confinement)
     # Eq. 3: A, and G of unit integral.
     a, g = fourier_ratio.normalise(fields.on_support(quotient.values, None))
-    sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
+    sigma = fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict.
     predicted = _reconvolved(estimate, fields, quotient) + estimate.background
     return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
@@ -139,7 +141,7 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
     values = fields.kernel(profile.radial) * fields.confinement
     quotient = Quotient(fields.grid, values, np.ones_like(fields.stress.transform.real))
     a, g = fourier_ratio.normalise(fields.on_support(values, profile))
-    sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
+    sigma = fit_gaussian(g, estimate.gaussian.sigma)
     model = estimate.model
     signal = model.signal(model.geometry(estimate.centres), profile.transform(model.k))
     predicted = signal + estimate.oval + estimate.background

@@ -27,10 +27,10 @@ from memscal.axisymmetry.hankel import (
 )
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Deconvolution, Solution
-from memscal.deconvolution.fourier_ratio import kernel_functionals, noise_area
+from memscal.deconvolution.widths import kernel_functionals, noise_area
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import (
+from memscal.estimation.reference_spectra import (
     RECTANGLE,
     carried_force,
     load_sensitivities,

@@ -314,7 +314,7 @@ def command(
 def _read(
     paths: tuple[Path, ...], reference: Path | None, settings: Mapping[str, Any]
 ) -> list[Scan]:
-    from memscal.estimation.reference import require_calibration_rod
+    from memscal.estimation.set_up import require_calibration_rod
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
 
@@ -354,7 +354,7 @@ def _rehearse(
     from memscal.calibration.prepare import Request, prepare
     from memscal.calibration.stages import require_channel_method
     from memscal.estimation.points import joined_points, measured_points, scans_of_repeats
-    from memscal.estimation.reference import reference_spectra
+    from memscal.estimation.reference_spectra import reference_spectra
     from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 

@@ -28,7 +28,6 @@ from scipy.special import ive
 from memscal.axisymmetry.hankel import bessel
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
-from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
 ORDERS = (1, 2, 3, 4)
@@ -196,69 +195,3 @@ def _expected_strengths(columns: FloatArray, data: FloatArray, counts: list[int]
             probability = np.exp(logs - logs.max())
             strengths[i] = np.sqrt(probability @ _STRENGTHS**2 / probability.sum())
     return strengths
-
-
-#: Fewer differences, or degrees of freedom among repeats, say nothing of the noise.
-_FEWEST_DIFFERENCES = 30
-#: Points of which a third difference is taken are at most so unevenly spaced.
-_UNEVEN = 4.0
-_NEIGHBOURS = 8
-
-
-def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
-    """Noise of one reading (V) by its repeats, or by third differences of residuals (n,) in V."""
-    # Both leave out what is smooth over the plane: a sensor that is not round adds nothing.
-    # ``None`` where noise is stated, or where there are too few of either.
-    if points.u_errors is not None or not points.planar:
-        return None
-    groups = np.stack([points.scan, points.of_places("index"), points.load])
-    group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
-    readings = np.bincount(group)
-    degrees = group.size - int(group.max()) - 1
-    if degrees < _FEWEST_DIFFERENCES:
-        return _third_difference_noise(points, residual)
-    left = (residual - (np.bincount(group, residual) / readings)[group])[readings[group] > 1]
-    # Deviations from a mean of few are smaller than the noise.
-    return _spread(left) * float(np.sqrt(left.size / degrees))
-
-
-def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float | None:
-    """Noise of one reading by divided third differences along the rows of a raster."""
-    # sum c_i r_i / (sum c_i^2)^(1/2), 1/c_i the product of all x_i - x_j, is zero for every
-    # parabola, and has the variance of the noise.
-    keys = np.stack([points.x, points.of_places("row"), points.repeat, points.scan])
-    four = np.lib.stride_tricks.sliding_window_view(np.lexsort(keys), 4)
-    gaps = np.diff(points.x[four], axis=1)
-    together = np.all(keys[1:, four[:, :1]] == keys[1:, four], axis=(0, 2))
-    four = four[together & (gaps.max(axis=1) < _UNEVEN * gaps.min(axis=1))]
-    if len(four) < _FEWEST_DIFFERENCES:
-        return None
-    apart = points.x[four][:, :, None] - points.x[four][:, None, :] + np.eye(4)
-    coefficients = 1 / apart.prod(axis=2)
-    coefficients /= np.linalg.norm(coefficients, axis=1)[:, None]
-    return _spread(np.sum(coefficients * residual[four], axis=1))
-
-
-def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
-    """What of each residual (n,) its neighbours in the plane do not share, (n,)."""
-    # An outlier stands alone; where a model misses a sensor's shape, neighbours depart together.
-    from scipy.spatial import KDTree
-
-    if not points.planar:
-        return residual
-    alone = np.zeros_like(residual)
-    for scan in range(points.scans):
-        rows = np.flatnonzero(points.scan == scan)
-        places = np.stack([points.x[rows], points.y[rows]], axis=1)
-        count = min(_NEIGHBOURS + 1, rows.size)
-        nearest = np.asarray(KDTree(places).query(places, k=count)[1])[:, 1:]
-        whole = residual[rows]
-        left = whole - np.median(whole[nearest], axis=1)
-        least = np.sign(left) * np.minimum(abs(left), abs(whole))
-        alone[rows] = np.where(left * whole > 0, least, 0.0)
-    return alone
-
-
-def _spread(values: FloatArray) -> float:
-    """Standard deviation of a normal distribution by the median absolute value."""
-    return 1.4826 * float(np.median(np.abs(values)))

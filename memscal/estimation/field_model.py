@@ -16,7 +16,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.estimation.forward import ForwardModel, Geometry, bounded
+from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.model.arrays import FloatArray
 from memscal.model.stress import StressField
 
@@ -96,14 +96,13 @@ class FieldModel(ForwardModel):
         return np.asarray(np.sum(geometry.towards * shift, axis=0))
 
     def elliptic(
-        self, geometry: Geometry, places: list[FloatArray]
+        self, geometry: Geometry, ellipses: list[FloatArray]
     ) -> tuple[list[FloatArray], FloatArray]:
         """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
         kx = self._plane.kx
         ky = self._plane.ky
         kernels = []
-        for sigma, *e in places:
-            e1, e2 = bounded(np.array(e))
+        for sigma, e1, e2 in ellipses:
             square = (1 + e1) * kx**2 + 2 * e2 * kx * ky + (1 - e1) * ky**2
             kernels.append(np.exp(-0.5 * sigma**2 * square))
         shift = [self._read(geometry, -1j * k * kernels[0]) for k in (kx, ky)]

@@ -141,6 +141,15 @@ class Geometry:
         return {}
 
 
+# An elliptic Gaussian has the second moments s^2 [[1 + e1, e2], [e2, 1 - e1]], e = |(e1, e2)| and
+# tan 2a = e2/e1, widths s sqrt(1 +- e), and the transform exp(-s^2 k^2/2) exp(-z cos 2(phi - a))
+# with z = s^2 k^2 e/2.  By the Jacobi-Anger expansion (DLMF 10.35.2) its response at R and angle t
+# is the sum over m of eps_m cos 2m(t - a) times 1/(2 pi) the integral of
+# exp(-s^2 k^2/2) I_m(z) sigma(k) J_2m(kR) k dk, with eps_0 = 1, the others 2.
+#: An ellipse's response is a sum of so many harmonics.
+_HARMONICS = 5
+
+
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
     """Voltages at the points of a scan, for kernels given by their transforms."""
@@ -288,10 +297,10 @@ class ForwardModel:
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
     def elliptic(
-        self, geometry: Geometry, places: list[FloatArray]
+        self, geometry: Geometry, ellipses: list[FloatArray]
     ) -> tuple[list[FloatArray], FloatArray]:
         """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
-        count = len(places)
+        count = len(ellipses)
         radius = geometry.radius
         toward, across = geometry.towards
         angle = np.arctan2(-across, -toward)
@@ -300,8 +309,7 @@ class ForwardModel:
         for m in range(_HARMONICS):
             kernels = np.empty((self.k.size, count))
             tilts = np.empty(count)
-            for i, (sigma, *e) in enumerate(places):
-                e1, e2 = bounded(np.array(e))
+            for i, (sigma, e1, e2) in enumerate(ellipses):
                 half = 0.5 * (sigma * self.k) ** 2
                 size = float(np.hypot(e1, e2))
                 kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
@@ -371,50 +379,3 @@ def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> F
 def _unit_range(positions: FloatArray) -> FloatArray:
     middle = (positions.max() + positions.min()) / 2
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
-
-
-# An elliptic Gaussian has the second moments s^2 [[1 + e1, e2], [e2, 1 - e1]], e = |(e1, e2)| and
-# tan 2a = e2/e1, widths s sqrt(1 +- e), and the transform exp(-s^2 k^2/2) exp(-z cos 2(phi - a))
-# with z = s^2 k^2 e/2.  By the Jacobi-Anger expansion (DLMF 10.35.2) its response at R and angle t
-# is the sum over m of eps_m cos 2m(t - a) times 1/(2 pi) the integral of
-# exp(-s^2 k^2/2) I_m(z) sigma(k) J_2m(kR) k dk, with eps_0 = 1, the others 2.
-#: An ellipse's response is a sum of so many harmonics, its derivatives are by centred differences.
-_HARMONICS = 5
-_LARGEST = 0.95
-_STEP = 1e-4
-
-
-def elliptic_columns(
-    model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Response per A of an elliptic Gaussian and its derivatives by s, e1, e2; by the centre."""
-    # Shapes (n, 4), and (2, n) of each point's own centre.
-    here = np.concatenate([[sigma], ellipticity])
-    steps = np.diag([_STEP * sigma, _STEP, _STEP])
-    places = [here, *(here + step for step in steps), *(here - step for step in steps)]
-    (values, *others), shift = model.elliptic(geometry, places)
-    slopes = [
-        (above - below) / (2 * step.sum())
-        for above, below, step in zip(others[:3], others[3:], steps, strict=True)
-    ]
-    return np.stack([values, *slopes], axis=1), shift
-
-
-def elliptic_departure(
-    x: FloatArray, y: FloatArray, sigma: float, ellipticity: FloatArray
-) -> FloatArray:
-    """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
-    e1, e2 = bounded(ellipticity)
-    plane_x, plane_y = np.meshgrid(x, y)
-    round_ = plane_x**2 + plane_y**2
-    determinant = 1 - e1**2 - e2**2
-    form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
-    scale = 1 / (2 * np.pi * sigma**2)
-    elliptic = np.exp(-0.5 * form / (determinant * sigma**2)) / np.sqrt(determinant)
-    return np.asarray(scale * (elliptic - np.exp(-0.5 * round_ / sigma**2)))
-
-
-def bounded(ellipticity: FloatArray) -> FloatArray:
-    """Return an ellipticity (e1, e2) that an ellipse can have."""
-    size = float(np.hypot(*ellipticity))
-    return np.asarray(ellipticity * min(1.0, _LARGEST / size) if size > 0 else ellipticity)

@@ -12,7 +12,9 @@ import numpy as np
 
 from memscal.axisymmetry.kernels import gaussian_transfer, gaussian_transfer_slope
 from memscal.errors import FitError, InputError
-from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
+from memscal.estimation.ellipse import elliptic_columns
+from memscal.estimation.forward import ForwardModel, Geometry
+from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
 from memscal.model.arrays import FloatArray
@@ -367,9 +369,3 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     return GaussianFit(
         amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
     )
-
-
-def robust_scale(residual: FloatArray) -> float:
-    """Median absolute deviation as a standard deviation, never zero."""
-    scale = 1.4826 * float(np.median(np.abs(residual)))
-    return max(scale, 1e-12 * float(np.abs(residual).max()), np.finfo(float).tiny)

@@ -8,7 +8,6 @@ the voltage falls where the indenter stands at larger x than the sensor.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -23,8 +22,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.correlation import is_banded, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.places import Places
-from memscal.model.provenance import SourceFile
-from memscal.model.quantities import Record
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_LINES, MOST_OF_RASTER, too_large
 from memscal.readings.find_places import places_of
@@ -34,10 +31,6 @@ from memscal.readings.mistaken_unit import rise_of
 TANGENTIAL = ("xz", "yz")
 #: All, the normal one first.
 CHANNELS = ("zz", *TANGENTIAL)
-#: Stated values agree within this many standard uncertainties of their difference ...
-COVERAGE = 2.0
-#: ... and within this share of them where none is stated.
-_SAME = 1e-6
 
 
 def channel_order(channel: str) -> int:
@@ -419,57 +412,6 @@ def require_size(scans: Sequence[Scan]) -> None:
         why = "Time and memory grow with their number."
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
         raise too_large(named, size, most, of, why=why, cure=cure)
-
-
-def file_in_words(source: SourceFile | None, kind: str) -> str:
-    """Name what a file holds, for messages: "the scan rod.h5"."""
-    return f"the {kind} {source.file_name}" if source else f"the {kind}"
-
-
-def stated_differences(
-    record: Record, names: Sequence[str], stated: Sequence[Any], places: Sequence[str], of: str = ""
-) -> list[str]:
-    """Return in words which quantities two sides both state, and with values that do not agree."""
-    # Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of
-    # them where no uncertainty is stated; texts if they are equal.
-    differences = []
-    for quantity in (q for q in record.quantities if q.name in names):
-        values: list[Any] = [getattr(side, quantity.name, None) for side in stated]
-        spreads = [getattr(side, f"{quantity.name}_uncertainty", None) for side in stated]
-        if None in values or "" in values or _agree(values, spreads):
-            continue
-        words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
-        sides = []
-        for value, spread, place in zip(values, spreads, places, strict=True):
-            shown = f'"{value}"'
-            if not isinstance(value, str):
-                u = "not stated" if spread is None else f"{spread / quantity.scale:.2g}"
-                unit = quantity.unit and f" {quantity.unit}"
-                shown = f"{value / quantity.scale:.7g}{unit} (u {u})"
-            sides.append(f"{shown} in {place}")
-        differences.append(f"{words.strip()} {', '.join(sides)}")
-    return differences
-
-
-def _agree(values: Sequence[Any], spreads: Sequence[float | None]) -> bool:
-    if isinstance(values[0], str):
-        return bool(values[0] == values[1])
-    allowed = COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
-    return math.isclose(*values, rel_tol=_SAME, abs_tol=allowed)
-
-
-def accepted_differences(
-    differences: Sequence[str], *, override: bool, problem: str, why: str, cure: str
-) -> list[str]:
-    """Refuse what does not agree; with ``override`` return it, each difference once."""
-    if differences and not override:
-        raise InputError(
-            f"{problem}: {'; '.join(dict.fromkeys(differences))}.",
-            why=why,
-            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
-            "command line): that is recorded.",
-        )
-    return list(dict.fromkeys(differences))
 
 
 def across(correlation: FloatArray, group: NDArray[np.intp]) -> bool:

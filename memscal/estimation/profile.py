@@ -10,27 +10,24 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
 from memscal.estimation import bayesian
-from memscal.estimation.angular import AngularRings, angular_departures, isolated, raster_noise
+from memscal.estimation.angular import AngularRings, angular_departures
 from memscal.estimation.bayesian import WeighedFit
 from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
-from memscal.estimation.forward import ForwardModel, elliptic_departure, forward_model
+from memscal.estimation.ellipse import elliptic_departure
+from memscal.estimation.forward import ForwardModel, forward_model
 from memscal.estimation.gaussian import (
     GaussianFit,
     fit_gaussian_to_points,
-    robust_scale,
 )
+from memscal.estimation.outliers import OUTLIER_THRESHOLD, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
-#: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
-OUTLIER_THRESHOLD = 3.5
 #: Error of the reference and of its transforms, relative to the largest signal.
 NUMERICAL_FLOOR = 1e-6
-#: Residuals below this share of the largest voltage are of rounding, and show no outliers.
-_ROUNDING = 1e-10
 #: A conversion constant must exceed this many of its standard uncertainties.
 LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
@@ -250,7 +247,7 @@ def estimate_profile(
     noise = _least_noise(fit)
     angular = angular and points.planar and not model.order
     first = 2 * OUTLIER_THRESHOLD
-    outlier = start.outlier_weight if start else _outliers(points, residual, stated, first)
+    outlier = start.outlier_weight if start else point_weights(points, residual, stated, first)
     for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
         weights = stated * outlier
         count = float(outlier.sum())
@@ -260,7 +257,7 @@ def estimate_profile(
             noise = raster_noise(points, residual) or noise
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
-        updated = _outliers(points, residual, stated, OUTLIER_THRESHOLD)
+        updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
         # A residual counts by the root of its weight.
         if rounds_left and not np.allclose(updated**0.5, outlier**0.5, atol=0.02):
             outlier = updated
@@ -296,17 +293,6 @@ def _weighed(
         around = angular_departures(rings, fit, columns, noise)
     basis = departure_basis(model, fit, reduced, around)
     return basis, bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
-
-
-def _outliers(
-    points: ScanPoints, residual: FloatArray, stated: FloatArray, threshold: float
-) -> FloatArray:
-    """Weights of the points by their residuals; over the plane by what neighbours do not share."""
-    least = _ROUNDING * float(np.abs(points.u).max() * np.sqrt(stated).max())
-    if points.planar:
-        least = max(least, float(robust_scale(residual * np.sqrt(stated))))
-        residual = isolated(points, residual)
-    return outlier_weights(residual * np.sqrt(stated), threshold, least)
 
 
 def log_marginal_likelihood(
@@ -440,16 +426,6 @@ def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
     with_a = (integrals @ covariance)[block] / deviation
     correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
     return float(with_a @ np.linalg.pinv(correlation, hermitian=True) @ with_a)
-
-
-def outlier_weights(
-    standardised: FloatArray, threshold: float, least: float = np.finfo(float).tiny
-) -> FloatArray:
-    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
-    # The residuals count in robust standard deviations of their own, of ``least`` or more.
-    scale = 1.4826 * np.median(np.abs(standardised))
-    z = np.abs(standardised) / max(scale, least)
-    return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))
 
 
 _RADII = 60

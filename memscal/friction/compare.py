@@ -11,7 +11,8 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
-from memscal.estimation.points import TANGENTIAL, accepted_differences, measured_mask
+from memscal.estimation.points import TANGENTIAL, measured_mask
+from memscal.estimation.set_up import accepted_differences
 from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress

@@ -41,11 +41,7 @@ from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, dep
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import (
-    law_at_once,
-    law_sensitivities,
-    rod_spectrum,
-)
+from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray

@@ -16,6 +16,7 @@ from memscal.estimation import profile
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
+from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
@@ -162,7 +163,7 @@ def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: boo
     if apparatus.order:
         raise InputError(
             f"The artifact is of the tangential channel {apparatus.sensor.channel}, but "
-            f"{scan_points.file_in_words(scan.source, 'scan')} is to be read as normal stress.",
+            f"{file_in_words(scan.source, 'scan')} is to be read as normal stress.",
             why="A shear is no normal stress: this cannot be overridden.",
             cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
         )
@@ -174,7 +175,7 @@ def accept_other_sensor(
 ) -> list[str]:
     """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
     sources = (scan.source, "scan"), (apparatus.source, "artifact")
-    places = tuple(scan_points.file_in_words(*source) for source in sources)
+    places = tuple(file_in_words(*source) for source in sources)
     apparatus.require_pascals()
     unit = scan.unit or "V"
     si = apparatus.reading.si
@@ -184,10 +185,10 @@ def accept_other_sensor(
         raise InputError(problem, cure=cure)
     sensors = (scan.sensor, apparatus.sensor)
     films = (scan.film, apparatus.film)
-    return scan_points.accepted_differences(
+    return accepted_differences(
         [
-            *scan_points.stated_differences(SENSOR, names, sensors, places),
-            *scan_points.stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
+            *stated_differences(SENSOR, names, sensors, places),
+            *stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
         ],
         override=override,
         problem="Scan and artifact do not belong together",

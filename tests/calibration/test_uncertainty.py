@@ -12,7 +12,7 @@ from scipy.stats import binom
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
-from memscal.deconvolution.fourier_ratio import kernel_functionals
+from memscal.deconvolution.widths import kernel_functionals
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.model.arrays import FloatArray
 

@@ -9,7 +9,8 @@ from helpers.scans import estimated, simulated
 from scipy.signal import fftconvolve
 
 import memscal
-from memscal.estimation.angular import ORDERS, AngularDepartures, AngularRings, raster_noise
+from memscal.estimation.angular import ORDERS, AngularDepartures, AngularRings
+from memscal.estimation.outliers import raster_noise
 from memscal.estimation.points import measured_points
 
 RADII = np.array([0.3e-3, 0.8e-3])

@@ -5,8 +5,9 @@ import pytest
 from helpers.scans import RING, TAILS, estimated, simulated
 
 import memscal
+from memscal.estimation.band import Band, find_band, transfer_uncertainty
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.smoothing import Band, find_band, smooth_profile, transfer_uncertainty
+from memscal.estimation.smoothing import smooth_profile
 
 
 def band_of(estimate: ProfileEstimate) -> Band:

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.estimation.forward import elliptic_columns, elliptic_departure
+from memscal.estimation.ellipse import elliptic_columns, elliptic_departure
 from memscal.model.scan import Scan
 
 SEEDS = 20

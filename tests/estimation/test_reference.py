@@ -11,12 +11,8 @@ from helpers.scans import LINEAR_FILM, reference_spectrum, simulated
 import memscal
 from memscal.errors import InputError
 from memscal.estimation.points import measured_points
-from memscal.estimation.reference import (
-    film_sensitivities,
-    reference_profile,
-    require_same_set_up,
-    rod_sensitivities,
-)
+from memscal.estimation.reference_spectra import film_sensitivities, rod_sensitivities
+from memscal.estimation.set_up import reference_profile, require_same_set_up
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.mechanics.contact import Contact
 

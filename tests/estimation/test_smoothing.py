@@ -10,7 +10,8 @@ import memscal
 from memscal.calibration.fields import LineFields, choose_grid
 from memscal.deconvolution.division import WhiteNoise
 from memscal.deconvolution.fourier_ratio import divide
-from memscal.estimation.smoothing import find_band, smooth_profile
+from memscal.estimation.band import find_band
+from memscal.estimation.smoothing import smooth_profile
 
 DISC = memscal.SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
 

@@ -11,7 +11,7 @@ from memscal import GaussianMixture
 from memscal.errors import InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
-from memscal.estimation.reference import reference_spectra
+from memscal.estimation.reference_spectra import reference_spectra
 from memscal.extensions.simulation.rod_scan import PAPER_ROD
 from memscal.model.arrays import FloatArray
 

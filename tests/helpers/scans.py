@@ -13,7 +13,7 @@ from memscal import Contact, MeasuredStress, Process, RadialKernel, Scan, Stress
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
-from memscal.estimation.reference import reference_spectra
+from memscal.estimation.reference_spectra import reference_spectra
 from memscal.extensions.simulation.experiment import simulate_contacts
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, ParameterSet, TransferFunction

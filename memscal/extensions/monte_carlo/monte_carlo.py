@@ -19,12 +19,7 @@ from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
-from memscal.estimation.reference import (
-    RECTANGLE,
-    law_at_once,
-    relative,
-    rod_spectrum,
-)
+from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, relative, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading

@@ -21,13 +21,14 @@ from memscal.calibration.stages import Solution, solved
 from memscal.calibration.uncertainty import Results, input_effects
 from memscal.deconvolution.division import Method, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
-from memscal.estimation import reference
 from memscal.estimation.bayesian import supported, weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
+from memscal.estimation.reference_spectra import reference_spectra
+from memscal.estimation.set_up import reference_profile
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
@@ -152,9 +153,9 @@ class Plan:
 def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
     """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
-    stress = reference.reference_profile(scan, None)
+    stress = reference_profile(scan, None)
     points = measured_points(scan)
-    model = ForwardModel(points, reference.reference_spectra([stress], [points]))
+    model = ForwardModel(points, reference_spectra([stress], [points]))
     assert points.u_errors is not None  # the plan's: the voltages themselves have none
     weights = np.asarray(1 / points.u_errors**2)
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))

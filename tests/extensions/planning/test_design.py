@@ -12,7 +12,8 @@ import memscal
 from memscal import Plan
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
-from memscal.estimation.smoothing import find_band, smooth_profile
+from memscal.estimation.band import find_band
+from memscal.estimation.smoothing import smooth_profile
 from memscal.extensions.planning.design import Design, expected_calibration, varied_designs
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 

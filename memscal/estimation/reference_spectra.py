@@ -1,28 +1,25 @@
-"""Reference stress of a calibration: its source, its transform, and its sensitivities."""
+"""Spectra of reference stresses, and their change with the film's thickness and other inputs."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from types import SimpleNamespace
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import ConvergenceError, DomainError, InputError
-from memscal.estimation import points
 from memscal.estimation.points import ScanPoints
+from memscal.estimation.set_up import film_of, is_source
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.mechanics.tabulated_rod import largest_tabulated_load
 from memscal.model.arrays import FloatArray
-from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
+from memscal.model.film import LINEAR, NEO_HOOKEAN, more_and_less
 from memscal.model.indenter import Rod
-from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan, SetUp
 from memscal.model.stress import StressProfile
 from memscal.progress import counted
-from memscal.readings.mistaken_unit import require_plausible
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
@@ -42,158 +39,6 @@ _ROUND = 0.005
 _SEEN = 17
 
 
-def is_source(stress: BaseStress | None) -> bool:
-    """Whether a reference is a source that needs no film, rod and load."""
-    return stress is not None and stress.form is not None
-
-
-def require_one_kind(
-    references: Sequence[BaseStress | None], alternatives: Sequence[BaseStress | None]
-) -> None:
-    """Refuse references that no one conversion constant belongs to."""
-    forms = [reference and reference.form for reference in references]
-    kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
-    if len(kinds) > 1 or any(map(is_source, alternatives)) or (kinds != {None} and alternatives):
-        raise InputError(
-            "Sources and stresses, slits and other sources, or sources of several units are mixed.",
-            why="One conversion constant has one unit; an alternative is of a film's stress.",
-            cure="Calibrate each by itself.",
-        )
-
-
-def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
-    """Refuse scans that cannot be fitted together."""
-    sensors = {(s.sensor.name or "unnamed", s.sensor.channel, s.unit): None for s in scans}
-    if len(sensors) > 1:
-        named = ", ".join(f"{name} ({channel}, in {unit})" for name, channel, unit in sensors)
-        why = "Scans that are fitted together share one apparatus function."
-        cure = "Calibrate each sensor by itself; check /entry/instrument/stress_sensor."
-        raise InputError(f"The scans are of {len(sensors)} sensors: {named}.", why=why, cure=cure)
-    films: dict[str, ElasticFilm] = {}
-    for film in (scan.film for scan in scans if scan.film is not None):
-        first = films.setdefault(film.name, film)
-        if film.name and first != film:
-            raise InputError(
-                f"Two of the scans name their film {film.name!r}, but give it a thickness of "
-                f"{first.thickness * 1e3:.4g} and {film.thickness * 1e3:.4g} mm, a Poisson's ratio "
-                f"of {first.poisson_ratio:.4g} and {film.poisson_ratio:.4g}, and a modulus of "
-                f"{first.young_modulus * 1e-6:.4g} and {film.young_modulus * 1e-6:.4g} MPa, or "
-                "other uncertainties.",
-                why="One film has one set of properties.",
-                cure="Correct /entry/sample/film in one of the files, or its name.",
-            )
-    return tuple(scans)
-
-
-def require_calibration_rod(scan: Scan, reference: BaseStress | None) -> None:
-    """Refuse an indenter that cannot calibrate, and lengths that no set-up has."""
-    if scan.indenter is not None and not isinstance(scan.indenter, Rod):
-        raise InputError(
-            f"The scan was made with a {scan.indenter.shape}, but a calibration needs a rod.",
-            why="Only a contact smaller than the film's thickness is independent of friction and "
-            "linear in load.",
-            cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
-        )
-    if with_film_of(reference, scan).film is not None:
-        require_plausible(scan)
-
-
-def film_of(stress: BaseStress) -> ElasticFilm | None:
-    """Return the film that a stress is stated to be below."""
-    return stress.film_of_law if isinstance(stress, Contact) else stress.film
-
-
-def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
-    """Return a scan with film and rod if the reference depends on them, else without."""
-    stress = scan.reference if reference is None else reference
-    if stress is None:
-        return scan
-    film = film_of(stress)
-    rod = scan.indenter or stress.indenter
-    if film is None or not isinstance(rod, Rod):
-        return replace(scan, film=None, indenter=None, rod_friction=None)
-    return replace(scan, film=scan.film or film, indenter=rod)
-
-
-def require_same_set_up(
-    scans: Sequence[Scan],
-    references: Sequence[BaseStress | None],
-    alternatives: Sequence[BaseStress | None] = (),
-    *,
-    override: bool,
-) -> list[str]:
-    """Refuse a reference of another film, rod or load than its scan; or return the differences."""
-    # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
-    # alternative may have another law and friction, which it is given for.
-    given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
-    differences: list[str] = []
-    for kind, stresses in (("reference", given), ("alternative", alternatives)):
-        for scan, stress in zip(scans, stresses, strict=False):
-            if stress is not None and not (kind == "reference" and is_source(stress)):
-                differences += _other_set_up(scan, stress, kind)
-    cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
-    cure += "value that is wrong."
-    if any(text.startswith("load") for text in differences):
-        cure += " If the film of the reference is linear, state it (memscal import --film-law "
-        cure += "linear; ElasticFilm(law='linear') in Python)."
-    return points.accepted_differences(
-        differences,
-        override=override,
-        problem="Scan and calculated stress are not of one set-up",
-        why="A calibration divides by the stress that this rod makes below this film, in "
-        "proportion to the load where the film's law is linear.",
-        cure=cure,
-    )
-
-
-def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
-    """Return in words what of film, rod and load a stress was not calculated for."""
-    source = None if isinstance(stress, Contact) else stress.source
-    places = points.file_in_words(scan.source, "scan"), points.file_in_words(source, kind)
-    film = film_of(stress)
-    law = "" if film is None else film.law
-    names = ["thickness", "poisson_ratio"]
-    finite = {law, scan.film.law if scan.film and film else ""} - {"", LINEAR}
-    if finite:
-        # Equilibrium of a linear film holds its modulus as a factor on both sides: at a given load
-        # the modulus changes depths, and no stress.
-        names.append("young_modulus")
-    if kind == "reference":
-        names += ["law", "mooney_rivlin_ratio"]
-    # What one side does not state does not differ.
-    differences = points.stated_differences(FILM, names, (scan.film, film), places, "film")
-    pair = scan.indenter, stress.indenter
-    differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
-    if kind == "reference" and finite:
-        friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
-        rods = scan, SimpleNamespace(rod_friction=friction)
-        differences += points.stated_differences(LOAD, ("rod_friction",), rods, places)
-    if law == LINEAR or (scan.load is None and scan.normal_load is None):
-        return differences
-    loads = (_farthest(scan, stress), stress)
-    stated = f"law is {law or 'not stated'}"
-    return differences + [
-        f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
-        for text in points.stated_differences(LOAD, ("load",), loads, places)
-    ]
-
-
-def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
-    """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
-    loads = np.atleast_1d(scan.stated_load if scan.normal_load is None else scan.normal_load)
-    stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
-    spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
-    i = np.nanargmax(np.abs(loads - stress.load) - points.COVERAGE * spread)
-    uncertainty = float(spread.flat[i]) if stated else None
-    return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
-
-
-def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
-    """Choose the reference: the argument, the scan's own, or the rod on the expected film."""
-    known = reference or scan.reference
-    return known or press_rod(*scan.set_up.expected)
-
-
 def expected_spectra(
     scans: Sequence[Scan], stresses: Sequence[BaseStress], references: Sequence[RadialSpectrum]
 ) -> tuple[RadialSpectrum, ...]:
@@ -208,20 +53,6 @@ def expected_spectra(
             reference = replace(reference, values=reference.values + change)
         moved.append(reference)
     return tuple(moved)
-
-
-def at_load_of(stress: BaseStress, scan: Scan, peak: float | None) -> Scan:
-    """Return a scan with a load: its own or the reference's; with a ``peak`` (Pa) one for all."""
-    if peak:
-        # A refers to the reference over its peak.
-        factor = np.full(scan.u_zz.shape, stress.load / peak)
-        return replace(scan, load=stress.load, normal_load=factor, normal_load_errors=None)
-    if stress.unit != "Pa":
-        # Loads are strengths, over that of the reference, and no newtons.
-        scan = replace(scan, load_uncertainty=None)
-    if scan.load is None and scan.normal_load is not None:
-        return replace(scan, load=float(np.nanmedian(scan.normal_load)))
-    return scan if scan.load else replace(scan, load=stress.load)
 
 
 def reference_spectra(

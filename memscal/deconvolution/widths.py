@@ -1,0 +1,129 @@
+"""Widths of G: of the nearest Gaussian, at half maximum, and its noise-equivalent area."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import radial_spline, ring_areas
+from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
+from memscal.deconvolution.fourier_ratio import Field
+from memscal.estimation.gaussian import gauss_newton
+from memscal.model.arrays import FloatArray
+
+#: Points per step of the profile between which the half maximum is interpolated.
+_FINE = 20
+
+
+def fit_gaussian(g: Field, start: float | None = None) -> float:
+    r"""Width of the Gaussian of unit integral nearest to G over the plane: the paper's fit.
+
+    Minimises :math:`\int (G - e^{-r^2/2\sigma^2}/2\pi\sigma^2)^2\, r\,dr`.  A width below half a
+    step of the radial grid is not resolved.
+
+    Parameters
+    ----------
+    g : Field
+        G, in 1/m^2.
+    start : float, optional
+        Width from which the search starts, in m; by default that of a Gaussian with the same
+        integral of the square.
+
+    Returns
+    -------
+    float
+        Standard deviation of the Gaussian, in m.
+
+    Examples
+    --------
+    >>> import memscal, numpy as np
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> wide = memscal.lift(r, np.exp(-0.5 * (r / 0.6e-3) ** 2), 0.1e-3, 8e-3)
+    >>> _, g = memscal.normalise(wide)
+    >>> round(1e3 * memscal.fit_gaussian(g), 4)  # mm
+    0.6
+    """
+    r = g.r
+    radial = g.radial
+    root = np.sqrt(r)
+    narrowest = 0.5 * float(r[1] - r[0])
+    if start is None:
+        start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
+
+    def misfit(scaled: FloatArray) -> FloatArray:
+        return root * (unit_gaussian(r, scaled[0] * start) - radial) * start**2
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
+
+    def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        # A step may lead beyond the narrowest width, where the search with a bound takes over.
+        inside = np.maximum(scaled, narrowest / start)
+        return misfit(inside), slope(inside)
+
+    begin = np.array([max(start, 2 * narrowest) / start])
+    width = gauss_newton(linearise, begin, tolerance=1e-10)
+    if width is not None and width[0] * start > 2 * narrowest:
+        return float(width[0] * start)
+    from scipy.optimize import least_squares
+
+    bounds = (narrowest / start, np.inf)
+    bounded = least_squares(misfit, begin, slope, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+    return float(bounded.x[0] * start)
+
+
+@dataclass(frozen=True, eq=False)
+class Functional:
+    """A number read off G: its parameter's name, its value, and its derivative by G(r)."""
+
+    name: str
+    value: float
+    row: FloatArray
+
+
+def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
+    """Return the Gaussian width nearest to G, its half width and noise-equivalent area."""
+    r = field.r
+    g = field.radial
+    area = noise_area(r, g)
+    of_noise = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
+    return (_gaussian_width(r, g, sigma), _half_width(r, g), of_noise)
+
+
+def noise_area(r: FloatArray, g: FloatArray) -> float:
+    """Noise-equivalent area (m^2) of G (1/m^2) at even radii: 4 pi sigma^2 of a Gaussian."""
+    return float(1 / np.sum(ring_areas(r) * g**2))
+
+
+def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
+    """Width of the Gaussian u nearest to G over the plane."""
+    # Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
+    slope = unit_gaussian_slope(r, sigma)
+    step = 1e-4 * sigma
+    bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
+    left = unit_gaussian(r, sigma) - g
+    row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
+    return Functional("gaussian_sigma_deconvolved", sigma, row)
+
+
+def _half_width(r: FloatArray, g: FloatArray) -> Functional:
+    """Diameter of the outermost circle where G is half of its maximum."""
+    # With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
+    fine = np.linspace(r[0], r[-1], _FINE * r.size)
+    values = radial_spline(r, g)(fine)
+    top = int(np.argmax(values))
+    last = min(int(np.flatnonzero(values >= values[top] / 2)[-1]), fine.size - 2)
+    slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
+    half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
+    row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
+    row = -2 * row / slope if slope else np.zeros_like(row)
+    return Functional("fwhm", float(2 * half), row)
+
+
+def _at(r: FloatArray, place: float) -> FloatArray:
+    """Row that reads a profile at a radius, by linear interpolation."""
+    row = np.zeros_like(r)
+    i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
+    share = (place - r[i]) / (r[i + 1] - r[i])
+    row[i] = 1 - share
+    row[i + 1] = share
+    return row

@@ -1,0 +1,88 @@
+"""Band of a scan: the relevant wavenumbers, which a division uses, and the resolved ones of G.
+
+Components are relevant to a division while the transform of the profile stands above its noise.
+G is resolved while the posterior standard uncertainty of its transfer function stays below a third
+of the fitted Gaussian's, which has no zeros and no lobes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.smoothing import SmoothedProfile
+from memscal.model.arrays import FloatArray
+
+#: A spectral component is relevant while it stands this many times above its noise: with the
+#: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
+RELEVANT = 15.0
+#: ...of a raster, which has as many components as points, they are about equal at this one...
+RELEVANT_OF_RASTER = 5.0
+#: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.
+RESOLVED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Signal and noise of the voltage's transform, and the relevant and resolved wavenumbers."""
+
+    k: FloatArray  # (n,): wavenumbers, in rad/m
+    signal: FloatArray  # (n,): modulus of the voltage's transform and its noise, in V m^2 / N
+    noise: FloatArray
+    # Both wavenumbers in rad/m, and at most the last one that the scan's step samples.
+    relevant: float  # beyond it the signal is less than 15 times the noise
+    resolved: float  # up to it the uncertainty is less than a third of the Gaussian
+    weakest_voltage: float  # moduli of both fields' transforms at the relevant wavenumber
+    weakest_reference: float
+
+
+def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Band:
+    """Find the band of a scan, of a tangential channel (nothing to divide) by its estimate."""
+    yardstick = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
+    k = estimate.model.k
+    reference = np.abs(estimate.model.reference.values)
+    error = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny)
+    clear = RELEVANT
+    if smoothed is None:
+        signal = np.abs(estimate.spectrum.values)
+        noise = error * estimate.conversion_constant * reference
+    elif (points := estimate.points).as_raster:
+        # Of all points of a raster the noise is equal at all wavenumbers.
+        share = points.cell / points.of_places("readings") * estimate.outlier_weight
+        noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
+        signal = np.abs(smoothed.spectrum.values)
+        clear = RELEVANT_OF_RASTER
+    else:
+        signal = np.abs(smoothed.spectrum.values)
+        noise = smoothed.noise
+    noise = np.maximum(noise, np.finfo(float).tiny)
+    # Nothing finer than two steps of the scan was sampled, whatever its signal.
+    sampled = np.pi / estimate.points.step
+    relevant = min(_falls_below(k, signal / noise, clear), sampled)
+    ratio = yardstick / error
+    lost = np.flatnonzero(ratio < RESOLVED)
+    end = int(lost[0]) + 1 if lost.size else k.size
+    resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
+    weakest = (float(np.interp(relevant, k, modulus)) for modulus in (signal, reference))
+    return Band(k, signal, noise, relevant, resolved, *weakest)
+
+
+def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
+    """Posterior standard uncertainty of K(k)/K(0) at the nodes, K = A G; the reference is exact."""
+    basis = estimate.basis
+    a = estimate.conversion_constant
+    rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
+    variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
+    """Return where a ratio falls below a threshold for good, log-interpolated."""
+    # The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
+    i = int(np.flatnonzero(ratio >= threshold).max(initial=-1)) + 1
+    if i in (0, k.size):
+        return float(k[max(i - 1, 0)])
+    upper = np.log(ratio[i - 1])
+    lower = np.log(max(ratio[i], np.finfo(float).tiny))
+    return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
