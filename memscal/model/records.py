@@ -14,7 +14,7 @@ _R = ("r",)
 _X = ("x",)
 _YX = ("y", "x")
 _K = ("k",)
-_PER_LOAD = ("load",)
+
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
 
@@ -324,18 +324,6 @@ SOLUTION = (
     Quantity("dissipated_energy", "energy", "energy that friction has taken"),
     Quantity("discretisation", "text", "mesh or quadrature"),
 )
-PLAN = (
-    Quantity("positions", _COUNT, "positions"),
-    Quantity("step", _L, "step"),
-    Quantity("half_range", _L, "half range"),
-    Quantity("repeats", _COUNT, "repeats"),
-    Quantity("load", "force", "load", "P"),
-    Quantity("signal", _U, "largest signal", label="largest_signal"),
-    Quantity("point_noise", _U, "noise of a voltage", label="noise"),
-)
-EXPECTED = (*measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")), TRANSFER.quantities[-1])
-"""What a planned scan is expected to give beside its parameters."""
-
 FORCE_BUDGET = Quantity("force_budget", "force", "uncertainty of it by source", axes=("source",))
 MAXIMUM_BUDGET = Quantity("maximum_budget", _P, "that of the maximum", axes=("source",))
 APPLIED = (
@@ -395,44 +383,3 @@ DRY_AGAINST_LUBRICATED = (
     *measured(Quantity("relative", _ONE, "of the lubricated")),
     *FIT,
 )
-
-LAW = (
-    Quantity("name", "text", "law"),
-    Quantity("best", _COUNT, "best parameters"),
-    Quantity("log_evidence", _COUNT, "ln of evidence"),
-    Quantity("log_likelihood", _COUNT, "ln of the largest likelihood"),
-    Quantity("numerical_error", _COUNT, "standard uncertainty of the integral"),
-    *ESTIMATE_FIT[1:],
-)
-BAYES_FACTOR = (
-    Quantity("favoured", "text", "law that is favoured"),
-    Quantity("against", "text", "law"),
-    Quantity("log_factor", _COUNT, "ln of the Bayes factor"),
-    Quantity("words", "text", "evidence"),
-    Quantity("log_likelihood_ratio", _COUNT, "ln of the ratio of the largest likelihoods"),
-)
-COMPARED_LAWS = (
-    Quantity("lubrication", "text", "dry or lubricated"),
-    Quantity("loads", "force", "loads", axes=_PER_LOAD),
-)
-_EFFECTIVE = "effective_friction_coefficient"
-IMPLIED = (
-    Quantity("load", "force", "load", axes=_PER_LOAD),
-    Quantity("friction", _ONE, "effective coefficient", axes=_PER_LOAD, label=_EFFECTIVE),
-    Quantity("pressure", _P, "mean pressure", axes=_PER_LOAD, label="mean_pressure"),
-    Quantity("stiffness", "stress per length", "stiffness", axes=_PER_LOAD),
-)
-"""What a slip length means at one load; coefficient and stiffness with the ends of intervals."""
-
-DRAWN = (
-    Quantity("value", _COUNT, "value of the calibration"),
-    Quantity("expected", _COUNT, "expectation of the draws to first order"),
-    Quantity("mean", _COUNT, "mean of the draws"),
-    Quantity("uncertainty", _COUNT, "u of the draws", label="standard_uncertainty"),
-    Quantity("sampling_error", _COUNT, "standard uncertainty of that"),
-    Quantity("symmetric", _COUNT, "95 % interval", label="interval_95"),
-    Quantity("shortest", _COUNT, "shortest 95 % interval", label="shortest_interval_95"),
-    Quantity("first_order", _COUNT, "u by the budget"),
-    Quantity("stated", _COUNT, "u with what regularisation hides"),
-)
-"""A parameter by draws and by its budget, all in the unit of the parameter."""

@@ -4,11 +4,47 @@ from typing import Any
 
 from memscal.friction import results
 from memscal.friction.results import percent
-from memscal.model.quantities import KPA
-from memscal.model.records import BAYES_FACTOR, COMPARED_LAWS, IMPLIED, LAW, SLIP_LENGTH
+from memscal.model.quantities import KPA, Quantity
+from memscal.model.records import ESTIMATE_FIT, SLIP_LENGTH
 from memscal.summaries.comparison import bounded_json, friction_name
 from memscal.summaries.declared import members
 from memscal.summaries.table import Table, texts_of
+
+_PER_LOAD = ("load",)
+
+LAW = (
+    Quantity("name", "text", "law"),
+    Quantity("best", "number", "best parameters"),
+    Quantity("log_evidence", "number", "ln of evidence"),
+    Quantity("log_likelihood", "number", "ln of the largest likelihood"),
+    Quantity("numerical_error", "number", "standard uncertainty of the integral"),
+    *ESTIMATE_FIT[1:],
+)
+
+BAYES_FACTOR = (
+    Quantity("favoured", "text", "law that is favoured"),
+    Quantity("against", "text", "law"),
+    Quantity("log_factor", "number", "ln of the Bayes factor"),
+    Quantity("words", "text", "evidence"),
+    Quantity("log_likelihood_ratio", "number", "ln of the ratio of the largest likelihoods"),
+)
+
+COMPARED_LAWS = (
+    Quantity("lubrication", "text", "dry or lubricated"),
+    Quantity("loads", "force", "loads", axes=_PER_LOAD),
+)
+
+_FRICTION = "effective_friction_coefficient"
+
+IMPLIED = (
+    Quantity("load", "force", "load", axes=_PER_LOAD),
+    Quantity(
+        "friction", "dimensionless", "effective coefficient", axes=_PER_LOAD, label=_EFFECTIVE
+    ),
+    Quantity("pressure", "stress", "mean pressure", axes=_PER_LOAD, label="mean_pressure"),
+    Quantity("stiffness", "stress per length", "stiffness", axes=_PER_LOAD),
+)
+"""What a slip length means at one load; coefficient and stiffness with the ends of intervals."""
 
 _STIFFNESS = IMPLIED[-1]
 

@@ -3,10 +3,22 @@
 from typing import Any
 
 from memscal.extensions.monte_carlo.monte_carlo import BudgetComparison, MonteCarlo
-from memscal.model.quantities import estimated_quantity
-from memscal.model.records import DRAWN
+from memscal.model.quantities import Quantity, estimated_quantity
 from memscal.summaries.declared import DataFrame, plain
 from memscal.summaries.table import Table, texts_of
+
+DRAWN = (
+    Quantity("value", "number", "value of the calibration"),
+    Quantity("expected", "number", "expectation of the draws to first order"),
+    Quantity("mean", "number", "mean of the draws"),
+    Quantity("uncertainty", "number", "u of the draws", label="standard_uncertainty"),
+    Quantity("sampling_error", "number", "standard uncertainty of that"),
+    Quantity("symmetric", "number", "95 % interval", label="interval_95"),
+    Quantity("shortest", "number", "shortest 95 % interval", label="shortest_interval_95"),
+    Quantity("first_order", "number", "u by the budget"),
+    Quantity("stated", "number", "u with what regularisation hides"),
+)
+"""A parameter by draws and by its budget, all in the unit of the parameter."""
 
 
 def tables(result: MonteCarlo) -> list[Table]:

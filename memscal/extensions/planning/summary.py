@@ -4,10 +4,23 @@ import math
 from typing import Any
 
 from memscal.extensions.planning.design import Design
-from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity
-from memscal.model.records import EXPECTED, PLAN, RADIAL, TRANSFER
+from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity, measured
+from memscal.model.records import RADIAL, TRANSFER
 from memscal.summaries import declared
 from memscal.summaries.table import Table
+
+PLAN = (
+    Quantity("positions", "number", "positions"),
+    Quantity("step", "length", "step"),
+    Quantity("half_range", "length", "half range"),
+    Quantity("repeats", "number", "repeats"),
+    Quantity("load", "force", "load", "P"),
+    Quantity("signal", "voltage", "largest signal", label="largest_signal"),
+    Quantity("point_noise", "voltage", "noise of a voltage", label="noise"),
+)
+
+EXPECTED = (*measured(Quantity("g_at_axis", "per area", "G at the axis")), TRANSFER.quantities[-1])
+"""What a planned scan is expected to give beside its parameters."""
 
 #: Words and symbol of the parameters that are shown.
 _SHOWN = {
