@@ -38,9 +38,7 @@ _FRICTION = "effective_friction_coefficient"
 
 IMPLIED = (
     Quantity("load", "force", "load", axes=_PER_LOAD),
-    Quantity(
-        "friction", "dimensionless", "effective coefficient", axes=_PER_LOAD, label=_EFFECTIVE
-    ),
+    Quantity("friction", "dimensionless", "effective coefficient", axes=_PER_LOAD, label=_FRICTION),
     Quantity("pressure", "stress", "mean pressure", axes=_PER_LOAD, label="mean_pressure"),
     Quantity("stiffness", "stress per length", "stiffness", axes=_PER_LOAD),
 )
