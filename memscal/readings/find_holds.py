@@ -41,15 +41,16 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
         raise InputError(f"The log has {u.size} rows without gaps.", cure=_CURE)
     position = columns["x"] + 1j * columns.get("y", np.zeros(u.size))
     way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
-    dwell = np.append(0, np.cumsum(np.abs(np.diff(position)) > _MOVING * way))
+    moves = np.abs(np.diff(position)) > _MOVING * way
+    dwell = np.append(0, np.cumsum(moves))
     pressed = _timed(u, dwell) if load is None else _loaded(load)
-    level = float(np.median(u[~pressed])) if not pressed.all() else 0.0
+
     starts = np.flatnonzero(np.diff(np.where(pressed, dwell, -1), prepend=-1))
     runs = [run for run in np.split(np.arange(u.size), starts) if run.size and pressed[run[0]]]
-    for values, lifted, share in ((load, 0.0, 0.75), (u, level, 0.5)):
-        if values is not None:  # of a load's run the ramps are below the hold
-            near = _NOISE * _noise(values[pressed])
-            runs = [run[_steady(values[run], lifted, share, near)] for run in runs if run.size]
+    if load is not None:  # the ramps of a run are below the hold
+        runs = _steady_rows(runs, load, pressed, lifted=0.0, share=0.75)
+    level = 0.0 if pressed.all() else float(np.median(u[~pressed]))
+    runs = _steady_rows(runs, u, pressed, lifted=level, share=0.5)
     held = [run for run in runs if run.size >= _FEWEST]
     if not held:
         why = f"A hold is {_FEWEST} rows or more in which position, load and reading are steady."
@@ -65,42 +66,51 @@ def _averaged(
     reading: Reading,
 ) -> Holds:
     """Average all columns over the rows of each hold, and say what the readings scatter by."""
-    first, stop = np.array([(run[0], run[-1] + 1) for run in held]).T
+    first = np.array([run[0] for run in held])
+    stop = np.array([run[-1] + 1 for run in held])
+    size = stop - first
     u = columns["u_zz"]
     mean = {
         name: np.array([values[run].mean() for run in held]) for name, values in columns.items()
     }
     for name in mean.keys() & {"repeat", "branch"}:
         mean[name] = columns[name][first]
-    apart = [u[run] - u[run].mean() for run in held]
-    size = stop - first
-    scatter = np.array([np.std(e, ddof=1) for e in apart])
-    # Noise of neighbouring rows is correlated where an amplifier filters it (autoregression).
-    total = sum(float(e @ e) for e in apart) or 1.0
-    correlation = sum(float(e[1:] @ e[:-1]) for e in apart) / total + 1 / np.median(size)
-    correlation = float(np.clip(correlation, 0.0, 0.95))
+
+    residuals = [u[run] - u[run].mean() for run in held]
+    scatter = np.array([np.std(residual, ddof=1) for residual in residuals])
     # A few rows may agree by chance: no hold counts as less noisy than the typical one.
-    single = np.maximum(scatter, np.median(scatter)) * np.sqrt(
-        (1 + correlation) / (1 - correlation)
+    noise = np.maximum(scatter, np.median(scatter))
+    correlation = _correlation_of_neighbours(residuals) + 1 / np.median(size)
+    correlation = float(np.clip(correlation, 0.0, 0.95))
+    errors = noise * np.sqrt((1 + correlation) / (1 - correlation)) / np.sqrt(size)
+
+    thirds = [run.size // 3 for run in held]
+    change = np.array(
+        [u[run[-n:]].mean() - u[run[:n]].mean() for run, n in zip(held, thirds, strict=True)]
     )
-    errors = single / np.sqrt(size)
-    change = np.array([u[r[-(r.size // 3) :]].mean() - u[r[: r.size // 3]].mean() for r in held])
-    usual, u_mean, changes = (reading.text(np.median(v)) for v in (scatter, errors, change))
-    found = (
+    averaged = (
         f"{len(held)} holds of {size.min()} to {size.max()} rows, the first in lines "
         f"{line[first[0]]} to {line[stop[0] - 1]}, are averaged to one reading each; "
         f"{left_out} presses of fewer than {_FEWEST} steady rows are left out."
     )
     scatters = (
-        f"Within a hold the readings scatter by {usual}, neighbouring rows correlate by "
-        f"{correlation:.2g}, and the mean has the standard uncertainty {u_mean} (medians)."
+        f"Within a hold the readings scatter by {reading.text(np.median(scatter))}, neighbouring "
+        f"rows correlate by {correlation:.2g}, and the mean has the standard uncertainty "
+        f"{reading.text(np.median(errors))} (medians)."
     )
-    changed = (
-        f"From the first to the last third of a hold the readings change by {changes} (median; at "
-        f"most by {reading.text(np.abs(change).max())})."
+    changes = (
+        "From the first to the last third of a hold the readings change by "
+        f"{reading.text(np.median(change))} (median; at most by "
+        f"{reading.text(np.abs(change).max())})."
     )
     log = {name: columns[name] for name in _LOGGED if name in columns}
-    return Holds(log, line, first, stop, mean, errors, reading, (found, scatters, changed))
+    return Holds(log, line, first, stop, mean, errors, reading, (averaged, scatters, changes))
+
+
+def _correlation_of_neighbours(residuals: list[FloatArray]) -> float:
+    """Correlation of neighbouring rows, such as an amplifier's filter makes (autoregression)."""
+    power = sum(float(residual @ residual) for residual in residuals)
+    return sum(float(residual[1:] @ residual[:-1]) for residual in residuals) / (power or 1.0)
 
 
 def _loaded(load: FloatArray) -> NDArray[np.bool_]:
@@ -116,10 +126,12 @@ def _timed(u: FloatArray, dwell: NDArray[np.intp]) -> NDArray[np.bool_]:
     size = np.diff(starts, append=u.size)
     time = (np.arange(u.size) - starts[dwell]) / size[dwell]
     spans = []
-    for a, n in zip(starts, size, strict=True):
-        low, high = np.quantile(u[a : a + n], [0.05, 0.95])
-        if n >= _FEWEST and high - low > 2 * _NOISE * _noise(u[a : a + n]):
-            spans.append(time[a : a + n][u[a : a + n] > (low + high) / 2][[0, -1]])
+    for start, count in zip(starts, size, strict=True):
+        rows = slice(start, start + count)
+        low, high = np.quantile(u[rows], [0.05, 0.95])
+        if count >= _FEWEST and high - low > 2 * _NOISE * _noise(u[rows]):
+            raised = time[rows][u[rows] > (low + high) / 2]
+            spans.append((raised[0], raised[-1]))
     begins, ends = np.array(spans or [(0.0, 1.0)]).T
     begin = np.quantile(begins, 0.9)
     end = np.quantile(ends, 0.1)
@@ -133,8 +145,22 @@ def _noise(values: FloatArray) -> float:
     return float(np.median(np.abs(np.diff(values)))) * _TO_SIGMA if values.size > 1 else 0.0
 
 
-def _steady(values: FloatArray, lifted: float, share: float, near: float) -> slice:
-    """Return the rows from the first to the last that is close to the quantile of a share."""
-    held = float(np.quantile(values, share))
-    inside = np.flatnonzero(np.abs(values - held) <= max(near, _STEADY * abs(held - lifted)))
-    return slice(inside[0], inside[-1] + 1) if inside.size else slice(0)
+def _steady_rows(
+    runs: list[NDArray[np.intp]],
+    values: FloatArray,
+    pressed: NDArray[np.bool_],
+    *,
+    lifted: float,
+    share: float,
+) -> list[NDArray[np.intp]]:
+    """Cut each run to the rows from the first to the last that is close to its quantile."""
+    noise = _NOISE * _noise(values[pressed])
+    steady = []
+    for run in runs:
+        if not run.size:
+            continue
+        held = float(np.quantile(values[run], share))
+        near = max(noise, _STEADY * abs(held - lifted))
+        inside = np.flatnonzero(np.abs(values[run] - held) <= near)
+        steady.append(run[inside[0] : inside[-1] + 1] if inside.size else run[:0])
+    return steady
