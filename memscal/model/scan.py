@@ -64,7 +64,8 @@ def require_rod_friction(friction: float | None) -> None:
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
-    values = numbers = np.asarray(stated)
+    values = np.asarray(stated)
+    numbers = values
     named = {"": 0, **BRANCHES}
     if values.dtype.kind not in "biuf":
         words = [named.get(v.strip().lower(), -1) if isinstance(v, str) else v for v in values.flat]
@@ -240,33 +241,13 @@ class Scan:
     source: SourceFile | None = None
 
     def __post_init__(self) -> None:
-        for name in ("x", "y"):
-            if (values := getattr(self, name)) is not None:
-                values = arrays.finite_vector(f"{name} of the scan", values)
-                place = f"{name} of the scan (/entry/data/{name})"
-                arrays.require_size(place, values, "m", smallest=0.0)
-                object.__setattr__(self, name, values)
+        self._freeze_positions()
         object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
-        if self.repeat is not None:
-            repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
-            object.__setattr__(self, "repeat", repeat)
         self._check_signal_shape()
-        for name in LIKE_SIGNAL:
-            if (values := getattr(self, name)) is not None:
-                object.__setattr__(self, name, self._like_signal(name, values))
-        if self.branch is not None:
-            branch = branch_numbers("branch of the scan", self.branch)
-            if branch.shape == self.u_zz.shape[:-1] != ():
-                branch = np.broadcast_to(branch[:, None], self.u_zz.shape)
-            object.__setattr__(self, "branch", self._like_signal("branch", branch, np.int64))
-        channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
-        object.__setattr__(self, "channels", MappingProxyType(channels))
+        self._freeze_readings()
         self._check_values()
-        self._check_positions()
-        sized = {name: getattr(self, name) for name in ("u_zz", *LIKE_SIGNAL)} | channels
-        for name, values in sized.items():
-            if values is not None:
-                arrays.require_size(f"{name} of the scan", values)
+        self._check_load()
+        self._check_direction()
         require_contacts(self)
         arrays.warn_of_units(self.film, self.indenter)
         if self.u_zz_correlation is not None:
@@ -384,17 +365,38 @@ class Scan:
         channels = {name: values[keep] for name, values in self.channels.items()}
         return replace(self, **changes, channels=channels)
 
+    def _freeze_positions(self) -> None:
+        for name in ("x", "y"):
+            stated = getattr(self, name)
+            if stated is not None:
+                values = arrays.finite_vector(f"{name} of the scan", stated)
+                place = f"{name} of the scan (/entry/data/{name})"
+                arrays.require_size(place, values, "m", smallest=0.0)
+                object.__setattr__(self, name, values)
+        if self.repeat is not None:
+            repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
+            object.__setattr__(self, "repeat", repeat)
+        if self.x_errors is not None:
+            errors = arrays.finite_vector("x_errors of the scan", self.x_errors)
+            if errors.shape != self.x.shape or np.any(errors < 0):
+                raise InputError(
+                    f"x_errors holds {errors.size} values for {self.x.size} positions, the "
+                    f"smallest {errors.min(initial=0.0) * 1e3:.4g} mm.",
+                    cure="Give one standard uncertainty for each position, in m, none negative.",
+                )
+            object.__setattr__(self, "x_errors", errors)
+
     def _check_signal_shape(self) -> None:
         n = self.x.size
         shape = self.u_zz.shape
-        if self.y is not None:
+        if self.y is None:
+            good = len(shape) in (1, 2) and shape[-1:] == (n,) and self.u_zz.size > 0
+            expected = f"({n},) or (repeat, {n})"
+        else:
             good = shape == (self.y.size, n) or shape == (n,) == self.y.shape
             expected = f"({self.y.size}, {n}), from y and x"
             if self.y.size == n:
                 expected += f", or ({n},), one voltage for each point"
-        else:
-            good = self.u_zz.ndim in (1, 2) and shape[-1:] == (n,) and self.u_zz.size > 0
-            expected = f"({n},) or (repeat, {n})"
         if not good:
             raise InputError(f"u_zz has shape {shape}, but it should be {expected}.")
         if self.repeat is not None and not self.repeat.shape == self.x.shape == shape:
@@ -405,73 +407,85 @@ class Scan:
         if self.kind == "points" and self.y is not None:
             require_plane(self.x, self.y)
 
+    def _freeze_readings(self) -> None:
+        arrays.require_size("u_zz of the scan", self.u_zz)
+        channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
+        object.__setattr__(self, "channels", MappingProxyType(channels))
+        for name in LIKE_SIGNAL:
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, self._like_signal(name, values))
+        if self.branch is not None:
+            branch = branch_numbers("branch of the scan", self.branch)
+            if branch.shape == self.u_zz.shape[:-1] != ():
+                branch = np.broadcast_to(branch[:, None], self.u_zz.shape)
+            object.__setattr__(self, "branch", self._like_signal("branch", branch, np.int64))
+
     def _like_signal(self, name: str, values: ArrayLike, dtype: Any = np.float64) -> FloatArray:
         array = arrays.frozen_array(values, dtype=dtype)
         if array.shape != self.u_zz.shape:
             raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
+        arrays.require_size(f"{name} of the scan", array)
         return array
 
     def _check_values(self) -> None:
         if np.any(np.isinf(self.u_zz)):
             problem = "u_zz holds an infinite voltage."
             raise InputError(problem, cure="Mark missing points with NaN.")
-        if self.load is not None and not (np.isfinite(self.load) and self.load > 0):
-            raise InputError(
-                f"The load of the scan is {self.load:g} N, but it must be above zero.",
-                why="A calibration divides the voltage by the stress that this load produces.",
-                cure="Give the indenter's load (/entry/indenter/load).",
-            )
-        arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
-        if self.load is not None and (self.load_uncertainty or 0.0) >= self.load:
-            raise InputError(
-                f"The standard uncertainty of the load is {self.load_uncertainty:g} N, but the "
-                f"load is {self.load:g} N.",
-                why="By a load that may be zero nothing is known of the stress.",
-                cure=f"Give it in N: 1 % of the load are {0.01 * self.load:g} N.",
-            )
-        require_rod_friction(self.rod_friction)
         for name in ("u_zz_errors", "normal_load_errors"):
             errors = getattr(self, name)
             if errors is not None and np.any((errors < 0) | np.isinf(errors)):
                 problem = "holds a standard uncertainty that is negative or infinite."
                 raise InputError(f"{name} {problem}")
         loads = self.normal_load
-        if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
+        if loads is None:
+            return
+        if np.any((loads <= 0) | np.isinf(loads)):
             problem = "normal_load holds a load that is infinite or not above zero."
             raise InputError(problem, cure="Mark points without contact as missing (NaN).")
-        if loads is not None and np.isnan(loads).all():
+        if np.isnan(loads).all():
             cure = "Leave it out, and state the one load of all points."
             raise InputError("normal_load is missing (NaN) at every point.", cure=cure)
 
-    def _check_positions(self) -> None:
+    def _check_load(self) -> None:
+        require_rod_friction(self.rod_friction)
+        arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        if self.load is None:
+            return
+        if not (np.isfinite(self.load) and self.load > 0):
+            raise InputError(
+                f"The load of the scan is {self.load:g} N, but it must be above zero.",
+                why="A calibration divides the voltage by the stress that this load produces.",
+                cure="Give the indenter's load (/entry/indenter/load).",
+            )
+        if (self.load_uncertainty or 0.0) >= self.load:
+            raise InputError(
+                f"The standard uncertainty of the load is {self.load_uncertainty:g} N, but the "
+                f"load is {self.load:g} N.",
+                why="By a load that may be zero nothing is known of the stress.",
+                cure=f"Give it in N: 1 % of the load are {0.01 * self.load:g} N.",
+            )
+
+    def _check_direction(self) -> None:
         if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
             cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
             raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
         arrays.require_non_negative(
             "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
         )
-        if self.x_errors is None:
-            return
-        errors = arrays.finite_vector("x_errors of the scan", self.x_errors)
-        if errors.shape != self.x.shape or np.any(errors < 0):
-            raise InputError(
-                f"x_errors holds {errors.size} values for {self.x.size} positions, the smallest "
-                f"{errors.min(initial=0.0) * 1e3:.4g} mm.",
-                cure="Give one standard uncertainty for each position, in m, none negative.",
-            )
-        object.__setattr__(self, "x_errors", errors)
 
 
 def common_circumstances(scans: Sequence[Scan]) -> dict[str, Any]:
     """Return what gave loads and positions, and who measured, if common to all scans, and when."""
     first = scans[0]
-    # Times in ISO 8601 and one time zone have the order of their texts.
+    same_cell = all(first.load_cell.same_as(scan.load_cell) for scan in scans)
+    same_stage = all(first.stage == scan.stage for scan in scans)
+    same_user = all(first.user == scan.user for scan in scans)
     return {
-        "load_cell": first.load_cell
-        if all(first.load_cell.same_as(scan.load_cell) for scan in scans)
-        else LoadCell(),
-        "stage": first.stage if all(first.stage == scan.stage for scan in scans) else Equipment(),
-        "user": first.user if all(first.user == scan.user for scan in scans) else User(),
+        "load_cell": first.load_cell if same_cell else LoadCell(),
+        "stage": first.stage if same_stage else Equipment(),
+        "user": first.user if same_user else User(),
+        # Times in ISO 8601 and one time zone have the order of their texts.
         "start_time": min(scan.start_time for scan in scans),
         "end_time": max(scan.end_time for scan in scans) if all(s.end_time for s in scans) else "",
     }

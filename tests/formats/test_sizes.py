@@ -24,8 +24,8 @@ from memscal.formats.tables import text_table
 from memscal.formats.tables.scan import import_table
 from memscal.formats.tables.text_table import TextTable, Wanted
 from memscal.friction import compare as compare_module
-from memscal.model import positions as places_module
 from memscal.model.scan import BRANCHES
+from memscal.readings import find_places as places_module
 from memscal.readings.find_places import places_of
 
 COLUMNS = {"x": Wanted("x", "mm", "length"), "u": Wanted("u"), "n": Wanted("n", words=BRANCHES)}
