@@ -66,7 +66,7 @@ _INTERVALS_PER_PANEL = 16
 _TABLE_PHASE = 40.0
 
 #: Tables of Bessel functions of no more products are kept.
-_MOST_KEPT = 200_000
+_MOST_KEPT = 300_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ import math
 from functools import lru_cache
 
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
 from memscal.mechanics.tabulated_rod import tabulated_rod
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
@@ -18,13 +17,20 @@ def press_rod(
     # Friction is 0 or inf; by default a linear film slides, which changes its base stress by 1e-3,
     # and one of another law sticks, which is solved at any depth.  A sphere sinks less: its film
     # is linear.
+    strain = None
     if film.law in ("", LINEAR) or not isinstance(rod, Rod):
-        return indent(film, rod, load=load, friction=friction or 0.0, strain="linear")
-    friction = math.inf if friction is None else friction
-    tabulated = None
-    if film.law == NEO_HOOKEAN:
-        tabulated = tabulated_rod(film, rod, load, sticking=friction > 0)
-    return tabulated or indent(film, rod, load=load, friction=friction)
+        friction = friction or 0.0
+        strain = "linear"
+    else:
+        friction = math.inf if friction is None else friction
+        if film.law == NEO_HOOKEAN:
+            tabulated = tabulated_rod(film, rod, load, sticking=friction > 0)
+            if tabulated is not None:
+                return tabulated
+    # Imported here, for a rod that is in the table needs no solver.
+    from memscal.mechanics.indent import indent
+
+    return indent(film, rod, load=load, friction=friction, strain=strain)
 
 
 @lru_cache(maxsize=256)

@@ -146,7 +146,7 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
         for axis, value in ((ratios, poisson), (radii, radius))
     )
     ends = reached[i : i + 2, j : j + 2].min(axis=1)
-    count = int(ends[_polynomial(ratios[i : i + 2], poisson) != 0].min())
+    count = int(ends[_polynomial(tuple(ratios[i : i + 2]), poisson) != 0].min())
     if count < _STENCIL:
         return None
     rows = np.empty((count, columns.shape[-1]))
@@ -157,10 +157,10 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
             nodes = _nearest(np.flatnonzero(reached[m] > n), j)
             if {j, j + 1} <= set(nodes):
                 usable.append(m)
-                weights = _polynomial(np.log(radii[nodes]), np.log(radius))
+                weights = _polynomial(tuple(np.log(radii[nodes])), np.log(radius))
                 of_ratios[m] = weights @ columns[m, nodes, n]
         chosen = _nearest(np.array(usable), i)
-        rows[n] = _polynomial(ratios[chosen], poisson) @ of_ratios[chosen]
+        rows[n] = _polynomial(tuple(ratios[chosen]), poisson) @ of_ratios[chosen]
     flat: Any = ((1, np.zeros(rows.shape[1])), "not-a-knot")
     spline = CubicSpline(np.cbrt(depths[:count]), rows, bc_type=flat)
     return _Column(spline, float(depths[count - 1]))
@@ -172,7 +172,11 @@ def _nearest(nodes: Any, place: int) -> list[int]:
     return sorted(order[:_STENCIL])
 
 
-def _polynomial(nodes: FloatArray, x: float) -> FloatArray:
+@lru_cache(maxsize=256)
+def _polynomial(nodes: tuple[float, ...], x: float) -> FloatArray:
     """Weights of values at nodes in the polynomial through them, at ``x``."""
-    others = [np.delete(nodes, i) for i in range(nodes.size)]
-    return np.array([np.prod((x - o) / (node - o)) for node, o in zip(nodes, others, strict=True)])
+    weights = []
+    for i, node in enumerate(nodes):
+        others = np.delete(nodes, i)
+        weights.append(np.prod((x - others) / (node - others)))
+    return np.array(weights)

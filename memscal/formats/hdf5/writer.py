@@ -203,23 +203,7 @@ def tree_to_bytes(root: Group) -> bytes:
     """Return the HDF5 file of a tree; the same tree always gives the same bytes."""
     memory = BytesIO()
     with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
-        for path, node in walk(root):
-            if isinstance(node, Group):
-                if wrong := [name for name in node.children if not _NAME.fullmatch(name)]:
-                    problem = f"{wrong[0]!r} cannot be written into {path}"
-                    cure = "Use the letters a to z, digits and underscores."
-                    raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
-                group = file if path == "/" else file.create_group(path)
-                for name, value in node.all_attributes.items():
-                    _write_attribute(group, name, value)
-            elif isinstance(node, Number):
-                _write_number(file, path, node)
-            else:
-                text = file.create_dataset(
-                    path, data=_plain_text(node), dtype=_TEXT, track_times=False
-                )
-                for name, value in _attributes(node).items():
-                    _write_attribute(text, name, value)
+        _write_group(file, root)
         _attach_scales(file, root)
     data = memory.getvalue()
     numbers = (node.values for _, node in walk(root) if isinstance(node, Number))
@@ -239,12 +223,33 @@ def _with_contents(root: Group, text: str) -> Group:
     return replace(root, children={**root.children, "entry": entry})
 
 
-def _write_number(file: Any, path: str, node: Number) -> None:
+def _write_group(group: Any, node: Group) -> None:
+    if wrong := [name for name in node.children if not _NAME.fullmatch(name)]:
+        problem = f"{wrong[0]!r} cannot be written into {group.name}"
+        cure = "Use the letters a to z, digits and underscores."
+        raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
+    _write_attributes(group, node)
+    for name, child in node.children.items():
+        if isinstance(child, Group):
+            _write_group(group.create_group(name), child)
+        else:
+            _write_dataset(group, name, child)
+
+
+def _write_dataset(group: Any, name: str, node: Number | Text | str) -> None:
     # The dataset is closed on return: while it is open HDF5 lays the next ones out otherwise.
-    compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
-    dataset = file.create_dataset(path, data=node.values, track_times=False, **compressed)
+    if isinstance(node, Number):
+        compressed = _COMPRESSION if node.values.nbytes > _COMPRESS_ABOVE else {}
+        dataset = group.create_dataset(name, data=node.values, track_times=False, **compressed)
+    else:
+        text = _plain_text(node)
+        dataset = group.create_dataset(name, data=text, dtype=_TEXT, track_times=False)
+    _write_attributes(dataset, node)
+
+
+def _write_attributes(item: Any, node: Node) -> None:
     for name, value in _attributes(node).items():
-        _write_attribute(dataset, name, value)
+        _write_attribute(item, name, value)
 
 
 def _write_attribute(item: Any, name: str, value: Attribute) -> None:
