@@ -22,14 +22,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
-from itertools import compress, pairwise, product
+from itertools import compress, product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from memscal.estimation import departures
-from memscal.estimation.departures import DepartureBasis, Family, ReducedScan, Shape
+from memscal.estimation.departures import (
+    FAMILIES,
+    SHAPES,
+    DepartureBasis,
+    Family,
+    ReducedScan,
+    Shape,
+)
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.model.arrays import FloatArray
 
@@ -74,35 +80,32 @@ class _Sensors:
         # ``columns`` (b, n, p) and ``data`` (b, n) of b fits, whose bases have the same columns.
         basis = bases[0]
         fits = len(bases)
-        starts = np.array([block.start for block in basis.blocks[len(basis.rings) :]], np.intp)
         flat = basis.flat
-        shape = (fits, 1 + starts.size, columns.shape[2])
-        start = np.zeros(shape)
-        places = np.zeros((*shape, flat))
-        # The first two parameters are ln A and ln(width).
-        flat_ones = np.ones((fits, flat))
-        flat_ones[:, :2] = [[basis.conversion_constant, basis.sigma] for basis in bases]
-        places[..., range(flat), range(flat)] = flat_ones[:, None]
-        each = np.arange(1, shape[1])
-        start[:, each, starts] = 1.0
-        places[:, each, 1, 1] = 0.0
-        places[:, each, starts, 0] = 1.0
-        places[:, each, starts + 1, 1] = 1.0
-        values = columns[:, None] @ places
-        data = data[:, None] - start @ columns.swapaxes(1, 2)
-        arrays = start, places, values, data
-        start, places, values, data = (array.reshape(-1, *array.shape[2:]) for array in arrays)
+        first = np.array([block.start for block in basis.blocks[len(basis.rings) :]], np.intp)
+        family = np.arange(1, 1 + first.size)
+        sensors = 1 + first.size
+        start = np.zeros((fits, sensors, columns.shape[2]))
+        start[:, family, first] = 1.0
+        # The flat columns among all: the first two are ln A and ln(width), of each family its own.
+        choice = np.zeros((fits, sensors, columns.shape[2], flat))
+        choice[..., range(flat), range(flat)] = 1.0
+        for i, each in enumerate(bases):
+            choice[i, :, 0, 0] = each.conversion_constant
+            choice[i, :, 1, 1] = each.sigma
+        choice[:, family, 1, 1] = 0.0
+        choice[:, family, first, 0] = 1.0
+        choice[:, family, first + 1, 1] = 1.0
+        left = data[:, None] - start @ columns.swapaxes(1, 2)
+        left = left.reshape(fits * sensors, -1)
+        values = (columns[:, None] @ choice).reshape(fits * sensors, -1, flat)
         scale = np.linalg.norm(values, axis=1, keepdims=True)
         q, r = np.linalg.qr(values / scale)
-        size = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)) * scale[:, 0]).sum(axis=1)
-        rest = data - _times(q, _times(q, data, transposed=True))
-        return cls(start, (places / scale) @ np.linalg.inv(r), q, size, data, rest)
-
-    @cached_property
-    def means(self) -> FloatArray:
-        """Posterior means of all parameters without departures, (f, p)."""
-        along = _times(self.q, self.data, transposed=True)
-        return np.asarray(self.start + _times(self.root, along))
+        diagonal = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        log_determinant = np.log(diagonal * scale[:, 0]).sum(axis=1)
+        rest = left - _times(q, _times(q, left, transposed=True))
+        start = start.reshape(fits * sensors, -1)
+        root = (choice.reshape(fits * sensors, -1, flat) / scale) @ np.linalg.inv(r)
+        return cls(start, root, q, log_determinant, left, rest)
 
 
 def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = False) -> FloatArray:
@@ -112,8 +115,8 @@ def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = Fals
     return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
 
 
-def _beside(matrices: FloatArray) -> FloatArray:
-    """Columns of matrices (h, n, m) beside each other, (n, h m)."""
+def _abreast(matrices: FloatArray) -> FloatArray:
+    """Columns of matrices (h, n, m) next to each other, (n, h m)."""
     return np.moveaxis(matrices, 0, 1).reshape(matrices.shape[1], -1)
 
 
@@ -129,8 +132,7 @@ class _Noise(NamedTuple):
 class _Conditionals:
     """Marginal likelihoods and posteriors, each given one of h hypotheses of m amplitudes.
 
-    The weighted columns of its departures are decomposed, by the SVD of what is left of them beside
-    the flat ones.
+    What the flat ones leave of the weighted columns of its departures is decomposed, by the SVD.
     """
 
     sensors: _Sensors
@@ -138,11 +140,11 @@ class _Conditionals:
     number: NDArray[np.intp]  # (h,): places among HYPOTHESES
     family: NDArray[np.intp]  # (h,): of the sensor
     prior: FloatArray  # (h,): variance of the amplitudes
-    changes: FloatArray  # (h, p, m): of all parameters, the flat ones fitted anew
+    by_amplitude: FloatArray  # (h, p, m): changes of all parameters, the flat ones fitted anew
     left: FloatArray  # (h, n, s)
     singular: FloatArray  # (h, s)
     right: FloatArray  # (h, s, m)
-    along: FloatArray  # (h, s): the data along the left singular vectors
+    data: FloatArray  # (h, s): along the left singular vectors
     # At the MAP estimate of the noise.
     log_marginal: FloatArray  # (h,)
     scatter: FloatArray  # (h,): variance of the residuals
@@ -153,103 +155,114 @@ class _Conditionals:
         cls, sensors: _Sensors, columns: FloatArray, choice: _Choice, noise: _Noise
     ) -> _Conditionals:
         """Decompose what each hypothesis about each of b fits chooses of its columns, (b, n, p)."""
-        fits = np.repeat(np.arange(len(columns)), len(choice.number))
-        number, family, places, factors, strength = (
-            np.concatenate([chosen] * len(columns)) for chosen in choice
-        )
-        family = family + fits * (len(sensors.start) // len(columns))
+        count = len(columns)
+        number = np.tile(choice.number, count)
+        fit = np.repeat(np.arange(count), len(choice.number))
+        family = np.tile(choice.family, count) + fit * (len(sensors.start) // count)
+        places = np.tile(choice.places, (count, 1))
+        factors = np.tile(choice.factors, (count, 1))
+        prior = np.tile(choice.strength, count) ** 2
         q = sensors.q[family]
-        prior = strength**2
-        chosen = columns[fits[:, None], :, places].swapaxes(1, 2) * factors[:, None, :]
-        beside = q.swapaxes(1, 2) @ chosen
-        changes = -(sensors.root[family] @ beside)
-        changes[np.arange(len(places))[:, None], places, np.arange(places.shape[1])] += factors
-        left, singular, right = np.linalg.svd(chosen - q @ beside, full_matrices=False)
-        along = _times(left, sensors.rest[family], transposed=True)
-        power = along**2
+        chosen = columns[fit[:, None], :, places].swapaxes(1, 2) * factors[:, None, :]
+        explained = q.swapaxes(1, 2) @ chosen
+        by_amplitude = -(sensors.root[family] @ explained)
+        by_amplitude[np.arange(len(places))[:, None], places, np.arange(places.shape[1])] += factors
+        left, singular, right = np.linalg.svd(chosen - q @ explained, full_matrices=False)
+        data = _times(left, sensors.rest[family], transposed=True)
+        power = data**2
         if noise.added:
-            # Of a vector that meets the flat columns, only what lies beside them carries noise.
+            # Of a vector that meets the flat columns, only the rest of it carries noise.
             power += noise.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
         signal = prior[:, None] * singular**2
-        found = _likelihoods(sensors, family, signal, power, noise)
-        decomposed = changes, left, singular, right, along
-        return cls(sensors, fits, number, family, prior, *decomposed, *found)
+        likelihoods = _likelihoods(sensors, family, signal, power, noise)
+        decomposed = (by_amplitude, left, singular, right, data)
+        return cls(sensors, fit, number, family, prior, *decomposed, *likelihoods)
 
     def __getitem__(self, rows: NDArray[np.bool_]) -> _Conditionals:
         """Some of the hypotheses."""
-        kept = {f.name: getattr(self, f.name) for f in fields(self)[1:]}
-        return replace(self, **{name: values[rows] for name, values in kept.items()})
+        kept = {f.name: getattr(self, f.name)[rows] for f in fields(self)[1:]}
+        return replace(self, **kept)
 
     @cached_property
     def filter(self) -> FloatArray:
         """From data to amplitudes, along the singular vectors, (h, s)."""
         prior = self.prior[:, None]
-        variance = self.variance[:, None]
-        return prior * self.singular / (variance + prior * self.singular**2)
+        return prior * self.singular / (self.variance[:, None] + prior * self.singular**2)
 
     @cached_property
-    def turned(self) -> FloatArray:
+    def by_component(self) -> FloatArray:
         """Changes of all parameters by amplitudes along the singular vectors, (h, p, s)."""
-        return np.asarray(self.changes @ self.right.swapaxes(1, 2))
+        return np.asarray(self.by_amplitude @ self.right.swapaxes(1, 2))
 
     @property
     def slopes(self) -> FloatArray:
         """Derivatives of the logarithms by the weighted data, (h, n)."""
-        explained = self.filter * self.singular * self.along
-        slopes = _times(self.left, explained) - self.sensors.rest[self.family]
-        return np.asarray(slopes / self.variance[:, None])
+        explained = _times(self.left, self.filter * self.singular * self.data)
+        rest = self.sensors.rest[self.family]
+        return np.asarray((explained - rest) / self.variance[:, None])
 
     @property
     def means(self) -> FloatArray:
         """Posterior means of all parameters, (h, p)."""
-        data = _times(self.left, self.sensors.data[self.family], transposed=True)
-        return np.asarray(self.sensors.means[self.family] + _times(self.turned, self.filter * data))
+        sensors = self.sensors
+        flat = _times(sensors.q, sensors.data, transposed=True)
+        plain = (sensors.start + _times(sensors.root, flat))[self.family]
+        data = _times(self.left, sensors.data[self.family], transposed=True)
+        return np.asarray(plain + _times(self.by_component, self.filter * data))
 
     def gain(self, shares: FloatArray) -> FloatArray:
         """Derivatives of the means by the weighted data, summed by shares (h,): (p, n)."""
-        each = np.bincount(self.family, shares, len(self.sensors.q))
+        of_sensor = np.bincount(self.family, shares, len(self.sensors.q))
         some = shares > 0
-        kept = each > 0
-        factor = shares[:, None] * self.filter
-        left = self.turned[some] * factor[some, None, :], self.sensors.root[kept]
-        right = self.left[some], each[kept, None, None] * self.sensors.q[kept]
-        both = [np.hstack([*map(_beside, side)]) for side in (left, right)]
-        return np.asarray(both[0] @ both[1].T)
+        kept = of_sensor > 0
+        components = self.by_component[some] * (shares[:, None] * self.filter)[some, None, :]
+        parameters = [components, self.sensors.root[kept]]
+        weighted = of_sensor[kept, None, None] * self.sensors.q[kept]
+        data = [self.left[some], weighted]
+        by_parameters = np.hstack([_abreast(part) for part in parameters])
+        by_data = np.hstack([_abreast(part) for part in data])
+        return np.asarray(by_parameters @ by_data.T)
 
     def covariance_root(self, shares: FloatArray) -> FloatArray:
         """Square root (p, c) of the sum of covariances by shares (h,)."""
-        each = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
+        of_sensor = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
         some = shares > 0
-        kept = each > 0
+        kept = of_sensor > 0
         # Posterior variances along the singular vectors; in all other directions the prior's.
         prior = self.prior[:, None]
         variance = self.variance[:, None]
-        left = shares[:, None] * prior * variance / (variance + prior * self.singular**2)
+        along = shares[:, None] * prior * variance / (variance + prior * self.singular**2)
         parts = [
-            self.sensors.root[kept] * (each[kept] ** 0.5)[:, None, None],
-            self.turned[some] * (left[some] ** 0.5)[:, None, :],
+            self.sensors.root[kept] * (of_sensor[kept] ** 0.5)[:, None, None],
+            self.by_component[some] * (along[some] ** 0.5)[:, None, :],
         ]
         if self.right.shape[1] < self.right.shape[2]:
-            hidden = self.changes[some] - self.turned[some] @ self.right[some]
+            hidden = self.by_amplitude[some] - self.by_component[some] @ self.right[some]
             parts.append(hidden * ((shares * self.prior)[some] ** 0.5)[:, None, None])
-        return np.hstack([*map(_beside, parts)])
+        return np.hstack([_abreast(part) for part in parts])
 
 
 def _likelihoods(
-    sensors: _Sensors, family: NDArray[np.intp], signal: FloatArray, power: FloatArray, of: _Noise
+    sensors: _Sensors,
+    family: NDArray[np.intp],
+    signal: FloatArray,
+    power: FloatArray,
+    noise: _Noise,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Log marginal likelihoods, variances of the residuals, and of the noise, (h,) each."""
-    total = (np.sum(sensors.rest**2, axis=1) + of.added * of.freedom)[family]
-    distinct = np.maximum((_ROUNDING * np.abs(sensors.data).max(axis=1)) ** 2, 1e-300)[family]
+    total = np.sum(sensors.rest**2, axis=1) + noise.added * noise.freedom
+    least = (_ROUNDING * np.abs(sensors.data).max(axis=1)) ** 2
+    total = total[family]
+    least = np.maximum(least, 1e-300)[family]
     beyond = np.maximum(total - power.sum(axis=1), 0.0)
-    scatter = np.maximum(total / of.freedom, distinct)
+    scatter = np.maximum(total / noise.freedom, least)
     for _ in range(8):
         explained = power * scatter[:, None] / (scatter[:, None] + signal)
-        scatter = np.maximum((beyond + explained.sum(axis=1)) / of.freedom, distinct)
-    variance = np.maximum(scatter, of.stated)
-    ratio = signal / variance[:, None]
-    square = (beyond + (power / (1 + ratio)).sum(axis=1)) / variance
-    loss = of.freedom * np.log(variance) + square + np.log(1 + ratio).sum(axis=1)
+        scatter = np.maximum((beyond + explained.sum(axis=1)) / noise.freedom, least)
+    variance = np.maximum(scatter, noise.stated)
+    growth = 1 + signal / variance[:, None]
+    chi_square = (beyond + (power / growth).sum(axis=1)) / variance
+    loss = noise.freedom * np.log(variance) + chi_square + np.log(growth).sum(axis=1)
     return -0.5 * loss - sensors.log_determinant[family], scatter, variance
 
 
@@ -291,13 +304,12 @@ _PRIOR: tuple[tuple[str, str, tuple[float, ...], float, float], ...] = (
 
 def _hypotheses() -> Iterator[Hypothesis]:
     for name, departure, strengths, estimate, uncertainty in _PRIOR:
-        families: list[Family | None] = [f for f in departures.FAMILIES if f.name == name]
-        shapes: list[Shape | None] = [
-            s for s in departures.SHAPES if departure in (s.name, f"{s.name} {s.blur}")
-        ]
+        families = [f for f in FAMILIES if f.name == name]
+        shapes = [s for s in SHAPES if departure in (s.name, f"{s.name} {s.blur}")]
         triples = list(product(families or [None], shapes or [None], strengths))
-        for triple in triples:
-            yield Hypothesis(*triple, estimate / len(triples), uncertainty / len(triples))
+        for family, shape, strength in triples:
+            count = len(triples)
+            yield Hypothesis(family, shape, strength, estimate / count, uncertainty / count)
 
 
 HYPOTHESES = tuple(_hypotheses())
@@ -325,11 +337,13 @@ class WeighedFit:
     def of_kind(self, name: str, integrals: FloatArray) -> tuple[float, float]:
         """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
         # ``integrals`` of all columns that were weighed, before any was left out.
-        shares = [p * (h.kind == name) for p, h in zip(self.probability, HYPOTHESES, strict=True)]
-        total = float(np.sum(shares))
+        shares = self.probability * [h.kind == name for h in HYPOTHESES]
+        total = float(shares.sum())
+        if total == 0:
+            return 0.0, 0.0
         change = self.means @ integrals
-        others = float((self.probability - shares) @ change) / max(1 - total, 1e-300)
-        return total, float(shares @ change) / total - others if total > 0 else 0.0
+        others = (self.probability - shares) @ change / max(1 - total, 1e-300)
+        return total, float(shares @ change / total - others)
 
 
 def weigh_departures(
@@ -354,22 +368,20 @@ def weighings(
     least_noise: float = 0.0,
 ) -> list[Weighing]:
     """Weigh the hypotheses about several fits to the same points, with equal numbers of columns."""
-    _, basis = pairs[0]
-    flat = basis.flat
+    bases = [basis for _, basis in pairs]
+    basis = bases[0]
     columns = np.stack([basis.columns(reduced) for reduced, basis in pairs])
     data = np.stack([reduced.data for reduced, _ in pairs])
     size = basis.angular.count if basis.angular else 0
     if size:
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
-        prior = least_noise * np.eye(size, columns.shape[2], flat - size)
-        prior = np.broadcast_to(prior, (len(pairs), *prior.shape))
-        columns = np.hstack([columns, prior])
+        prior = least_noise * np.eye(size, columns.shape[2], basis.flat - size)
+        columns = np.hstack([columns, np.broadcast_to(prior, (len(pairs), *prior.shape))])
         data = np.pad(data, ((0, 0), (0, size)))
-    noise = _Noise(effective_count + size - flat, expected_noise**2, least_noise**2)
-    families = tuple(fitted.family for fitted in basis.families)
-    choice = _choice(flat, tuple(ring.radius.size for ring in basis.rings), families)
-    sensors = _Sensors.of([basis for _, basis in pairs], columns, data)
-    given = _Conditionals.of(sensors, columns, choice, noise)
+    noise = _Noise(effective_count + size - basis.flat, expected_noise**2, least_noise**2)
+    sizes = tuple(ring.radius.size for ring in basis.rings)
+    choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))
+    given = _Conditionals.of(_Sensors.of(bases, columns, data), columns, choice, noise)
     return [Weighing(*pair, given[given.fit == i], noise.added) for i, pair in enumerate(pairs)]
 
 
@@ -392,45 +404,44 @@ class Weighing:
     @cached_property
     def log_marginal_likelihoods(self) -> tuple[float, float]:
         """Of all hypotheses by either prior, up to a constant of the scan."""
-        terms = (self.log_marginals[p > 0] + np.log(p[p > 0]) for p in _PRIORS)
-        estimate, uncertainty = map(np.logaddexp.reduce, terms)
-        return float(estimate), float(uncertainty)
+        estimate, uncertainty = (
+            float(np.logaddexp.reduce(self.log_marginals[prior > 0] + np.log(prior[prior > 0])))
+            for prior in _PRIORS
+        )
+        return estimate, uncertainty
 
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""
         given = self.given
-        added = self.added
-        reduced = self.reduced
-        basis = self.basis
+        model = self.reduced.model
+        fit = self.reduced.fit
         scatter = np.zeros(len(HYPOTHESES))
         scatter[given.number] = given.scatter
         estimate, uncertainty = (_posterior(self.log_marginals, prior) for prior in _PRIORS)
-        used = given[((estimate > 0) | (uncertainty > 0))[given.number]]
+        likely = (estimate > 0) | (uncertainty > 0)
+        used = given[likely[given.number]]
         p = estimate[used.number]
         q = uncertainty[used.number]
-        means = used.means
-        of_each = np.zeros((estimate.size, means.shape[1]))
-        of_each[used.number] = means
-        mean = p @ means
-        apart = means - mean
+        means = np.zeros((estimate.size, self.basis.integrals.size))
+        means[used.number] = used.means
+        mean = p @ means[used.number]
+        apart = means[used.number] - mean
         gain = used.gain(p)
         parts = [q**0.5 * apart.T, used.covariance_root(q)]
-        if added:
-            pairs = zip(q, np.eye(q.size), strict=True)
-            parts += [(added * share) ** 0.5 * (used.gain(one) - gain) for share, one in pairs]
+        if self.added:
+            for share, one in zip(q, np.eye(q.size), strict=True):
+                parts.append((self.added * share) ** 0.5 * (used.gain(one) - gain))
         root = np.hstack(parts)
         # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal).
         gain = gain + (p[:, None] * apart).T @ used.slopes
-        model = reduced.model
-        fit = reduced.fit
         return WeighedFit(
             mean=mean,
             covariance=root @ root.T,
-            gain=reduced.by_voltages(gain[:, : reduced.data.size]),
+            gain=self.reduced.by_voltages(gain[:, : self.reduced.data.size]),
             noise=float(np.sqrt(estimate @ scatter)),
             probability=estimate,
-            residual=model.points.u - fit.predicted - basis.voltages(model, fit, mean),
-            means=of_each,
+            residual=model.points.u - fit.predicted - self.basis.voltages(model, fit, mean),
+            means=means,
         )
 
 
@@ -448,39 +459,38 @@ class _Choice(NamedTuple):
 def _choice(flat: int, sizes: tuple[int, ...], families: tuple[Family, ...]) -> _Choice:
     """Return what the hypotheses choose of the flat columns, the shapes', three of each family."""
     ends = flat + np.cumsum([0, *sizes])
-    of_shape = dict(zip(departures.SHAPES, pairwise(ends), strict=True))
-    of_family: dict[Family | None, int] = {None: 0}
-    of_family |= {family: i for i, family in enumerate(families, start=1)}
-    kept = [(i, h) for i, h in enumerate(HYPOTHESES) if h.family in of_family]
+    known = [(i, h) for i, h in enumerate(HYPOTHESES) if h.family in (None, *families)]
+    family = np.zeros(len(known), dtype=np.intp)
+    strength = np.ones(len(known))
     # Equal numbers of columns for all: one batch of decompositions.
-    places, factors = np.zeros((2, len(kept), max(sizes) + bool(families)))
-    strengths = np.array([1.0 if h.family else h.strength for _, h in kept])
-    for row, (_, hypothesis) in enumerate(kept):
-        if hypothesis.family is not None:
+    places = np.zeros((len(known), max(sizes) + bool(families)), dtype=np.intp)
+    factors = np.zeros(places.shape)
+    for row, (_, hypothesis) in enumerate(known):
+        factor = hypothesis.strength
+        if hypothesis.family is None:
+            strength[row] = factor
+            factor = 1.0
+        else:
             # The share of a family departs by its own spread, whatever the strength.
-            places[row, -1] = ends[-1] + 3 * of_family[hypothesis.family] - 1
+            family[row] = 1 + families.index(hypothesis.family)
+            places[row, -1] = ends[-1] + 3 * family[row] - 1
             factors[row, -1] = 1.0
         if hypothesis.shape is not None:
-            first, last = of_shape[hypothesis.shape]
-            places[row, : last - first] = range(first, last)
-            factors[row, : last - first] = hypothesis.strength if hypothesis.family else 1.0
-    numbers, of = (
-        [*each] for each in zip(*((i, of_family[h.family]) for i, h in kept), strict=True)
-    )
-    return _Choice(np.array(numbers), np.array(of), places.astype(np.intp), factors, strengths)
+            shape = SHAPES.index(hypothesis.shape)
+            places[row, : sizes[shape]] = np.arange(ends[shape], ends[shape + 1])
+            factors[row, : sizes[shape]] = factor
+    return _Choice(np.array([i for i, _ in known]), family, places, factors, strength)
 
 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:
     """Leave out the shapes and families of negligible probability."""
-    blocks = basis.blocks
-    used = [bool(np.diag(weighed.covariance)[block].any()) for block in blocks]
-    columns = [np.arange(basis.flat)]
-    columns += [np.arange(b.start, b.stop) for b, use in zip(blocks, used, strict=True) if use]
-    chosen = np.concatenate(columns)
-    families = compress(basis.families, used[len(basis.rings) :])
-    kept = replace(basis, rings=tuple(compress(basis.rings, used)), families=tuple(families))
-    kept._tables.update({key: table[:, chosen] for key, table in basis._tables.items()})
-    return kept, replace(
+    variances = np.diag(weighed.covariance)
+    used = [bool(variances[block].any()) for block in basis.blocks]
+    columns = [np.arange(block.start, block.stop) for block in compress(basis.blocks, used)]
+    chosen = np.concatenate([np.arange(basis.flat), *columns])
+    rings = tuple(compress(basis.rings, used))
+    families = tuple(compress(basis.families, used[len(basis.rings) :]))
+    return replace(basis, rings=rings, families=families), replace(
         weighed,
         mean=weighed.mean[chosen],
         covariance=weighed.covariance[np.ix_(chosen, chosen)],
