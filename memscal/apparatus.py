@@ -159,7 +159,7 @@ class ApparatusFunction(Result, ApparatusData):
         if profile.conversion_correlation is not None:
             shared = operator @ (profile.conversion_correlation * profile.g_errors)
             variance += 2 * a * blurred * u_a * shared
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        return np.sqrt(np.maximum(variance, 0.0))
 
     def stress_uncertainty(self, u_zz: ArrayLike) -> FloatArray:
         """Return the standard uncertainty of :meth:`stress` that A brings, in Pa."""
@@ -262,7 +262,7 @@ class ApparatusFunction(Result, ApparatusData):
         first_x = kernel.shape[-1] // 2
         last_y = first_y + len(stress)
         last_x = first_x + stress.shape[1]
-        return np.asarray(fftconvolve(stress, kernel)[first_y:last_y, first_x:last_x] * cell)
+        return fftconvolve(stress, kernel)[first_y:last_y, first_x:last_x] * cell
 
     def _require_fine(self, step: float) -> None:
         """Refuse a stress whose step (m) does not resolve G."""

@@ -58,7 +58,7 @@ class EvenGrid:
     @cached_property
     def wavenumber(self) -> FloatArray:
         """Modulus of each wave vector, shape (count, count), in rad/m."""
-        return np.asarray(np.hypot.outer(self.wavenumber_axis, self.wavenumber_axis))
+        return np.hypot.outer(self.wavenumber_axis, self.wavenumber_axis)
 
     @property
     def cell_area(self) -> float:
@@ -67,11 +67,11 @@ class EvenGrid:
 
     def forward(self, field: FloatArray) -> FloatArray:
         """Fourier transform of the even field: real, shape (count, count)."""
-        return np.asarray(scipy.fft.dctn(field, type=1) * self.cell_area)
+        return scipy.fft.dctn(field, type=1) * self.cell_area
 
     def inverse(self, spectrum: FloatArray) -> FloatArray:
         """Return the even field of a real even spectrum."""
-        return np.asarray(scipy.fft.idctn(spectrum, type=1) / self.cell_area)
+        return scipy.fft.idctn(spectrum, type=1) / self.cell_area
 
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the origin, where an even field's axis already is."""
@@ -85,7 +85,7 @@ class EvenGrid:
     def inverse_on_axis(self, spectrum: FloatArray) -> FloatArray:
         """Return the first row of the field of a real even spectrum, (1, count)."""
         line = (2 * spectrum.sum(axis=0) - spectrum[0] - spectrum[-1]) / (2 * (self.count - 1))
-        return np.asarray(scipy.fft.idct(line[None], type=1) / self.cell_area)
+        return scipy.fft.idct(line[None], type=1) / self.cell_area
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve two even fields."""
@@ -172,7 +172,7 @@ class Lattice:
     def inverse(self, spectrum: FloatArray) -> FloatArray:
         """Return the field of a spectrum whose origin is the first point: a quotient's."""
         shape = (self.y.size, self.x.size)
-        return np.asarray(scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area)
+        return scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area
 
     def sampled(self, plane: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
         """Return a field by its transform (ky, kx) about the axis, as far as this samples it."""
@@ -180,7 +180,7 @@ class Lattice:
         ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
         kx = 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
         spectrum = plane(ky, kx) * np.exp(1j * np.add.outer(ky * self.y[0], kx * self.x[0]))
-        return np.asarray(scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size)) / self.cell_area)
+        return scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size)) / self.cell_area
 
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the central point."""
@@ -194,7 +194,7 @@ class Lattice:
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a kernel centred on the central point with a field of the lattice."""
         spectrum = self.transfer(kernel) * self.forward(field)
-        return np.asarray(scipy.fft.irfft2(spectrum, s=field.shape) / self.cell_area)
+        return scipy.fft.irfft2(spectrum, s=field.shape) / self.cell_area
 
     def integrate(self, field: FloatArray) -> float:
         """Integral of a field over the lattice."""
@@ -209,7 +209,7 @@ class Lattice:
         rows = (np.multiply.outer(r, np.sin(angle)) - self.y[0]) / (self.y[1] - self.y[0])
         columns = (np.multiply.outer(r, np.cos(angle)) - self.x[0]) / (self.x[1] - self.x[0])
         samples = map_coordinates(field, [rows, columns], order=3, mode="nearest")
-        return r, np.asarray(samples.mean(axis=1))
+        return r, samples.mean(axis=1)
 
     def refined(self, kernel: FloatArray, factor: int) -> tuple[Lattice, FloatArray]:
         """Interpolate a centred kernel to a lattice ``factor`` (odd) times finer, by its series."""
@@ -233,7 +233,7 @@ class Lattice:
 
     def from_quotient(self, period: FloatArray) -> FloatArray:
         """Roll the quotient's zero from the first point to the central one."""
-        return np.asarray(scipy.fft.fftshift(period))
+        return scipy.fft.fftshift(period)
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Return the field itself: it already covers the plane."""

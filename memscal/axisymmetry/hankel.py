@@ -47,7 +47,7 @@ def ring_areas(r: FloatArray) -> FloatArray:
     # The trapezoidal rule with the Euler-Maclaurin correction of its end on the axis.
     weights = 2 * np.pi * r * np.gradient(r)
     weights[0] += np.pi * (r[1] - r[0]) ** 2 / 6
-    return np.asarray(weights)
+    return weights
 
 
 #: Order of a transform across lines: U(x) is the integral of U(k) cos(kx) dk/pi.
@@ -93,7 +93,7 @@ class Wavenumbers:
             matrix = 2 * np.cos(np.multiply.outer(radii, self.k)) / self.k
         else:
             matrix = bessel_table(radii, self.k, order)
-        return np.asarray(matrix @ (spectrum.T * self.weights).T)
+        return matrix @ (spectrum.T * self.weights).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
 
 def bessel(order: int, x: FloatArray) -> FloatArray:
     """Bessel function of the first kind, of order zero or more."""
-    return np.asarray((j0, j1)[order](x) if order < 2 else jv(order, x))
+    return (j0, j1)[order](x) if order < 2 else jv(order, x)
 
 
 def bessel_table(r: FloatArray, k: FloatArray, order: int = 0) -> FloatArray:

@@ -18,39 +18,39 @@ _FARTHEST = 9.0
 
 def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
     r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""
-    return np.asarray(np.exp(-0.5 * (sigma * k) ** 2))
+    return np.exp(-0.5 * (sigma * k) ** 2)
 
 
 def gaussian_transfer_slope(k: FloatArray, sigma: float) -> FloatArray:
     """Derivative of :func:`gaussian_transfer` by the width, in 1/m."""
-    return np.asarray(-sigma * k**2 * gaussian_transfer(k, sigma))
+    return -sigma * k**2 * gaussian_transfer(k, sigma)
 
 
 def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
     """Gaussian of unit integral over the plane, in 1/m^2."""
-    return np.asarray(np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2))
+    return np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2)
 
 
 def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
     """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
-    return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)
+    return unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma
 
 
 def disc_transfer(k: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
     """Transforms of discs of unit integral, blurred by Gaussians, at ``k`` (rad/m)."""
     phase = np.asarray(k, dtype=np.float64) * radius
     disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
-    return np.asarray(disc * np.exp(-0.5 * (sigma * k) ** 2))
+    return disc * np.exp(-0.5 * (sigma * k) ** 2)
 
 
 def blurred_disc(r: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
     """Discs of unit integral, blurred by Gaussians, at radii ``r`` (m), in 1/m^2."""
     # A point blurred from r falls into the disc: a non-central chi-square probability.
-    place, edge = np.broadcast_arrays(np.asarray(r) / sigma, radius / sigma)
+    place, edge = np.broadcast_arrays(r / sigma, radius / sigma)
     share = np.zeros(place.shape)
     near = place < edge + _FARTHEST
     share[near] = chndtr(edge[near] ** 2, 2, place[near] ** 2)
-    return np.asarray(share / (np.pi * radius**2))
+    return share / (np.pi * radius**2)
 
 
 @runtime_checkable
@@ -200,7 +200,7 @@ class Rings:
         # The scaled Bessel function carries exp(-rq/b^2), which completes the square.
         near = np.exp(-0.5 * np.subtract.outer(r, self.radius) ** 2 / square)
         bessel = i0e(np.multiply.outer(r, self.radius / square))
-        return np.asarray(self.amplitude / (2 * np.pi * square) * near * bessel)
+        return self.amplitude / (2 * np.pi * square) * near * bessel
 
     @property
     def size(self) -> float:

@@ -96,7 +96,7 @@ def _kernels(
             oval = estimate.oval_changes(x, y[start : start + rows], coefficients)
             first = start * x.size
             round_[first : first + len(oval)] += oval
-        return np.asarray(round_)
+        return round_
 
     return combined
 
@@ -189,12 +189,12 @@ class _Band:
         along = spectra @ (self.twice[:, None] * columns.conj() / self.count)
         # The real part of the product.
         planes = rows.real.T @ along.real + rows.imag.T @ along.imag
-        return np.asarray(planes.reshape(len(planes), -1).T)
+        return planes.reshape(len(planes), -1).T
 
 
 def _summed(planes: FloatArray, rows: ComplexArray, columns: ComplexArray) -> ComplexArray:
     """Fourier sums (q, ky, kx) of real planes (q, m, n)."""
-    return np.asarray((rows.real @ planes + 1j * (rows.imag @ planes)) @ columns.T)
+    return (rows.real @ planes + 1j * (rows.imag @ planes)) @ columns.T
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,7 +75,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
 def _taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then a cosine that falls to zero at its edge."""
     # A sharp edge would cut G's ripples at full height, and A would depend on where it lies.
-    return np.asarray((1 + np.cos(np.pi * np.clip(2 * radius / support - 1, 0.0, 1.0))) / 2)
+    return (1 + np.cos(np.pi * np.clip(2 * radius / support - 1, 0.0, 1.0))) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,14 +234,14 @@ class RasterFields:
 
     def convolved(self, kernel: Field) -> FloatArray:
         """Convolve a kernel with the stress: its values at the measured points."""
-        return np.asarray(reconvolve(1.0, kernel, self.stress).values[self.index])
+        return reconvolve(1.0, kernel, self.stress).values[self.index]
 
     def share(self, smoothed: SmoothedProfile) -> FloatArray:
         """What each reading (n,) adds to its node, over its voltage, in 1/N."""
         readings = np.zeros(self.voltage.values.shape)
         np.add.at(readings, self.index, 1.0)
         weight = smoothed.outlier_weight / smoothed.estimate.points.load
-        return np.asarray(weight / readings[self.index])
+        return weight / readings[self.index]
 
     def gain(self, smoothed: SmoothedProfile) -> VoltageMap:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""

@@ -115,7 +115,7 @@ def _mistaken(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> Float
     changed = zip(estimate.model.references, changes, strict=True)
     spectra = tuple(replace(reference, values=values) for reference, values in changed)
     model = replace(estimate.model, references=spectra)
-    return np.asarray(-model.signal(estimate.gaussian.geometry, estimate.kernel))
+    return -model.signal(estimate.gaussian.geometry, estimate.kernel)
 
 
 def _of_loads(
@@ -548,7 +548,7 @@ def _drawn_columns(
     for name, column in drawn.parameters.items():
         columns[names.index(name)] = column
     columns[len(names) :] = np.vstack([drawn.radial, drawn.transfer])
-    return np.asarray(columns)
+    return columns
 
 
 def _misfit_columns(estimate: ProfileEstimate, gain: VoltageMap) -> FloatArray:

@@ -69,7 +69,7 @@ class AngularRings:
     def transform(self, m: int, k: FloatArray) -> FloatArray:
         """Transforms of order m at ``k`` (rad/m), (k, q)."""
         blurred = np.exp(-0.5 * (self.blur * k) ** 2)[:, None]
-        return np.asarray(blurred * bessel(m, np.multiply.outer(k, self.radius)))
+        return blurred * bessel(m, np.multiply.outer(k, self.radius))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class AngularDepartures:
             turn = (np.cos, np.sin)[i % 2]
             profiles = rings_of_order(m, table, rings.radius, rings.blur) @ of_rings
             total[near] += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
-        return np.asarray(total)
+        return total
 
     def signal(
         self, model: ForwardModel, centres: FloatArray, coefficients: FloatArray
@@ -133,7 +133,7 @@ class AngularDepartures:
 def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> FloatArray:
     """Blurred rings of order m at radii (n,) in m, for unit amplitudes: (n, q), in 1/m^2."""
     near = np.exp(-0.5 * (np.subtract.outer(r, radius) / blur) ** 2)
-    return np.asarray(near * ive(m, np.multiply.outer(r, radius / blur**2)) / (2 * np.pi * blur**2))
+    return near * ive(m, np.multiply.outer(r, radius / blur**2)) / (2 * np.pi * blur**2)
 
 
 def angular_departures(

@@ -95,24 +95,22 @@ class _Sensors:
         choice[:, family, 1, 1] = 0.0
         choice[:, family, first, 0] = 1.0
         choice[:, family, first + 1, 1] = 1.0
-        left = data[:, None] - start @ columns.swapaxes(1, 2)
-        left = left.reshape(fits * sensors, -1)
+        data = (data[:, None] - start @ columns.swapaxes(1, 2)).reshape(fits * sensors, -1)
         values = (columns[:, None] @ choice).reshape(fits * sensors, -1, flat)
         scale = np.linalg.norm(values, axis=1, keepdims=True)
         q, r = np.linalg.qr(values / scale)
         diagonal = np.abs(np.diagonal(r, axis1=1, axis2=2))
         log_determinant = np.log(diagonal * scale[:, 0]).sum(axis=1)
-        rest = left - _times(q, _times(q, left, transposed=True))
-        start = start.reshape(fits * sensors, -1)
+        rest = data - _times(q, _times(q, data, transposed=True))
         root = (choice.reshape(fits * sensors, -1, flat) / scale) @ np.linalg.inv(r)
-        return cls(start, root, q, log_determinant, left, rest)
+        return cls(start.reshape(fits * sensors, -1), root, q, log_determinant, data, rest)
 
 
 def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = False) -> FloatArray:
     """Product of each matrix, or of its transpose, with a vector of its own, (h, m)."""
     if transposed:
         matrices = matrices.swapaxes(1, 2)
-    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
+    return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 def _abreast(matrices: FloatArray) -> FloatArray:
@@ -192,14 +190,14 @@ class _Conditionals:
     @cached_property
     def by_component(self) -> FloatArray:
         """Changes of all parameters by amplitudes along the singular vectors, (h, p, s)."""
-        return np.asarray(self.by_amplitude @ self.right.swapaxes(1, 2))
+        return self.by_amplitude @ self.right.swapaxes(1, 2)
 
     @property
     def slopes(self) -> FloatArray:
         """Derivatives of the logarithms by the weighted data, (h, n)."""
         explained = _times(self.left, self.filter * self.singular * self.data)
         rest = self.sensors.rest[self.family]
-        return np.asarray((explained - rest) / self.variance[:, None])
+        return (explained - rest) / self.variance[:, None]
 
     @property
     def means(self) -> FloatArray:
@@ -208,7 +206,7 @@ class _Conditionals:
         flat = _times(sensors.q, sensors.data, transposed=True)
         plain = (sensors.start + _times(sensors.root, flat))[self.family]
         data = _times(self.left, sensors.data[self.family], transposed=True)
-        return np.asarray(plain + _times(self.by_component, self.filter * data))
+        return plain + _times(self.by_component, self.filter * data)
 
     def gain(self, shares: FloatArray) -> FloatArray:
         """Derivatives of the means by the weighted data, summed by shares (h,): (p, n)."""
@@ -221,7 +219,7 @@ class _Conditionals:
         data = [self.left[some], weighted]
         by_parameters = np.hstack([_abreast(part) for part in parameters])
         by_data = np.hstack([_abreast(part) for part in data])
-        return np.asarray(by_parameters @ by_data.T)
+        return by_parameters @ by_data.T
 
     def covariance_root(self, shares: FloatArray) -> FloatArray:
         """Square root (p, c) of the sum of covariances by shares (h,)."""
@@ -306,7 +304,7 @@ def _hypotheses() -> Iterator[Hypothesis]:
     for name, departure, strengths, estimate, uncertainty in _PRIOR:
         families = [f for f in FAMILIES if f.name == name]
         shapes = [s for s in SHAPES if departure in (s.name, f"{s.name} {s.blur}")]
-        triples = list(product(families or [None], shapes or [None], strengths))
+        triples = [*product(families or (None,), shapes or (None,), strengths)]
         for family, shape, strength in triples:
             count = len(triples)
             yield Hypothesis(family, shape, strength, estimate / count, uncertainty / count)

@@ -55,26 +55,26 @@ class Decorrelation:
         if self.common is None or self.growth is None:
             return values
         along = self.common.T @ values
-        return np.asarray(values + self.common @ (along.T * (self.growth**-power - 1)).T)
+        return values + self.common @ (along.T * (self.growth**-power - 1)).T
 
 
 def _solved(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
     """Solve L x = values, or L' x = values."""
     if not is_banded(root):
-        return np.asarray(solve_triangular(root, values, lower=True, trans=1 if transposed else 0))
+        return solve_triangular(root, values, lower=True, trans=1 if transposed else 0)
     below = len(root) - 1
     if not transposed:
-        return np.asarray(solve_banded((below, 0), root, values))
+        return solve_banded((below, 0), root, values)
     upper = np.zeros_like(root)
     for i, diagonal in enumerate(root):
         upper[below - i, i:] = diagonal[: diagonal.size - i]
-    return np.asarray(solve_banded((0, below), upper, values))
+    return solve_banded((0, below), upper, values)
 
 
 def _product(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
     """L times columns, or L' times them."""
     if not is_banded(root):
-        return np.asarray((root.T if transposed else root) @ values)
+        return (root.T if transposed else root) @ values
     total = np.zeros_like(values)
     count = len(values)
     for i, diagonal in enumerate(root):

@@ -202,7 +202,7 @@ class ReducedScan:
     def signal(self, kernels: FloatArray) -> FloatArray:
         """Voltages (r, m) of round kernels by their transforms, (nodes, m)."""
         if self.synthesis is not None:
-            return np.asarray(self.synthesis @ kernels)
+            return self.synthesis @ kernels
         voltages = self.model.signal(self.fit.geometry, kernels)
         return self.model.points.standardised(voltages, self.weights)
 
@@ -212,9 +212,9 @@ class ReducedScan:
         factor = self.model.points.decorrelation
         shares = share / root if factor is None else factor.correlate_adjoint(share / root)
         if self.right is None:
-            return np.asarray(shares)
+            return shares
         shares = shares if factor is None else factor.correlate(shares)
-        return np.asarray(self.right.T @ (shares / root))
+        return self.right.T @ (shares / root)
 
     def by_voltages(self, gain: FloatArray) -> VoltageMap:
         """Derivatives by the voltages (m, n) of numbers with these by the reduced data, (m, r)."""
@@ -271,7 +271,7 @@ class DepartureBasis:
             around = self.angular.signal(model, fit.centre, theirs.reshape(len(theirs), -1))
             volts += around.reshape(volts.shape)
         kernels = self.kernels(model.k)[:, self.flat :]
-        return np.asarray(volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :]))
+        return volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :])
 
     @cached_property
     def integrals(self) -> FloatArray:
@@ -353,7 +353,7 @@ def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
     others = np.linalg.qr(reduced.flat[:, 2:])[0]
 
     def free(values: FloatArray) -> FloatArray:
-        return np.asarray(values - others @ (others.T @ values))
+        return values - others @ (others.T @ values)
 
     gaussian = fit.conversion_constant * kernels.gaussian_transfer(k, fit.sigma)
     data = free(reduced.data + reduced.signal(gaussian))

@@ -126,7 +126,7 @@ class FieldModel(ForwardModel):
         from scipy.interpolate import CubicSpline
 
         wavenumbers = np.hypot(self._plane.ky, self._plane.kx)
-        return np.asarray(CubicSpline(self.k, kernels, axis=1)(wavenumbers))
+        return CubicSpline(self.k, kernels, axis=1)(wavenumbers)
 
     def _read(self, geometry: Geometry, spectrum: FloatArray) -> FloatArray:
         """Read voltages (n,) at the points for a kernel's transform on the cells."""
@@ -144,7 +144,7 @@ class FieldModel(ForwardModel):
             values[rows] = map_coordinates(
                 splines, places[:, rows], order=5, mode="grid-wrap", prefilter=False
             )
-        return np.asarray(values * self.points.load)
+        return values * self.points.load
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -56,7 +56,7 @@ def _wave(wave: int, r: FloatArray, k: FloatArray, across: bool) -> FloatArray:
     """A wave at all products of radii and wavenumbers: cosines and sines where it is a slit's."""
     x = np.multiply.outer(r, k)
     if across:
-        return np.asarray(2 * (np.cos, np.sin)[wave](x) / k)
+        return 2 * (np.cos, np.sin)[wave](x) / k
     if wave == TURN:
         return np.divide(j1(x), x, out=np.full_like(x, 0.5), where=x != 0)
     return bessel(wave, x)
@@ -77,7 +77,7 @@ class WaveTable:
 
         inside = np.clip(radius, self.radii[0], self.radii[-1])
         spline = BSpline.construct_fast(self.knots, self.splines, _DEGREE)
-        return np.asarray(spline(inside))
+        return spline(inside)
 
     def interpolation(self, radius: FloatArray) -> csr_array:
         """From coefficients to radii within the table, shape (n, t), sparse."""
@@ -113,14 +113,14 @@ class Geometry:
     def summed(self, wave: int, spread: FloatArray, rows: Rows = slice(None)) -> FloatArray:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
-            return np.asarray(self.interpolation[rows] @ (self.table(wave).splines @ spread))
+            return self.interpolation[rows] @ (self.table(wave).splines @ spread)
         if wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
             unique, back = self._distinct
             short = self.reach * self.k[-1] < _LONGEST_PHASE
             at = self.table(wave).at(unique) if short else _wave(wave, unique, self.k, self.across)
             self._waves[wave] = at[back]
-        return np.asarray(self._waves[wave][rows] @ spread)
+        return self._waves[wave][rows] @ spread
 
     def table(self, wave: int) -> WaveTable:
         """The table of a wave."""
@@ -218,7 +218,7 @@ class ForwardModel:
         """Cosines between a channel's component and the points, for trial centres (m, 2)."""
         across = [self.points.x - centres[:, :1], self.points.y - centres[:, 1:]]
         radius = np.hypot(*across)
-        return np.asarray(across[self.axis] / np.where(radius > 0, radius, 1.0))
+        return across[self.axis] / np.where(radius > 0, radius, 1.0)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
@@ -280,7 +280,7 @@ class ForwardModel:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
         # A vector's component changes by f/R across its direction, too.
         if self.order == 0:
-            return np.asarray(geometry.towards * self.radial_derivative(geometry, kernel))
+            return geometry.towards * self.radial_derivative(geometry, kernel)
         slope, turn = self._vector_slopes(geometry, kernel)
         shift = geometry.towards[self.axis] * geometry.towards * (turn - slope)
         shift[self.axis] -= turn
@@ -352,7 +352,7 @@ class ForwardModel:
         for rows, measure in self._measures:
             spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
             per_newton[rows] = geometry.summed(wave, spread, rows)
-        return np.asarray(per_newton * (load if kernel.ndim == 1 else load[:, None]))
+        return per_newton * (load if kernel.ndim == 1 else load[:, None])
 
     @property
     def _measures(self) -> list[tuple[Rows, FloatArray]]:

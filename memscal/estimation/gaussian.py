@@ -61,7 +61,7 @@ def gauss_newton(
         place = place + step
         cost = loss
         if longest < tolerance:
-            return np.asarray(place)
+            return place
     return None
 
 
@@ -332,7 +332,7 @@ def _solve(
         )
         if not result.success:
             raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
-        solution = np.asarray(result.x)
+        solution = result.x
     # The model is even in the width.
     solution[1] = abs(solution[1])
     fit = linearise(model, solution * scale)

@@ -36,7 +36,7 @@ def outlier_weights(
     """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
     # The residuals count in robust standard deviations of their own, of ``least`` or more.
     z = np.abs(standardised) / max(median_deviation(standardised), least)
-    return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))
+    return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 
 def point_weights(

@@ -60,13 +60,13 @@ class ProfileEstimate:
     @property
     def noise(self) -> FloatArray:
         """Adopted noise of each voltage, shape (n,), in V, uncertain positions included."""
-        return np.asarray(self.noise_scale / np.sqrt(self.weights / self.outlier_weight))
+        return self.noise_scale / np.sqrt(self.weights / self.outlier_weight)
 
     def drawn_noise(self, standard: FloatArray) -> FloatArray:
         """Noise of the voltages, in V, of independent standard normal draws, (n,) or (n, m)."""
         factor = self.points.decorrelation
         correlated = standard if factor is None else factor.correlate(standard)
-        return np.asarray((self.noise / self.outlier_weight**0.5 * correlated.T).T)
+        return (self.noise / self.outlier_weight**0.5 * correlated.T).T
 
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
@@ -110,12 +110,12 @@ class ProfileEstimate:
         """Transform of A G at the quadrature nodes, in V/Pa."""
         gaussian = gaussian_transfer(self.model.k, self.gaussian.sigma)
         correction = self.basis.kernels(self.model.k) @ self.weighed.mean
-        return np.asarray(self.gaussian.conversion_constant * gaussian + correction)
+        return self.gaussian.conversion_constant * gaussian + correction
 
     def radial(self, r: FloatArray, shift: FloatArray | float = 0.0) -> FloatArray:
         """A G at radii ``r`` (m), in V/Pa/m^2; its coefficients may be shifted, shape (p,)."""
         gaussian = self.gaussian.conversion_constant * unit_gaussian(r, self.gaussian.sigma)
-        return np.asarray(gaussian + self.basis.radial(r) @ (self.weighed.mean + shift))
+        return gaussian + self.basis.radial(r) @ (self.weighed.mean + shift)
 
     @property
     def spectrum(self) -> RadialSpectrum:
@@ -145,7 +145,7 @@ class ProfileEstimate:
         """Each scan's baseline and its change over half the range along x (and y), in V."""
         first = 2 + int(self.points.free.sum())
         last = self.gaussian.jacobian.shape[1] - self.points.ellipse
-        return np.asarray(self.gaussian.drift + self.weighed.mean[first:last])
+        return self.gaussian.drift + self.weighed.mean[first:last]
 
     @property
     def drift(self) -> FloatArray:
@@ -157,7 +157,7 @@ class ProfileEstimate:
         fit = self.gaussian
         kernel = fit.conversion_constant * elliptic_departure(x, y, fit.sigma, fit.ellipticity)
         changes = self.oval_changes(x, y, self.weighed.mean[:, None])
-        return np.asarray(kernel + changes.reshape(kernel.shape))
+        return kernel + changes.reshape(kernel.shape)
 
     def oval_changes(self, x: FloatArray, y: FloatArray, coefficients: FloatArray) -> FloatArray:
         """What of combinations (p, c) of the posterior's kernels is not round: (y x, c)."""
@@ -188,7 +188,7 @@ class ProfileEstimate:
         if not self.points.ellipse:
             return np.zeros_like(self.points.u)
         radial = self.model.signal(self.model.geometry(self.centres), self.kernel)
-        return np.asarray(self.predicted - self.background - radial)
+        return self.predicted - self.background - radial
 
     @property
     def uneven(self) -> FloatArray:
@@ -197,13 +197,13 @@ class ProfileEstimate:
         if type(self.model) is ForwardModel:
             return np.zeros_like(self.points.u)
         whole = self.model.signal(self.model.geometry(self.centres), self.kernel)
-        return np.asarray(whole - mean.signal(mean.geometry(self.centres), self.kernel))
+        return whole - mean.signal(mean.geometry(self.centres), self.kernel)
 
     @property
     def offset(self) -> FloatArray:
         """Position of each point from its scan's centre, shape (2, n), in m."""
         positions = np.stack([self.points.x, self.points.y])
-        return np.asarray(positions - self.centres[self.points.scan].T)
+        return positions - self.centres[self.points.scan].T
 
     @cached_property
     def distance(self) -> FloatArray:
@@ -213,7 +213,7 @@ class ProfileEstimate:
     @cached_property
     def background(self) -> FloatArray:
         """Baseline and drift at each point, shape (n,), in V."""
-        return np.asarray(self.model.drift_columns @ self.drifts)
+        return self.model.drift_columns @ self.drifts
 
     @property
     def predicted(self) -> FloatArray:
@@ -333,7 +333,7 @@ def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0
     """Inverse variance of each voltage as stated; ones where nothing is."""
     if points.u_errors is None:
         return np.ones_like(points.u)
-    return np.asarray(1 / (points.u_errors**2 + position_noise**2))
+    return 1 / (points.u_errors**2 + position_noise**2)
 
 
 def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
@@ -342,7 +342,7 @@ def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
     along = np.argmax(model.points.free[model.points.scan], axis=1), range(model.points.u.size)
-    return np.asarray(slope[along] * model.points.x_errors)
+    return slope[along] * model.points.x_errors
 
 
 def _require_determined(estimate: ProfileEstimate) -> None:
@@ -451,7 +451,7 @@ class PosteriorProfile:
         basis = self.estimate.basis
         corrections = self.estimate.weighed.mean + self.shift
         gaussian = fit.conversion_constant * gaussian_transfer(k, fit.sigma)
-        return np.asarray(gaussian + basis.kernels(k) @ corrections)
+        return gaussian + basis.kernels(k) @ corrections
 
 
 def constrained_profile(

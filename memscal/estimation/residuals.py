@@ -155,7 +155,7 @@ class Residuals:
         root = np.sqrt(np.maximum(shares, np.finfo(float).eps))
         along = self.basis.T @ self.values - self.basis[dropped].T @ self.values[dropped]
         growth = vectors @ ((vectors.T @ along) / (root * (1 + root)))
-        return np.asarray((self.values + self.basis @ growth)[rest]), rest
+        return (self.values + self.basis @ growth)[rest], rest
 
 
 def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> Residuals:
@@ -203,7 +203,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     def within(columns: FloatArray) -> FloatArray:
         """Subtract from each column its weighted mean at each place."""
         sums = np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1)
-        return np.asarray(columns - weight[:, None] * (sums / square[:, None])[group])
+        return columns - weight[:, None] * (sums / square[:, None])[group]
 
     basis = orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)
@@ -327,4 +327,4 @@ def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArra
     if len(scaled) > DENSE:
         return orthonormalised(scaled, np.ones_like(size), _DEPENDENT)[0]
     left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(left[:, singular > _DEPENDENT * singular[0]])
+    return left[:, singular > _DEPENDENT * singular[0]]

@@ -345,7 +345,7 @@ def _layout(
     transform = bessel @ values @ free
     if not source:
         transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
-    return basis, intervals, free, np.asarray(np.linalg.qr(rows)[1]), transform
+    return basis, intervals, free, np.linalg.qr(rows)[1], transform
 
 
 def _even_splines(knots: FloatArray) -> Splines:

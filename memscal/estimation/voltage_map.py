@@ -181,7 +181,7 @@ def orthonormalised(
     for start in range(0, len(columns), BLOCK):
         block = columns[start : start + BLOCK]
         block[:, : len(right)] = block @ turn
-    return columns[:, : len(right)], np.asarray(singular[:, None] * right * scale)
+    return columns[:, : len(right)], singular[:, None] * right * scale
 
 
 def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
@@ -190,6 +190,6 @@ def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> 
     safe = np.where(scale > 0, np.sqrt(scale), 1.0)
     scaled = covariance / np.outer(safe, safe)
     with contextlib.suppress(np.linalg.LinAlgError):
-        return np.asarray(safe[:, None] * np.linalg.cholesky(scaled))
+        return safe[:, None] * np.linalg.cholesky(scaled)
     values, vectors = np.linalg.eigh(scaled)
     return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
