@@ -67,16 +67,16 @@ ROWS = st.one_of(
 def test_blocks_give_what_the_whole_table_gives(
     tmp_path_factory: pytest.TempPathFactory, table, delimiter, decimal, end, encoding, names
 ):
-    """In small blocks, of which those of plain numbers take another way, and in one."""
+    """In small blocks, of which those of bare numbers take another way, and in one."""
     regular = [["0.5", "1", "2"]] * 40
     lines = [delimiter.join(row).replace(".", decimal) for row in regular + table + regular * 3]
     text = end.join([delimiter.join("xun"), *lines])
     path = tmp_path_factory.mktemp("t") / "table.csv"
     path.write_bytes(text.encode(encoding, "replace"))
     whole = content(path, names, decimal, delimiter)
-    for block in (256, 512):
+    for block in (64, 256):
         with pytest.MonkeyPatch.context() as patch:
-            for name, value in (("_FIRST", 64), ("_SAMPLE", 3), ("_BLOCK", block)):
+            for name, value in (("_SAMPLE", 3), ("_BLOCK", block)):
                 patch.setattr(text_table, name, value)
             found = content(path, names, decimal, delimiter)
         if isinstance(whole, str):
@@ -156,7 +156,7 @@ def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line
     lines = TextTable._numbered
 
     def watched(table: TextTable, block: bytes) -> Any:
-        assert len(block) <= 3 * text_table._BLOCK
+        assert len(block) <= 2 * text_table._LONGEST
         return lines(table, block)
 
     monkeypatch.setattr(TextTable, "_numbered", watched)

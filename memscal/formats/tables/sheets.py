@@ -195,7 +195,7 @@ class FrameTable(NamedColumns):
             return values.astype(np.float64)
         cells = ["" if value is None else str(value).strip() for value in values.tolist()]
         with placed(self.where(item.column)):
-            self.decimal = self.decimal or find_decimal([(cell,) for cell in cells])
+            self.decimal = self.decimal or find_decimal([[cell] for cell in cells])
         return self._numbers(cells, lines, item)
 
     def _describe(self, count: int) -> None:

@@ -3,12 +3,12 @@
 import codecs
 import csv
 import hashlib
+import itertools
 import os
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import suppress
-from itertools import zip_longest
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -34,7 +34,8 @@ from memscal.progress import counted
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-_SHEET_ERROR = re.compile(r"#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?)", re.IGNORECASE)
+#: Begins a line of cells, which is no comment: what a spreadsheet writes for an error is a cell.
+_CELLS = re.compile(r"\s*(?:[^\s#%]|#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?))", re.IGNORECASE)
 #: A number with a separator of thousands, such as -4.000,0.
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 #: A name and its unit: x (mm) or x [mm], and x/mm.
@@ -45,17 +46,15 @@ _MAX_NAME = 80
 _MAX_COMMENTS = 20
 _MAX_COMMENT = 300
 _NAMED = 5
-#: Lines from which delimiter, decimal mark and header are found; bytes that hold them, and bytes
-#: that are then cut into cells at once.
+#: Lines from which delimiter, decimal mark and header are found; bytes that are cut into cells at
+#: once, and those of the longest line.
 _SAMPLE = 250
-_FIRST = 2**16
-_BLOCK = 2**22
+_BLOCK = 2**16
+_LONGEST = 2**22
 #: Rows that tell which columns hold numbers: the last ones, for a preamble stands above them.
 _LAST = 50
-#: What may stand in a block that needs no care: no quote and no sign of a comment.
-_PLAIN = bytes({9, 10, *range(32, 127)} - {*b'"#%'})
 
-Rows = list[tuple[str, ...]]
+Rows = list[list[str]]
 Numbered = list[tuple[int, str]]
 Lines = range | list[int] | NDArray[np.int32]
 
@@ -93,7 +92,7 @@ class NamedColumns:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        (rows, room) = self._room(len(wanted))
+        rows, room = self._room(len(wanted))
         count = 0
         values = [np.empty(room) for _ in wanted]
         parts = self._parts([*wanted.values()])
@@ -129,10 +128,11 @@ class NamedColumns:
             problem = f"{self.where(column)} states the unit {stated!r}, but {option} is {unit!r}."
             cure = "Leave the option out to take the unit of the table, or correct the table."
             raise InputError(problem, why="One of them is wrong.", cure=cure)
-        if chosen := unit or stated or default:
-            return chosen.strip()
-        cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
-        raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
+        chosen = unit or stated or default
+        if not chosen:
+            cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
+            raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
+        return chosen.strip()
 
     def where(self, column: str | int) -> str:
         """Return file and column as messages name them."""
@@ -141,10 +141,16 @@ class NamedColumns:
     def lines(self, rows: Sequence[int]) -> str:
         """Name the lines of the file in which rows stand: the first five, and how many more."""
         starts = [start for start, _ in self._lines_of]
-        parts = [(row, self._lines_of[bisect_right(starts, row) - 1]) for row in rows[:_NAMED]]
-        numbers = [str(lines[row - start]) for row, (start, lines) in parts]
-        more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
-        return f"{self._row}{'s' if len(rows) > 1 else ''} {', '.join(numbers)}{more}"
+        named = []
+        for row in rows[:_NAMED]:
+            start, lines = self._lines_of[bisect_right(starts, row) - 1]
+            named.append(lines[row - start])
+        return self._named(named, len(rows))
+
+    def _named(self, lines: Sequence[int], count: int) -> str:
+        more = f" and {count - _NAMED} more" if count > _NAMED else ""
+        several = "s" if count > 1 else ""
+        return f"{self._row}{several} {', '.join(map(str, lines[:_NAMED]))}{more}"
 
     def all_lines(self) -> NDArray[Any]:
         """Return the line of the file of each row, (n,)."""
@@ -188,9 +194,10 @@ class NamedColumns:
 
     def _numbers(self, cells: Sequence[str], lines: Lines, item: Wanted) -> FloatArray:
         """Return cells of a column as numbers; those that are none are kept for the message."""
-        with suppress(ValueError):
-            if not (self._comma_alone and any("." in cell for cell in cells)):
-                return np.fromiter(map(float, cells), np.float64, len(cells))
+        texts = [cell.replace(",", ".") for cell in cells] if self.decimal == "," else cells
+        if not (self._comma_alone and any("." in cell for cell in cells)):
+            with suppress(ValueError):
+                return np.fromiter(map(float, texts), np.float64, len(cells))
         pairs = zip(cells, lines, strict=True)
         return np.array([self._number(cell, line, item) for cell, line in pairs])
 
@@ -200,6 +207,7 @@ class NamedColumns:
         return False
 
     def _number(self, cell: str, line: int, item: Wanted) -> float:
+        cell = cell.strip()
         word = cell.lower()
         if word in item.words:
             return item.words[word]
@@ -211,13 +219,12 @@ class NamedColumns:
                 return _float(text)
         lines, cells = self._wrong.setdefault(item.column, ([], []))
         lines.append(line)
-        cells += [printable(cell, _MAX_NAME)] if len(cells) < _NAMED else []
+        if len(cells) < _NAMED:
+            cells.append(printable(cell, _MAX_NAME))
         return float("nan")
 
     def _refuse_wrong(self, wanted: list[Wanted]) -> None:
-        for item in wanted:
-            if item.column not in self._wrong:
-                continue
+        for item in (item for item in wanted if item.column in self._wrong):
             lines, cells = self._wrong[item.column]
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
@@ -239,7 +246,11 @@ def _float(text: str) -> float:
 
 def _cut(name: str) -> tuple[str, ...]:
     """Return the name of a column and, if there is one, its unit."""
-    return next((m.groups() for m in (head.fullmatch(name) for head in _HEADS) if m), (name,))
+    for head in _HEADS:
+        match = head.fullmatch(name)
+        if match:
+            return match.groups()
+    return (name,)
 
 
 class Sheet(NamedTuple):
@@ -275,86 +286,97 @@ class TextTable(NamedColumns):
         self._latin = False
         self._width = 0
         self._line = 1
-        self._comments: list[int] = []
         self._blocks = self._whole_lines()
-        head = b""
-        written = Numbered()
         lines = Numbered()
+        comments = Numbered()
+        seen = 0
         # A head of a few endless lines, or of comments alone, is looked at no further than this.
-        while len(lines) < _SAMPLE and len(head) <= _BLOCK and (block := next(self._blocks, b"")):
-            head = head + block
-            self._line = 1
-            written = self._numbered(head)
-            lines = [(n, s) for n, s in written if n > skip_rows and not _is_comment(s)]
-        if not lines:
+        while len(lines) < _SAMPLE + skip_rows and seen <= _LONGEST:
+            block = next(self._blocks, b"")
+            if not block:
+                break
+            seen += len(block)
+            more_lines, more_comments = self._numbered(block)
+            lines += more_lines
+            comments += more_comments
+        below = [(number, line) for number, line in lines if number > skip_rows]
+        if not below:
             cure = "Give a table with one row per reading."
             raise FormatError(f"{self._name} holds no table.", cure=cure)
-        self._delimiter = delimiter or ("\t" if sheet else _find_delimiter([s for _, s in lines]))
-        self._find_head([(n, s) for n, s in written if n > skip_rows], lines)
-        self._said = [s for n, s in written if n < self._header[0]]
-        self._comments = [n for n, s in written if n > self._first[1][0] and _is_comment(s)]
+        self._delimiter = delimiter or ("\t" if sheet else _find_delimiter([s for _, s in below]))
+        self._find_head(below, [(n, s) for n, s in comments if n > skip_rows])
+        self._said = [line for n, line in sorted(lines + comments) if n < self._header]
+        self._comments = [n for n, _ in comments if n > self._first[1][0]]
         with placed(self._name):
             self.decimal = decimal or find_decimal(self._first[0], self._delimiter)
-        self._marks = bytes.maketrans(self.decimal.encode()[:1] + b"dD", b".EE")
 
-    def _find_head(self, written: Numbered, lines: Numbered) -> None:
+    def _find_head(self, lines: Numbered, comments: Numbered) -> None:
         """Find the first row of numbers, and the header and the row of units above it."""
-        rows, places = self._rows(lines)
-        if (start := _first_of_numbers(rows, self._missing)) is None:
+        cut, places = self._rows(lines)
+        rows = [[cell.strip() for cell in row] for row in cut]
+        start = _first_of_numbers(rows, self._missing)
+        if start is None:
             sheet = f"sheet {self._sheet.name!r} of " if self._sheet else ""
             cure = self._sheet.cure if self._sheet else "Give a table with rows of numbers."
             raise FormatError(f"{sheet}{self._name} has no row of numbers.", cure=cure)
+        width = len(rows[start])
         above = [(places[i], rows[i]) for i in range(start) if any(rows[i])]
-        if not above:  # numpy.savetxt writes the header as a comment
-            comments = [(n, s.lstrip(" \t#%")) for n, s in written if n < places[start]]
-            found = [(n, self._rows([(n, s)])[0]) for n, s in comments if s]
-            above = [(n, cut[0]) for n, cut in found if len(cut[0]) == len(rows[start])]
-        self._header = (places[start], False)
-        names = tuple[str, ...]()
-        if above and _filled(above[-1][1]) >= min(2, len(rows[start])):
-            line, names = above.pop()
-            title, cells = above[-1] if above else (0, ())
-            named = title == line - 1 and _filled(cells) >= _filled(names)
-            bare = [cell.strip("()[]- ") for cell in names]
-            if named and not any(map(_is_number, cells)) and any(map(is_common_unit, bare)):
-                units = tuple(unit if unit and is_unit(unit) else "" for unit in bare)
-                if 2 * _filled(units) >= _filled(bare):
-                    self._unit_row = units
-                    line = title
-                    names = cells
-            self._header = line, bool(names)
+        if not above:
+            above = self._commented_heads(comments, places[start], width)
+        names: list[str] = []
+        self._header = places[start]
+        if above and _filled(above[-1][1]) >= min(2, width):
+            self._header, names = above.pop()
+            line, title = above[-1] if above else (0, [])
+            units = _units_in(names)
+            if units and line == self._header - 1 and _may_have_units(title, names):
+                self._unit_row = units
+                self._header = line
+                names = title
+        self._headed = bool(names)
         heads = [*names, *[""] * (self._width - len(names))]
         self.names = tuple(printable(c, _MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
         by_rows = not names or self._delimiter == " "
-        self._columns = len(rows[start] if by_rows else names)
+        self._columns = width if by_rows else len(names)
         after = places[start - 1] if start else 0
         self._require_whole(*self._first, [entry for entry in lines if entry[0] > after])
+
+    def _commented_heads(
+        self, comments: Numbered, before: int, width: int
+    ) -> list[tuple[int, list[str]]]:
+        """Return comments with as many cells as a row: numpy.savetxt writes the header as one."""
+        heads = []
+        for number, line in comments:
+            text = line.lstrip(" \t#%")
+            if number < before and text:
+                (row,) = self._rows([(number, text)])[0]
+                if len(row) == width:
+                    heads.append((number, [cell.strip() for cell in row]))
+        return heads
 
     def _describe(self, count: int) -> None:
         sha256 = self._sheet.sha256 if self._sheet else self._digest.hexdigest()
         self.source = SourceFile(self._name, sha256)
-        mark = "comma" if self.decimal == "," else "point"
-        apart = f"separated by a {_DELIMITERS.get(self._delimiter, repr(self._delimiter))}"
-        sheet = f"of the sheet {self._sheet.name!r}" if self._sheet else ""
-        apart = sheet or f"{apart}, with a decimal {mark}"
-        line, headed = self._header
+        notes = [f"Imported from {self._name} (sha256 {sha256})."]
+        if self._latin:
+            notes.append("The table is not UTF-8; it was read as Latin-1.")
+        notes += self._sayings()
         units = ", a row of units below it" if self._unit_row else ""
-        found = headed and bool(units or not all(map(_is_comment, self._said)))
-        self.notes = (
-            f"Imported from {self._name} (sha256 {sha256}).",
-            *["The table is not UTF-8; it was read as Latin-1."] * self._latin,
-            *self._sayings(),
-            *[f"The header is {self._row} {line}{units}."] * found,
-            *[f"Left out as comments: {self._left_out()}."] * bool(self._comments),
-            f"Read {count} rows of {self._width} columns {apart}.",
-        )
-
-    def _left_out(self) -> str:
-        named = ", ".join(map(str, self._comments[:_NAMED]))
-        more = len(self._comments) - _NAMED
-        several = "s" if len(self._comments) > 1 else ""
-        return f"{self._row}{several} {named}{f' and {more} more' if more > 0 else ''}"
+        if self._headed and (units or any(map(_CELLS.match, self._said))):
+            notes.append(f"The header is {self._row} {self._header}{units}.")
+        if self._comments:
+            notes.append(
+                f"Left out as comments: {self._named(self._comments, len(self._comments))}."
+            )
+        if self._sheet:
+            apart = f"of the sheet {self._sheet.name!r}"
+        else:
+            mark = "comma" if self.decimal == "," else "point"
+            delimiter = _DELIMITERS.get(self._delimiter, repr(self._delimiter))
+            apart = f"separated by a {delimiter}, with a decimal {mark}"
+        notes.append(f"Read {count} rows of {self._width} columns {apart}.")
+        self.notes = tuple(notes)
 
     @property
     def _comma_alone(self) -> bool:
@@ -364,38 +386,38 @@ class TextTable(NamedColumns):
     def _require_whole(self, rows: Rows, places: list[int], lines: Numbered) -> None:
         """Refuse rows with more cells than the header, or spaces for a cell; and open quotes."""
         if len(rows) < len(lines):
-            order = {number: i for i, (number, _) in enumerate(lines)}
-            ends = [order[number] for number in places]
-            # The first row whose lines are several.
-            begun = next(i for i, end in enumerate(ends) if end > i)
+            # Rows end on the lines of their numbers: the first one that does not has several.
+            begun = next(line for (line, _), end in zip(lines, places, strict=False) if line != end)
             raise FormatError(
-                f"{self._name}: a cell of {self._row} {lines[begun][0]} has no end in it.",
+                f"{self._name}: a cell of {self._row} {begun} has no end in it.",
                 why="A quotation mark stands alone; the readings within would be lost.",
                 cure="Take quotation marks out of the rows of numbers, or close them.",
             )
-        spaces = self._delimiter == " "
         stated = self._columns
-        for row, place in zip(rows, places, strict=True):
-            # Cells may be missing at the end; between spaces, any may be.
-            if len(row) != stated if spaces else any(row[stated:]):
-                raise FormatError(
-                    f"{self._name}: {self._row} {place} has {len(row)} cells, the "
-                    f"{'header' if self._header[1] and not spaces else 'first row'} {stated}.",
-                    why="Which cell belongs to which column is not known.",
-                    cure="Correct the table; state what separates its cells (--delimiter), or "
-                    "write numbers with a decimal point where commas separate them.",
-                )
+        if self._delimiter == " ":
+            wrong = (i for i, row in enumerate(rows) if len(row) != stated)
+            by = "first row"
+        else:  # cells may be missing at the end
+            wrong = (i for i, row in enumerate(rows) if any(map(str.strip, row[stated:])))
+            by = "header" if self._headed else "first row"
+        for i in wrong:
+            raise FormatError(
+                f"{self._name}: {self._row} {places[i]} has {len(rows[i])} cells, the {by} "
+                f"{stated}.",
+                why="Which cell belongs to which column is not known.",
+                cure="Correct the table; state what separates its cells (--delimiter), or "
+                "write numbers with a decimal point where commas separate them.",
+            )
 
     def _sayings(self) -> Iterator[str]:
         """Yield what is written above the table: it may say that the data are synthetic."""
-        texts = (
-            s.strip(f' \t#%"{self._delimiter}').replace("\t", " ").replace('"', "")
-            for s in self._said
-        )
-        said = [printable(text, _MAX_COMMENT).strip() for text in texts]
-        yield from (f"The table says: {text}" for text in said[:_MAX_COMMENTS] if text)
-        if len(said) > _MAX_COMMENTS:
-            yield f"{len(said) - _MAX_COMMENTS} more lines above the table were left out."
+        for line in self._said[:_MAX_COMMENTS]:
+            bare = line.strip(f' \t#%"{self._delimiter}').replace("\t", " ").replace('"', "")
+            text = printable(bare, _MAX_COMMENT).strip()
+            if text:
+                yield f"The table says: {text}"
+        if len(self._said) > _MAX_COMMENTS:
+            yield f"{len(self._said) - _MAX_COMMENTS} more lines above the table were left out."
 
     def _room(self, columns: int) -> tuple[int, int]:
         most = self._most(columns)
@@ -408,7 +430,8 @@ class TextTable(NamedColumns):
 
     def _raw(self) -> Iterator[bytes]:
         if self._sheet:
-            return iter([self._sheet.text])
+            text = self._sheet.text
+            return (text[i : i + _LONGEST] for i in range(0, len(text), _LONGEST))
         return read_pieces(self._path, limit=MOST_TABLE_BYTES)
 
     def _pieces(self) -> Iterator[bytes]:
@@ -416,77 +439,69 @@ class TextTable(NamedColumns):
         decode: codecs.IncrementalDecoder | None = None
         for number, piece in enumerate(filter(None, self._raw())):
             self._digest.update(piece)
-            if not number and piece.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            if number == 0 and piece.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
                 decode = codecs.getincrementaldecoder("utf-16")("replace")
             yield decode.decode(piece).encode() if decode else piece
 
     def _whole_lines(self) -> Iterator[bytes]:
-        """Yield a few lines, then blocks of whole lines."""
+        """Yield blocks of whole lines."""
         rest = b""
-        size = _FIRST
         for piece in self._pieces():
             rest += piece
-            while len(rest) > size:
-                if end := rest.rfind(b"\n", 0, size) + 1 or rest.rfind(b"\r", 0, size) + 1:
+            while len(rest) > _BLOCK:
+                end = _line_end(rest)
+                if end:
                     yield rest[:end]
                     rest = rest[end:]
-                elif size == _BLOCK:
-                    raise too_large("A line", len(rest), _BLOCK, "bytes", cure="Give a table.")
-                size = _BLOCK
+                elif len(rest) > _LONGEST:
+                    raise too_large("A line", len(rest), _LONGEST, "bytes", cure="Give a table.")
+                else:
+                    break
         if rest:
             yield rest
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
         indices = [self._index(item.column) for item in wanted]
-        yield self._part(*self._first, indices, wanted)
+        rows, places = self._first
+        yield places, self._columns_of(rows, places, indices, wanted)
         for block in self._blocks:
-            if numbers := self._plain_numbers(block, indices):
-                first = self._line
-                self._line = self._line + numbers[0].size
-                yield range(first, self._line), numbers
-            else:
-                written = self._numbered(block)
-                self._comments += [n for n, s in written if _is_comment(s)]
-                lines = [entry for entry in written if not _is_comment(entry[1])]
-                rows, places = self._rows(lines)
-                self._require_whole(rows, places, lines)
-                yield self._part(rows, places, indices, wanted)
+            numbers = self._bare_numbers(block)
+            if numbers is not None:
+                yield range(self._line, self._line + len(numbers)), [*numbers.T[indices]]
+                self._line += len(numbers)
+                continue
+            lines, comments = self._numbered(block)
+            self._comments += [number for number, _ in comments]
+            rows, places = self._rows(lines)
+            self._require_whole(rows, places, lines)
+            columns = self._columns_of(rows, places, indices, wanted)
+            yield np.array(places, dtype=np.int32), columns
 
-    def _part(
-        self, rows: Rows, lines: list[int], indices: list[int], wanted: list[Wanted]
-    ) -> tuple[Lines, list[FloatArray]]:
-        cells = [[row[i] if i < len(row) else "" for row in rows] for i in indices]
-        numbers = [self._numbers(c, lines, item) for c, item in zip(cells, wanted, strict=True)]
-        return np.array(lines, dtype=np.int32), numbers
-
-    def _plain_numbers(self, block: bytes, indices: list[int]) -> list[FloatArray]:
-        """Return columns of a block of bare numbers in rows of one width; of others, nothing."""
-        block = block.replace(b"\r\n", b"\n").rstrip(b"\n") + b"\n"
-        if self._delimiter not in _DELIMITERS or block.translate(None, _PLAIN):
-            return []
-        lines = block.translate(self._marks).splitlines()
-        mark = self._delimiter.encode()
-        spaces = self._delimiter == " "
-        width = len(lines[0].split(None if spaces else mark))
-        # The ends of the cells, as they follow each other in equal rows.
-        ends = block.translate(None, _PLAIN.translate(None, mark + b"\n"))
-        equal = spaces or ends == (mark * (width - 1) + b"\n") * len(lines)
-        # What needs a look is cut into cells: to be refused, or completed.
-        if max(indices) >= width or not equal or width > self._columns:
-            return []
-        if (spaces and width != self._columns) or (self._comma_alone and b"." in block):
-            return []
+    def _bare_numbers(self, block: bytes) -> FloatArray | None:
+        """Return a block of bare numbers in full rows, in a fifth of the time that cells take."""
+        if block.isspace() or (self._comma_alone and b"." in block):
+            return None
+        lines = block.replace(b",", b".") if self._comma_alone else block
+        delimiter = None if self._delimiter == " " else self._delimiter
+        rows = lines.splitlines()
         try:
-            chosen: Any = {} if spaces else {"delimiter": self._delimiter, "usecols": indices}
-            numbers = np.loadtxt(lines, ndmin=2, comments=None, **chosen)
+            numbers = np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2)
         except ValueError:
-            return []
-        self._width = max(self._width, width)
-        columns = numbers.T[indices] if spaces else numbers.T
-        return [*columns] if len(numbers) == len(lines) else []
+            return None
+        return numbers if numbers.shape == (len(rows), self._columns) else None
 
-    def _numbered(self, block: bytes) -> Numbered:
-        """Return the lines that are not blank, with their numbers in the file."""
+    def _columns_of(
+        self, rows: Rows, places: list[int], indices: list[int], wanted: list[Wanted]
+    ) -> list[FloatArray]:
+        cells = [*itertools.zip_longest(*rows, fillvalue="")]
+        empty = ("",) * len(rows)
+        return [
+            self._numbers(cells[i] if i < len(cells) else empty, places, item)
+            for i, item in zip(indices, wanted, strict=True)
+        ]
+
+    def _numbered(self, block: bytes) -> tuple[Numbered, Numbered]:
+        """Return lines of cells, and comments, with their numbers in the file."""
         if b"\0" in block:
             raise FormatError(f"{self._name} is not a text file.", cure="Give a table as CSV.")
         try:
@@ -495,41 +510,63 @@ class TextTable(NamedColumns):
             self._latin = True
             text = block.decode("latin-1")
         # A typographic minus is one.
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").replace("−", "-").split("\n")
-        first = self._line
-        self._line = self._line + len(lines) - 1
-        return [(number, line) for number, line in enumerate(lines, first) if line.strip()]
+        written = text.replace("\r\n", "\n").replace("\r", "\n").replace("−", "-").split("\n")
+        lines = Numbered()
+        comments = Numbered()
+        for number, line in enumerate(written, self._line):
+            if _CELLS.match(line):
+                lines.append((number, line))
+            elif line.strip():
+                comments.append((number, line))
+        self._line += len(written) - 1
+        return lines, comments
 
     def _rows(self, lines: Numbered) -> tuple[Rows, list[int]]:
         """Cut lines into cells; return them with the numbers of their lines."""
+        places = [number for number, _ in lines]
+        texts = [line for _, line in lines]
         if self._delimiter == " ":
-            rows = [line.split() for _, line in lines]
-            places = [number for number, _ in lines]
+            rows = [line.split() for line in texts]
         else:
             try:
-                reader = csv.reader(
-                    (line for _, line in lines), delimiter=self._delimiter, skipinitialspace=True
-                )
-                cut = [(row, lines[reader.line_num - 1][0]) for row in reader]
+                reader = csv.reader(texts, delimiter=self._delimiter, skipinitialspace=True)
+                cut = [(row, reader.line_num) for row in reader]
             except (csv.Error, TypeError) as error:
                 raise FormatError(f"{self._name} cannot be cut into columns: {error}.") from error
             rows = [row for row, _ in cut]
-            places = [number for _, number in cut]
+            places = [places[line - 1] for _, line in cut]
         self._width = max(self._width, *map(len, rows), 0)
         if self._width > MOST_COLUMNS:
             cure = "Leave out columns."
             raise too_large(self._name, self._width, MOST_COLUMNS, "columns", cure=cure)
-        return [tuple(map(str.strip, row)) for row in rows], places
+        return rows, places
 
 
-def _is_comment(line: str) -> bool:
-    # What a spreadsheet writes for an error is a cell.
-    text = line.lstrip()
-    return text[0] in "#%" and not _SHEET_ERROR.match(text)
+def _line_end(text: bytes) -> int:
+    """Return where the last whole line of a block ends, or the first line, if that is longer."""
+    for end in (b"\n", b"\r"):
+        place = text.rfind(end, 0, _BLOCK) + 1 or text.find(end, _BLOCK, -1) + 1
+        if place:
+            return place
+    return 0
 
 
 def _filled(cells: Sequence[str]) -> int:
     return sum(map(bool, cells))
+
+
+def _units_in(cells: Sequence[str]) -> tuple[str, ...]:
+    """Return the units in a row that holds units alone, "" where a cell is none."""
+    bare = [cell.strip("()[]- ") for cell in cells]
+    if not any(map(is_common_unit, bare)):
+        return ()
+    units = tuple(text if text and is_unit(text) else "" for text in bare)
+    return units if 2 * _filled(units) >= _filled(bare) else ()
+
+
+def _may_have_units(cells: Sequence[str], below: Sequence[str]) -> bool:
+    """Whether a row may name the columns of which the row below it states the units."""
+    return _filled(cells) >= _filled(below) and not any(map(_is_number, cells))
 
 
 def _is_number(cell: str) -> bool:
@@ -539,18 +576,23 @@ def _is_number(cell: str) -> bool:
 def _first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
     """Return the first row of a table, below preamble, header and units; none without numbers."""
     counts = [sum(map(_is_number, row)) for row in rows]
-    if not (most := min(2, max(counts, default=0))):
+    most = min(2, max(counts, default=0))
+    if not most:
         return None
-    dense = [row for row, count in zip(rows, counts, strict=True) if count >= most][-_LAST:]
+    dense = [row for row, count in zip(rows, counts, strict=True) if count >= most]
     numeric = []
-    for i, cells in enumerate(zip_longest(*dense, fillvalue="")):
-        stated = [_is_number(cell) for cell in cells if cell.lower() not in missing]
-        numeric += [i] if 2 * sum(stated) >= len(stated) > 0 else []
-    of_numbers = [[row[i] for i in numeric if i < len(row)] for row in rows]
-    good = [all(_is_number(c) or c.lower() in missing for c in cells) for cells in of_numbers]
-    some = [any(map(_is_number, cells)) for cells in of_numbers]
-    both = [a and b for a, b in zip(good, some, strict=True)]
-    start = both.index(True) if any(both) else some.index(True)
+    for i, column in enumerate(itertools.zip_longest(*dense[-_LAST:], fillvalue="")):
+        stated = [_is_number(cell) for cell in column if cell.lower() not in missing]
+        if 2 * sum(stated) >= len(stated) > 0:
+            numeric.append(i)
+    good = []
+    some = []
+    for row in rows:
+        cells = [row[i] for i in numeric if i < len(row)]
+        some.append(any(map(_is_number, cells)))
+        whole = all(_is_number(cell) or cell.lower() in missing for cell in cells)
+        good.append(some[-1] and whole)
+    start = good.index(True) if any(good) else some.index(True)
     while start and some[start - 1]:  # a row with a wrong cell, which is refused later
         start -= 1
     return start
@@ -559,16 +601,18 @@ def _first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
 def _find_delimiter(lines: list[str]) -> str:
     """Take the delimiter that cuts the most lines into equally many pieces, of numbers."""
     best = " "
-    score = 0.0
+    highest = 0.0
     for delimiter in _DELIMITERS:
         rows = [line.split(None if delimiter == " " else delimiter) for line in lines[-_LAST:]]
         widths = [len(row) for row in rows]
         common = max(set(widths), key=widths.count)
-        cells = [c.strip(' "') for row in rows if len(row) == common for c in row]
-        found = widths.count(common) * (0.1 + sum(map(_is_number, cells)) / len(cells))
-        if common > 1 and found > score:
+        cells = itertools.chain(*(row for row in rows if len(row) == common))
+        numbers = sum(_is_number(cell.strip(' "')) for cell in cells)
+        equal = widths.count(common)
+        score = equal * (0.1 + numbers / (common * equal))
+        if common > 1 and score > highest:
             best = delimiter
-            score = found
+            highest = score
     return best
 
 
@@ -577,10 +621,10 @@ def find_decimal(rows: Rows, delimiter: str = "") -> str:
     if delimiter == ",":
         return "."
     some = rows[:200]
-    cells = [c for row in some for c in row if _is_number(c)]
+    cells = [cell for cell in itertools.chain(*some) if _is_number(cell)]
     if not any("," in c for c in cells) or any("." in c for c in cells):
         return "."
-    for column in zip_longest(*some, fillvalue=""):
+    for column in itertools.zip_longest(*some, fillvalue=""):
         commas = [c for c in column if "," in c and _is_number(c)]
         bare = [c for c in column if "," not in c and _is_number(c)]
         if commas and bare and all(map(_THOUSANDS.fullmatch, commas)):
