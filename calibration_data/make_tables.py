@@ -32,8 +32,10 @@ def messy_scan(path: Path) -> None:
     rng = np.random.default_rng(2008)
     quiet = memscal.simulate(
         conversion_constant=conversion_constant,
-        half_range=10e-3, points=4001, centre=(0.0, 0.0), noise=0.0, baseline=0.0, drift=0.0,
-    )  # fmt: skip
+        half_range=10e-3,
+        points=4001,
+        disturbances=memscal.Disturbances(noise=0.0, baseline=0.0, drift=0.0, centre=(0.0, 0.0)),
+    )
     largest = quiet.u_zz.max() * 1e3
 
     repeat = np.repeat([1, 2, 3], 33)
@@ -107,8 +109,7 @@ def own_experiment(folder: Path) -> None:
         friction=0.12,
         spacing=0.4e-3,
         repeats=2,
-        load_scatter=0.01,
-        centre=(-0.31e-3, 0.0),
+        disturbances=memscal.Disturbances(load_scatter=0.01, centre=(-0.31e-3, 0.0)),
         seed=60,
     )
     about = (

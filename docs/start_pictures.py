@@ -88,8 +88,9 @@ def pipeline() -> plt.Figure:
     spread = np.random.default_rng(7)
     truths = 1e-7 * (1 + 0.04 * spread.standard_normal(200))
     truths[[41, 138]] *= [0.72, 1.25]
+    noisy = memscal.Disturbances(noise=0.01)
     scans = (
-        memscal.simulate(conversion_constant=a, noise=0.01, points=33, seed=seed)
+        memscal.simulate(conversion_constant=a, points=33, disturbances=noisy, seed=seed)
         for seed, a in enumerate(truths)
     )
     results = list(memscal.calibrate_many(scans, method="bayesian"))

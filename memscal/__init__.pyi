@@ -29,6 +29,7 @@ from .extensions.monte_carlo.sweep import Sweep as Sweep
 from .extensions.planning.design import Design as Design
 from .extensions.planning.design import Plan as Plan
 from .extensions.planning.design import design as design
+from .extensions.simulation.disturbances import Disturbances as Disturbances
 from .extensions.simulation.experiment import Experiment as Experiment
 from .extensions.simulation.experiment import simulate_experiment as simulate_experiment
 from .extensions.simulation.rod_scan import simulate as simulate

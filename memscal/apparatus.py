@@ -46,7 +46,7 @@ class ApparatusFunction(Result, ApparatusData):
     Examples
     --------
     >>> import memscal
-    >>> apparatus = memscal.calibrate(memscal.simulate(noise=0.002, seed=3)).apparatus
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=3)).apparatus
     >>> contact = memscal.indent(apparatus.film, memscal.Sphere(radius=0.1), load=0.5)
     >>> r = np.linspace(0, 20e-3, 801)
     >>> volts = apparatus.predict(r, contact.base_stress(r))
@@ -184,7 +184,7 @@ class ApparatusFunction(Result, ApparatusData):
         Examples
         --------
         >>> import memscal
-        >>> apparatus = memscal.calibrate(memscal.simulate(noise=0.002, seed=3)).apparatus
+        >>> apparatus = memscal.calibrate(memscal.simulate(seed=3)).apparatus
         >>> apparatus.compact().plane is None
         True
         """

@@ -433,7 +433,12 @@ comparison.plot()
 # %%
 interface = memscal.Interface(slip_length=6 * UM)
 experiment = memscal.simulate_experiment(
-    friction=1.6, interface=interface, repeats=4, rod_repeats=8, load_uncertainty=0.003, seed=1
+    friction=1.6,
+    interface=interface,
+    repeats=4,
+    rod_repeats=8,
+    disturbances=memscal.Disturbances(load_uncertainty=0.003),
+    seed=1,
 )
 precise = replace(
     film,

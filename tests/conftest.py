@@ -21,7 +21,7 @@ if hasattr(signal, "SIGHUP"):
 import pytest  # noqa: E402
 from helpers.console import Outcome, Run  # noqa: E402
 from helpers.nexus import definitions_folder, structure, violations  # noqa: E402
-from helpers.scans import known_apparatus  # noqa: E402
+from helpers.scans import known_apparatus, simulate  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
 import memscal  # noqa: E402
@@ -126,7 +126,7 @@ def good_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def drifting_scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scan whose baseline drifts by far more than the quality check allows."""
     path = tmp_path_factory.mktemp("drifting") / "scan.h5"
-    memscal.write_scan(memscal.simulate(seed=1, drift=0.2), path)
+    memscal.write_scan(simulate(seed=1, drift=0.2), path)
     return path
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.builders import CONVERSION, SIGMA, make_artifact
 from helpers.machine import assert_same_to_rounding
-from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS
+from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad
@@ -228,7 +228,7 @@ def test_an_artifact_keeps_its_arrays_and_names_its_parameters():
 
 
 def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path: Path) -> None:
-    whole = memscal.calibrate(memscal.simulate(noise=0.005, seed=2)).apparatus
+    whole = memscal.calibrate(simulate(noise=0.005, seed=2)).apparatus
     compact = whole.compact()
     sizes = []
     for name, apparatus in (("whole.h5", whole), ("compact.h5", compact)):
@@ -269,7 +269,7 @@ def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
     stated = []
     blurred = []
     for seed in range(40):
-        scan = memscal.simulate(
+        scan = simulate(
             film=film, rod=rod, noise=0.005, seed=seed, load_uncertainty=None, kernel=TAILS
         )
         apparatus = memscal.calibrate(scan, method="evidence").apparatus

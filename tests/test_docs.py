@@ -12,6 +12,7 @@ import jupytext
 import nbformat
 import pytest
 from helpers.bench import Bench
+from helpers.scans import simulate
 
 import memscal
 from memscal.cli import main
@@ -132,7 +133,7 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    scan = memscal.simulate(points=33, noise=0.0)
+    scan = simulate(points=33, noise=0.0)
     bench = Bench(scan, noise=0.005 * scan.u_zz.max(), seed=seed)
     procedure, run = blocks("acquisition.md", "python")
     names: dict[str, object] = {"__name__": "recipe"}

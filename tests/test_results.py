@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.records import assert_same
-from helpers.scans import contact_scan
+from helpers.scans import contact_scan, simulate
 
 import memscal
 from memscal.cli import main
@@ -17,7 +17,7 @@ from memscal.cli import main
 @pytest.fixture(scope="module")
 def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("results") / "scan.h5"
-    memscal.write_scan(memscal.simulate(seed=1, points=33, drift=0.2), path)
+    memscal.write_scan(simulate(seed=1, points=33, drift=0.2), path)
     return path
 
 

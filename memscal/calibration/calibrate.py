@@ -199,7 +199,7 @@ def calibrate(
     Examples
     --------
     >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(noise=0.005, seed=1))
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """

@@ -92,6 +92,7 @@ PUBLIC = {
     "extensions.monte_carlo.monte_carlo": ["BudgetComparison", "MonteCarlo", "monte_carlo"],
     "extensions.monte_carlo.sweep": ["Sweep"],
     "extensions.planning.design": ["Design", "Plan", "design"],
+    "extensions.simulation.disturbances": ["Disturbances"],
     "extensions.simulation.experiment": ["Experiment", "simulate_experiment"],
     "extensions.simulation.rod_scan": ["simulate"],
 }

@@ -535,8 +535,9 @@ def compare_shear(
     Examples
     --------
     >>> import math, memscal
+    >>> shear = (memscal.GaussianMixture(), 5e-8)  # G and A of the tangential channel
     >>> made = memscal.simulate_experiment(
-    ...     friction=0.1, loads=[1.37], lubricated_loads=[1.37], channels=("zz", "xz"), seed=1
+    ...     friction=0.1, loads=[1.37], lubricated_loads=[1.37], shear=shear, seed=1
     ... )
     >>> normal, shear = (
     ...     memscal.calibrate(made.rod, channel=channel, method="bayesian").apparatus

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.scans import simulate
 from scipy.stats import chi2
 
 import memscal
@@ -77,7 +78,7 @@ def study(number: int) -> Study:
     stated = []
     found = []
     for seed in range(SEEDS):
-        scan = memscal.simulate(
+        scan = simulate(
             film=plan.film,
             kernel=plan.kernel,
             half_range=plan.step * (plan.positions - 1) / 2,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.scans import simulate_experiment
 from scipy.stats import binom, chi2
 
 import memscal
@@ -28,7 +29,7 @@ def study(**mistake: Any) -> list[tuple[float, float, int, float]]:
     """Force over load, its uncertainty, failed force checks, and width of G, of each."""
     found = []
     for seed in range(EXPERIMENTS):
-        scans = memscal.simulate_experiment(seed=seed, draw_inputs=True, **CAREFUL, **mistake)
+        scans = simulate_experiment(seed=seed, draw_inputs=True, **CAREFUL, **mistake)
         sensor = memscal.calibrate(scans.rod, method="evidence").apparatus
         measured = memscal.measure_stress([scans.dry, scans.lubricated], sensor)
         alarms = [c for c in measured.checks if "applied_force" in c.name and not c.passed]

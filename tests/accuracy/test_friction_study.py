@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.scans import simulate_experiment
 from scipy.stats import binom, kstest, norm
 
 import memscal
-from memscal.extensions.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
+from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import _channels, _confronted, _joint, compare_measured
@@ -76,7 +77,7 @@ def outcome(friction: float, seed: int, gain: float = 1.0, thickness: float = 1.
     mistakes = {"gain": gain, "thickness_factor": thickness}
     # Every coefficient has seeds of its own: shared ones would be unlucky together.
     own = 1000 * round(100 * min(friction, 9.0)) + seed
-    made = memscal.simulate_experiment(friction=friction, draw_inputs=True, seed=own, **mistakes)
+    made = simulate_experiment(friction=friction, draw_inputs=True, seed=own, **mistakes)
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
     return Outcome(friction, compare_measured(measured, apparatus, families()), apparatus)

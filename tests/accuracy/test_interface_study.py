@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.scans import simulate_experiment
 from scipy.stats import binom
 
 import memscal
 from memscal import ElasticFilm, Interface, LawComparison
 from memscal.extensions.interface_laws.model_comparison import compare_interface
-from memscal.extensions.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
+from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
@@ -78,7 +79,7 @@ def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawCom
     contact = {"film": film, "friction": friction, "interface": interface}
     # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
     seed += round(1e5 * friction + 1e9 * slip_length) * 1000 + 250 * list(KINDS).index(kind)
-    made = memscal.simulate_experiment(draw_inputs=True, seed=seed, **contact, **KINDS[kind])
+    made = simulate_experiment(draw_inputs=True, seed=seed, **contact, **KINDS[kind])
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     profiles = memscal.measure_stress([made.dry], apparatus).profiles
     families = {"amontons": rigid(film), "slipping": slipping(film)}

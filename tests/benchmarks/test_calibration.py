@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL
 from helpers.machine import once, show, turns
-from helpers.scans import LINEAR_FILM
+from helpers.scans import LINEAR_FILM, simulate
 from scipy.optimize import curve_fit
 
 import memscal
@@ -65,9 +65,7 @@ def plain(problem: DivisionProblem) -> PlainDivision:
 
 @pytest.fixture(scope="module")
 def scan() -> Scan:
-    return memscal.simulate(
-        film=LINEAR_FILM, points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4
-    )
+    return simulate(film=LINEAR_FILM, points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4)
 
 
 @pytest.fixture(scope="module")
@@ -145,12 +143,10 @@ def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference)
 
 def test_a_calibration_costs_as_much_as_it_has_points() -> None:
     # Beyond what a scan of few points costs; matrices over the points would cost 64 times as much.
-    scans = [memscal.simulate(points=points, noise=0.003, seed=1) for points in (20_001, 160_001)]
+    scans = [simulate(points=points, noise=0.003, seed=1) for points in (20_001, 160_001)]
     small, large = (lambda s=s: memscal.calibrate(s) for s in scans)
     show("calibration of 160,000 points, over 20,000", turns(large, small, rounds=2), 16)
-    rasters = [
-        memscal.simulate(points=side, raster=True, noise=0.003, seed=1) for side in (65, 129)
-    ]
+    rasters = [simulate(points=side, raster=True, noise=0.003, seed=1) for side in (65, 129)]
     small, large = (lambda s=s: memscal.calibrate(s) for s in rasters)
     show("calibration of a raster of 129 x 129 points, over 65 x 65", turns(large, small, 2), 8)
 
@@ -163,7 +159,7 @@ ALLOWED = 0.9 if SCANS > 100 else 1.2
 def test_two_processes_calibrate_faster_than_a_loop() -> None:
     if (os.cpu_count() or 1) < 2:
         pytest.skip("one core")
-    scans = [memscal.simulate(points=65, noise=0.003, seed=seed) for seed in range(SCANS)]
+    scans = [simulate(points=65, noise=0.003, seed=seed) for seed in range(SCANS)]
 
     def loop() -> None:
         for scan in scans:

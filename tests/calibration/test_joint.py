@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import assert_as_stated, cramer_rao
-from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, as_points, simulated
+from helpers.scans import (
+    CONVERSION,
+    EXACT_FILM,
+    EXACT_ROD,
+    SIGMA,
+    TAILS,
+    as_points,
+    simulate,
+    simulated,
+)
 from scipy.stats import chi2
 
 import memscal
@@ -104,7 +113,7 @@ def test_scans_of_other_sensors_or_of_films_that_contradict_are_refused() -> Non
 
 def moved_repeats() -> Scan:
     """Three passes over a sensor that moves between them."""
-    points = as_points(memscal.simulate(repeats=3, points=33, noise=0.003, seed=4))
+    points = as_points(simulate(repeats=3, points=33, noise=0.003, seed=4))
     return replace(points, x=points.x + 40e-6 * points.repeat)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.rasters import tailed_raster
+from helpers.scans import simulate
 
 import memscal
 from memscal.calibration import field_uncertainty, fields
@@ -17,7 +18,7 @@ from memscal.estimation import forward, gaussian, profile, residuals, smoothing,
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
-LINE = memscal.simulate(noise=0.005, seed=1)
+LINE = simulate(noise=0.005, seed=1)
 
 
 def correlated(scan: Scan) -> Scan:
@@ -39,10 +40,10 @@ def correlated_with_neighbours(scan: Scan, width: int) -> list[Scan]:
 
 
 def test_correlation_of_neighbours_is_that_of_all_pairs() -> None:
-    u = memscal.simulate(noise=0.005, seed=3, repeats=2).u_zz.copy()
+    u = simulate(noise=0.005, seed=3, repeats=2).u_zz.copy()
     u[0, 5] = np.nan
     u[1, 30:33] = np.nan
-    scan = replace(memscal.simulate(noise=0.005, seed=3, repeats=2), u_zz=u)
+    scan = replace(simulate(noise=0.005, seed=3, repeats=2), u_zz=u)
     whole, banded = (
         memscal.calibrate(s).apparatus.parameters for s in correlated_with_neighbours(scan, 4)
     )
@@ -69,7 +70,7 @@ def test_a_correlation_of_neighbours_that_is_none_is_refused(band: FloatArray, f
 
 
 def test_noise_of_many_points_may_be_correlated_with_neighbours(tmp_path: Path) -> None:
-    scan = memscal.simulate(points=20_001, noise=0.0, seed=1)
+    scan = simulate(points=20_001, noise=0.0, seed=1)
     # A moving average of independent noise.
     share = np.array([1.0, 0.5, 0.25]) / np.sqrt(1.3125)
     independent = np.random.default_rng(1).standard_normal(20_003)
@@ -103,14 +104,14 @@ def with_an_outlier(scan: Scan) -> Scan:
 
 CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "line": (LINE, {}),
-    "repeats": (memscal.simulate(noise=0.005, seed=2, repeats=5), {}),
+    "repeats": (simulate(noise=0.005, seed=2, repeats=5), {}),
     "repeats with centres": (
-        memscal.simulate(noise=0.005, seed=2, repeats=3),
+        simulate(noise=0.005, seed=2, repeats=3),
         {"centre": "per-repeat"},
     ),
     "correlated noise": (correlated(LINE), {}),
     "outlier": (with_an_outlier(LINE), {}),
-    "loads": ([memscal.simulate(noise=0.005, seed=i, load=0.1 * i) for i in (1, 2, 3)], {}),
+    "loads": ([simulate(noise=0.005, seed=i, load=0.1 * i) for i in (1, 2, 3)], {}),
     "source": (LINE, {"reference": "disc:0.4mm"}),
     "raster": (tailed_raster(seed=1, side=21), {}),
 }
@@ -155,7 +156,7 @@ def test_many_points_give_the_results_of_whole_matrices(
 def test_memory_grows_with_the_points_not_with_their_square() -> None:
     program = (
         "import memscal\n"
-        "scan = memscal.simulate(points=100_001, noise=0.005, seed=1)\n"
+        "scan = memscal.simulate(points=100_001, seed=1)\n"
         "print(memscal.calibrate(scan).apparatus.gaussian_sigma)\n"
         "print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])\n"
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.scans import simulate
 
 import memscal
 from memscal.cli import main
@@ -13,7 +14,7 @@ from memscal.formats.scan import read_scan, write_scan
 
 FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="linear")
 ROD = memscal.Rod(radius=0.25e-3)
-SCAN = replace(memscal.simulate(film=FILM, noise=0.005, seed=1), synthetic=None)
+SCAN = replace(simulate(film=FILM, noise=0.005, seed=1), synthetic=None)
 TABLE = memscal.indent(FILM, ROD, load=1.0).profile()
 BARE = replace(TABLE, film=None, indenter=None, depth=None, contact_radius=None)
 

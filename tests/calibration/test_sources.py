@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL, RARE
 from helpers.rasters import TailedEllipse
-from helpers.scans import EXACT_FILM, EXACT_ROD
+from helpers.scans import EXACT_FILM, EXACT_ROD, simulate
 from PIL import Image
 from scipy.integrate import quad
 from scipy.special import chndtr, j0, ndtr
@@ -233,7 +233,7 @@ def test_a_slit_is_not_the_reference_of_a_raster_nor_beside_a_stress() -> None:
 
 
 def test_more_points_than_a_source_with_an_edge_allows_are_refused_at_once() -> None:
-    scan = memscal.simulate(noise=0.005, points=401)
+    scan = simulate(noise=0.005, points=401)
     with pytest.raises(InputError, match="401 points for such a reference, but at most 400"):
         memscal.calibrate(scan, reference="disc:0.5mm")
     assert memscal.calibrate(scan, reference="gaussian:0.5mm").apparatus.conversion_constant > 0

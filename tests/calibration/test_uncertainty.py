@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from helpers.scans import LINEAR_FILM, RING, SIGMA, TAILS, simulated
+from helpers.scans import LINEAR_FILM, RING, SIGMA, TAILS, simulate, simulated
 from scipy.stats import binom
 
 import memscal
@@ -47,7 +47,7 @@ def test_each_input_of_the_reference_counts_what_moving_it_changes(source, chang
 
 
 def test_at_finite_strain_the_load_counts_in_the_widths_what_moving_it_changes() -> None:
-    scan = replace(memscal.simulate(noise=0.002, seed=2), load_uncertainty=0.02)
+    scan = replace(simulate(noise=0.002, seed=2), load_uncertainty=0.02)
     usual, moved = (
         memscal.calibrate(each, method="bayesian").apparatus
         for each in (scan, replace(scan, load=1.02))
@@ -73,7 +73,7 @@ def test_the_area_of_a_division_counts_what_its_window_hides(film, kernel, setti
     film = memscal.ElasticFilm(young_modulus=1e6, poisson_ratio=0.49, law="linear", **film)
     pulls = []
     for seed in range(12):
-        scan = memscal.simulate(film=film, kernel=kernel, load=0.1, seed=seed, **settings)
+        scan = simulate(film=film, kernel=kernel, load=0.1, seed=seed, **settings)
         found = memscal.calibrate(scan).apparatus.parameters
         name = "noise_equivalent_area"
         pulls.append((found[name] - true) / found.uncertainty(name))
@@ -91,7 +91,7 @@ def test_a_scan_that_is_given_twice_is_refused() -> None:
 
 @pytest.mark.parametrize("options", [{}, {"raster": True, "points": 17}])
 def test_the_budget_adds_up_to_the_stated_uncertainty(options) -> None:
-    apparatus = memscal.calibrate(memscal.simulate(**options)).apparatus
+    apparatus = memscal.calibrate(simulate(**options)).apparatus
     for name in PARAMETERS:
         total = np.sqrt(sum(u**2 for u in apparatus.budget[name].values()))
         assert total == pytest.approx(apparatus.parameters.uncertainty(name), rel=1e-9)
@@ -172,7 +172,7 @@ def test_the_rows_are_derivatives(name: str, kernel: FloatArray) -> None:
 
 
 def test_kernel_changes_are_those_of_calibrations_with_another_film() -> None:
-    scan = memscal.simulate(noise=0.002, seed=4)
+    scan = simulate(noise=0.002, seed=4)
     found = memscal.calibrate(scan, method="evidence").apparatus
     film = scan.set_up.film
     u = film.thickness_uncertainty or 0.0

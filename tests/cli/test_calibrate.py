@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.console import Run, names
+from helpers.scans import simulate
 
 import memscal
 from memscal.cli.options import si
@@ -67,7 +68,7 @@ def test_figures_and_report_are_written_in_their_formats(run: Run, scan: Path, f
 def lawless(folder: Path) -> Path:
     """A scan that does not state its film's law."""
     path = folder / "scan.h5"
-    memscal.write_scan(memscal.simulate(seed=1, state_law=False), path)
+    memscal.write_scan(simulate(seed=1, state_law=False), path)
     return path
 
 

@@ -11,12 +11,11 @@ import pytest
 from helpers.console import Run, names
 from helpers.friction_results import comparison, interface_comparison
 from helpers.records import assert_same
-from helpers.scans import known_apparatus
+from helpers.scans import known_apparatus, simulate_experiment
 
 import memscal
 from memscal.cli.compare import cache_from, user_cache_folder
 from memscal.cli.failures import CHECK_FAILED
-from memscal.extensions.simulation.experiment import simulate_experiment
 
 CHECKED = CHECK_FAILED
 USAGE = 2

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.console import Run, names
-from helpers.scans import LINEAR_FILM, shear_scan
+from helpers.scans import LINEAR_FILM, shear_scan, simulate_experiment
 
 import memscal
 
@@ -44,8 +44,12 @@ def test_a_method_that_divides_fields_is_refused_by_a_dry_run(run: Run, sheared:
 
 
 def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run, folder: Path):
-    made = memscal.simulate_experiment(
-        friction=0.1, loads=[1.37], lubricated_loads=[1.37], channels=("zz", "xz"), seed=1
+    made = simulate_experiment(
+        friction=0.1,
+        loads=[1.37],
+        lubricated_loads=[1.37],
+        shear=(memscal.GaussianMixture(), 5e-8),
+        seed=1,
     )
     for channel in ("zz", "xz"):
         found = memscal.calibrate(made.rod, channel=channel, method="bayesian").apparatus

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.scans import simulate
 
 import memscal
 from memscal.cli import main
@@ -134,7 +135,7 @@ def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
 
 @pytest.mark.usefixtures("plug_in")
 def test_a_calibration_runs_with_a_plug_in() -> None:
-    scan = memscal.simulate(noise=0.002, seed=5)
+    scan = simulate(noise=0.002, seed=5)
     apparatus = memscal.calibrate(scan, method="cutoff", k_max=2.5e3).apparatus
     assert apparatus.process.configuration["method"] == "cutoff"
     assert apparatus.process.configuration["options"] == {"k_max": 2.5e3}

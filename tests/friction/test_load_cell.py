@@ -5,11 +5,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers.scans import simulate, simulate_contacts, simulate_experiment
 from scipy.stats import binom, chi2
 
 import memscal
 from memscal import ApparatusFunction, Experiment, LoadCell, MeasuredStress
-from memscal.extensions.simulation.experiment import PAPER_SPHERE, simulate_contacts
+from memscal.extensions.simulation.contact_scan import PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
@@ -31,7 +32,7 @@ OFFSETS = np.linspace(-6e-3, 6e-3, 25)
 @lru_cache
 def experiment(seed: int) -> Experiment:
     """Scans of one load cell, whose error is drawn with everything else."""
-    return memscal.simulate_experiment(
+    return simulate_experiment(
         film=FILM,
         loads=LOADS,
         lubricated_loads=LOADS[:1],
@@ -83,7 +84,7 @@ def test_scans_of_two_load_cells_calibrate_a_sensor_of_none() -> None:
 def force_of(rod_scale: float, sphere_scale: float, seed: int) -> tuple[float, float]:
     """Force less load, and what the check allows, by true loads over the stated; in N."""
     cell = {"load_cell": LoadCell(name="K")}
-    rod = memscal.simulate(film=FILM, load=rod_scale, load_uncertainty=SHARE, seed=seed)
+    rod = simulate(film=FILM, load=rod_scale, load_uncertainty=SHARE, seed=seed)
     sensor = memscal.calibrate(replace(rod, load=1.0, **cell), method="evidence").apparatus
     contact = simulate_contacts(
         film=FILM,

@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from helpers.scans import simulate_experiment
 from scipy.linalg import block_diag
 from scipy.stats import binom
 
@@ -44,12 +45,11 @@ def width(interval: Interval) -> float:
 
 
 def experiment(friction: float, seed: int) -> Experiment:
-    return memscal.simulate_experiment(
+    return simulate_experiment(
         friction=friction,
         loads=LOADS,
         lubricated_loads=LOADS[:1],
-        channels=("zz", "xz"),
-        shear_kernel=KERNEL,
+        shear=(KERNEL, 5e-8),
         draw_inputs=True,
         seed=seed,
     )

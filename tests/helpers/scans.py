@@ -9,12 +9,12 @@ from helpers.builders import make_artifact
 from scipy.special import i0e
 
 import memscal
+import memscal.extensions.simulation.contact_scan as contacts
 from memscal import Contact, MeasuredStress, Process, RadialKernel, Scan, StressSensor
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference_spectra import reference_spectra
-from memscal.extensions.simulation.experiment import simulate_contacts
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, ParameterSet, TransferFunction
 
@@ -36,10 +36,32 @@ EXACT_FILM = replace(
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
 
 
+def in_record(options: dict[str, Any]) -> dict[str, Any]:
+    """Put the disturbances among the options of a simulation into their record."""
+    disturbances = {f.name for f in fields(memscal.Disturbances)} & options.keys()
+    record = memscal.Disturbances(**{name: options.pop(name) for name in disturbances})
+    return options | {"disturbances": record}
+
+
+def simulate(**options: Any) -> Scan:
+    """Simulate a rod scan; options are those of the simulation and of its disturbances."""
+    return memscal.simulate(**in_record(options))
+
+
+def simulate_contacts(**options: Any) -> Scan:
+    """Simulate a scan of a sphere's contacts likewise."""
+    return contacts.simulate_contacts(**in_record(options))
+
+
+def simulate_experiment(**options: Any) -> memscal.Experiment:
+    """Simulate an experiment likewise."""
+    return memscal.simulate_experiment(**in_record(options))
+
+
 def simulated(branch: Any = None, **options: Any) -> Scan:
     """Simulate a scan whose film, rod and load are exact; its branches may be named."""
     exact = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
-    return replace(memscal.simulate(**(exact | options)), branch=branch)
+    return replace(simulate(**(exact | options)), branch=branch)
 
 
 def estimated(scan: Scan, *, angular: bool = False) -> ProfileEstimate:
@@ -184,7 +206,7 @@ def shear_scan(
     ``noise``, and ``crosstalk`` of the normal channel, are shares of the largest voltage.
     """
     settings = {"film": LINEAR_FILM, "centre": (CENTRE, 0.0)} | options
-    scan = memscal.simulate(seed=seed, **settings)
+    scan = simulate(seed=seed, **settings)
     kernel = kernel or memscal.GaussianMixture(sigmas=(SHEAR_SIGMA,))
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     wavenumbers = Wavenumbers.covering(40 / scan.film.thickness, 12e-3)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers import scans as made
 from helpers.bounds import cramer_rao
+from helpers.scans import simulate
 from scipy.stats import chi2
 
 import memscal
@@ -151,7 +152,7 @@ def test_less_noise_resolves_more() -> None:
     "setting", [{"load": (0.5, 1.0, 2.0), "points": 33}, {"raster": True, "points": 15}], ids=str
 )
 def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting) -> None:
-    scans = [memscal.simulate(film=EXACT.film, seed=s, **setting) for s in range(FEW)]
+    scans = [simulate(film=EXACT.film, seed=s, **setting) for s in range(FEW)]
     found = [memscal.restore(scan, EXACT) for scan in scans]
     z = [(f.force - f.scan.load) / f.force_uncertainty for f in found]
     low, high = chi2.ppf([1e-4, 1 - 1e-4], len(z)) / len(z)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.pages import PAPER, cut, violations
-from helpers.scans import known_apparatus, pressed, sphere_scan
+from helpers.scans import known_apparatus, pressed, simulate, sphere_scan
 
 import memscal
 from memscal.cli import main
@@ -34,7 +34,7 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     sensor = memscal.StressSensor(name=LONG, model="W7", serial_number="7")
     (folder / "scans").mkdir()
     for i, drift in enumerate((0.0, 0.0, 0.3)):
-        scan = memscal.simulate(seed=i, points=33, drift=drift)
+        scan = simulate(seed=i, points=33, drift=drift)
         place = folder / "scans" / f"{i}{LONG[:120]}.h5"
         memscal.write_scan(replace(scan, sensor=sensor), place)
     drifting = str(place)

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from helpers.builders import make_artifact, make_profile, make_scan
 from helpers.console import names
+from helpers.scans import simulate
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from robustness.campaign import SHARE, count, number
@@ -82,7 +83,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Good:
     film = memscal.ElasticFilm(
         young_modulus=2.2e6, poisson_ratio=0.48, thickness=2e-3, law="linear"
     )
-    scan = memscal.simulate(noise=0.005, seed=1, points=33, film=film)
+    scan = simulate(noise=0.005, seed=1, points=33, film=film)
     apparatus = memscal.calibrate(scan).apparatus
     contact = memscal.read_scan(experiment / "sphere_dry.h5")
     memscal.measure_stress(contact, apparatus, override=True).save(folder / "stress")

@@ -18,9 +18,9 @@ from pathlib import Path
 import pytest
 from helpers.builders import make_artifact, make_scan
 from helpers.console import names, run_program
+from helpers.scans import simulate
 from robustness.campaign import count, number
 
-import memscal
 from memscal.errors import MemscalError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
@@ -35,7 +35,7 @@ CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with a scan."""
-    write_scan(memscal.simulate(noise=0.005, seed=1, points=33), tmp_path / "scan.h5")
+    write_scan(simulate(noise=0.005, seed=1, points=33), tmp_path / "scan.h5")
     return tmp_path
 
 

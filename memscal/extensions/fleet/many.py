@@ -113,7 +113,7 @@ def calibrate_many(
     Examples
     --------
     >>> import memscal
-    >>> scans = [memscal.simulate(noise=0.005, seed=seed) for seed in range(3)]
+    >>> scans = [memscal.simulate(seed=seed) for seed in range(3)]
     >>> results = memscal.calibrate_many([*scans, "missing.h5"], method="bayesian")
     >>> [result.passed for result in results]
     [True, True, True, False]

@@ -335,7 +335,7 @@ def monte_carlo(
     Examples
     --------
     >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(noise=0.003, seed=2), method="bayesian")
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=2), method="bayesian")
     >>> drawn = memscal.monte_carlo(calibration, draws=20)
     >>> 0.4 < drawn["gaussian_sigma"].ratio < 1.6
     True

@@ -29,6 +29,7 @@ from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.estimation.set_up import reference_profile
+from memscal.extensions.simulation.disturbances import Disturbances
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
@@ -48,7 +49,7 @@ _ROUNDING = 1e-6
 #: An apparatus function that takes less than this from every wave that a film passes is a point.
 _A_POINT = 1e-3
 #: What a plan and a simulated scan have in common.
-_OF_SIMULATION = ("film", "rod", "kernel", "conversion_constant", "load", "load_uncertainty")
+_OF_SIMULATION = ("film", "rod", "kernel", "conversion_constant", "load")
 #: The film passes nothing beyond exp(-kh) of this.
 _LARGEST_KH = 20.0
 
@@ -140,12 +141,19 @@ class Plan:
         """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
         shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
-        shared |= {"half_range": self.step * (count - 1) / 2, "centre": (self.centre, 0.0)}
-        x = np.linspace(-1.0, 1.0, count) * shared["half_range"]
+        half_range = self.step * (count - 1) / 2
+        x = np.linspace(-1.0, 1.0, count) * half_range
         flat = np.zeros(count)
         load = self.load
         require_plausible(Scan(x=x, u_zz=flat, film=self.film, indenter=self.rod, load=load))
-        scan = simulate(points=count, noise=0.0, baseline=0.0, drift=0.0, **shared)
+        undisturbed = Disturbances(
+            noise=0.0,
+            baseline=0.0,
+            drift=0.0,
+            centre=(self.centre, 0.0),
+            load_uncertainty=self.load_uncertainty,
+        )
+        scan = simulate(points=count, half_range=half_range, disturbances=undisturbed, **shared)
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 

@@ -26,15 +26,24 @@ if TYPE_CHECKING:
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with the names of its scans."""
 
-#: Options of a sphere whose values are given on as they are.
-_OF_SPHERE = (
-    *("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "one_load_cell"),
-    "gain",
-)
 _SPHERE_NAMES = (
-    *_OF_SPHERE,
-    *("sphere_radius", "sphere_radius_uncertainty", "slip_length", "greenwood_tripp"),
-    *("exponential", "contacts", "spacing", "load_scatter", "position_error", "thickness_factor"),
+    "contacts",
+    "draw_inputs",
+    "exponential",
+    "friction",
+    "gain",
+    "greenwood_tripp",
+    "load_scatter",
+    "loading",
+    "lubricated_loads",
+    "one_load_cell",
+    "position_error",
+    "record_loads",
+    "slip_length",
+    "spacing",
+    "sphere_radius",
+    "sphere_radius_uncertainty",
+    "thickness_factor",
 )
 """The options that only an experiment with a sphere has."""
 
@@ -84,22 +93,38 @@ _sphere_options = options_of(
 )
 
 
-#: Options whose values are given on as they are, and those in other units, by the power of ten.
-_SHARED = ("repeats", "state_noise", "state_law", "rod_friction", "seed")
-_SCALED = {"conversion_constant": -3} | dict.fromkeys(
-    ("noise", "baseline", "drift", "load_uncertainty"), -2
+_PERCENT = ("noise", "baseline", "drift", "load_uncertainty", "load_scatter")
+_AS_GIVEN = (
+    "state_noise",
+    "state_law",
+    "record_loads",
+    "draw_inputs",
+    "one_load_cell",
+    "gain",
+    "thickness_factor",
 )
 
 
 def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return what describes a rod scan and an experiment alike."""
+    from memscal.extensions.simulation.disturbances import Disturbances
+
+    shares = {name: si(options[name], -2) for name in _PERCENT}
+    disturbances = Disturbances(
+        centre=(si(options["centre"], -3), si(options["centre_y"], -3)),
+        position_error=si(options["position_error"], -6),
+        **shares,
+        **{name: options[name] for name in _AS_GIVEN},
+    )
     return {
         "film": common.film_from(options),
         "rod": common.indenter_from("rod", options),
+        "rod_friction": options["rod_friction"],
         "kernel": common.kernel_from(options),
-        "centre": (si(options["centre"], -3), si(options["centre_y"], -3)),
-        **{name: si(options[name], power) for name, power in _SCALED.items()},
-        **{name: options[name] for name in _SHARED},
+        "conversion_constant": si(options["conversion_constant"], -3),
+        "repeats": options["repeats"],
+        "disturbances": disturbances,
+        "seed": options["seed"],
     }
 
 
@@ -296,20 +321,20 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     from memscal.formats.scan import ensure_folder_writable, write_scans
 
     ensure_folder_writable(folder, FILES, overwrite=force)
-    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
-    of_sphere = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
-    settings["sphere"] = common.indenter_from("sphere", of_sphere)
+    radius = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
+    sphere: Any = common.indenter_from("sphere", radius)
     with working("Simulating"):
         made = simulate_experiment(
+            sphere=sphere,
             interface=interface_of(options),
             rod_points=options["points"],
             loads=options["loads"] or _LOADS,
+            lubricated_loads=options["lubricated_loads"],
+            friction=options["friction"],
+            loading=options["loading"],
             points=options["contacts"],
             spacing=si(options["spacing"], -3),
-            load_scatter=si(options["load_scatter"], -2),
-            position_error=si(options["position_error"], -6),
-            thickness_factor=options["thickness_factor"],
-            **settings,
+            **_shared_settings(options),
         )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     with together(folder):

@@ -11,6 +11,7 @@ from time import sleep
 import pandas as pd
 import pytest
 from distributed import Client, LocalCluster
+from helpers.scans import simulate
 
 import memscal
 from memscal.cli import main
@@ -30,7 +31,7 @@ def workers() -> Iterator[LocalCluster]:
 def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("scans")
     for seed in range(SCANS):
-        scan = memscal.simulate(points=33, noise=0.004, seed=seed)
+        scan = simulate(points=33, noise=0.004, seed=seed)
         memscal.write_scan(scan, folder / f"{seed:02}.h5")
     return folder
 

@@ -112,7 +112,7 @@ class Half(Tikhonov):
 
 print("The script runs.")
 if {condition}:
-    scans = (memscal.simulate(points=33, noise=0.004, seed=seed) for seed in range(3))
+    scans = (memscal.simulate(points=33, seed=seed) for seed in range(3))
     print([result.error for result in memscal.calibrate_many(scans, **{options})])
 """
 

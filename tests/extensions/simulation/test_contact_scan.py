@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from helpers.bounds import RARE
 from helpers.machine import assert_same_to_rounding
+from helpers.scans import simulate, simulate_contacts, simulate_experiment
 from scipy.integrate import simpson
 from scipy.stats import chi2
 
 import memscal
 from memscal.errors import DomainError, InputError
-from memscal.extensions.simulation.experiment import PAPER_SPHERE, Reality, drawn, simulate_contacts
-from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, blurred_stress
+from memscal.extensions.simulation.contact_scan import PAPER_SPHERE
+from memscal.extensions.simulation.experiment import Reality, drawn
+from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.extensions.simulation.sensor import blurred_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
@@ -203,8 +206,8 @@ def test_an_experiment_is_a_calibration_and_contacts_dry_and_lubricated() -> Non
 
 
 def test_another_load_of_one_scan_changes_no_number_of_another() -> None:
-    less = memscal.simulate_experiment(**FEW, seed=8)
-    more = memscal.simulate_experiment(**FEW | {"loads": [0.34, 0.69], "repeats": 1}, seed=8)
+    less = simulate_experiment(**FEW, seed=8)
+    more = simulate_experiment(**FEW | {"loads": [0.34, 0.69], "repeats": 1}, seed=8)
     assert_same_to_rounding(less.rod.u_zz, more.rod.u_zz)
     assert_same_to_rounding(less.lubricated.u_zz, more.lubricated.u_zz)
     assert less.dry.u_zz.shape != more.dry.u_zz.shape
@@ -212,14 +215,14 @@ def test_another_load_of_one_scan_changes_no_number_of_another() -> None:
 
 def test_the_scans_of_one_seed_share_no_noise() -> None:
     options = {**FEW, "friction": 0.0, "load_scatter": 0.0, "position_error": 0.0}
-    noisy = memscal.simulate_experiment(**options, noise=0.01)
-    still = memscal.simulate_experiment(**options, noise=0.0)
+    noisy = simulate_experiment(**options, noise=0.01)
+    still = simulate_experiment(**options, noise=0.0)
     dry, lubricated = (
         getattr(noisy, name).u_zz - getattr(still, name).u_zz for name in ("dry", "lubricated")
     )
     np.testing.assert_allclose(still.dry.u_zz, still.lubricated.u_zz, rtol=1e-12)
     assert np.abs(dry - lubricated).min() > 0
-    again = memscal.simulate_experiment(**options, noise=0.01, seed=1)
+    again = simulate_experiment(**options, noise=0.01, seed=1)
     assert np.abs(again.dry.u_zz - noisy.dry.u_zz).min() > 0
 
 
@@ -245,7 +248,7 @@ def test_what_is_drawn_scatters_as_it_is_stated() -> None:
 
 
 def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones() -> None:
-    found = memscal.simulate_experiment(**FEW, **EXACT, draw_inputs=True, seed=3)
+    found = simulate_experiment(**FEW, **EXACT, draw_inputs=True, seed=3)
     told = truth(found.dry)
     rod = truth(found.rod)
     names = ("young_modulus", "poisson_ratio", "thickness")
@@ -269,7 +272,7 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
         **EXACT,
     )
     np.testing.assert_allclose(found.dry.u_zz, again.u_zz, rtol=1e-9)
-    pressed = memscal.simulate(
+    pressed = simulate(
         film=film,
         rod=memscal.Rod(radius=rod["indenter_radius"]),
         load=rod["load_1"],
@@ -281,7 +284,7 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
 
 
 def test_a_gain_is_on_the_contacts_only() -> None:
-    right, wrong = (memscal.simulate_experiment(**FEW, **EXACT, gain=g) for g in (1.0, 1.05))
+    right, wrong = (simulate_experiment(**FEW, **EXACT, gain=g) for g in (1.0, 1.05))
     assert_same_to_rounding(right.rod.u_zz, wrong.rod.u_zz)
     np.testing.assert_allclose(wrong.dry.u_zz, 1.05 * right.dry.u_zz, rtol=1e-12)
     np.testing.assert_allclose(wrong.lubricated.u_zz, 1.05 * right.lubricated.u_zz, rtol=1e-12)
@@ -290,8 +293,8 @@ def test_a_gain_is_on_the_contacts_only() -> None:
 
 
 def test_a_thicker_film_than_is_stated_is_under_all_indenters() -> None:
-    wrong = memscal.simulate_experiment(**FEW, **EXACT, thickness_factor=1.05)
-    right = memscal.simulate_experiment(**FEW, **EXACT, film=replace(PAPER_FILM, thickness=2.1e-3))
+    wrong = simulate_experiment(**FEW, **EXACT, thickness_factor=1.05)
+    right = simulate_experiment(**FEW, **EXACT, film=replace(PAPER_FILM, thickness=2.1e-3))
     for one, other in zip(wrong.scans.values(), right.scans.values(), strict=True):
         np.testing.assert_allclose(one.u_zz, other.u_zz, rtol=1e-12)
         assert (one.film.thickness, truth(one)["thickness"]) == (2e-3, pytest.approx(2.1e-3))
@@ -300,7 +303,7 @@ def test_a_thicker_film_than_is_stated_is_under_all_indenters() -> None:
 def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> None:
     normal = memscal.ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6)
     law = memscal.Interface(normal=normal, slip_length=2e-6)
-    found = memscal.simulate_experiment(**FEW, load_scatter=0.0, friction=0.3, interface=law)
+    found = simulate_experiment(**FEW, load_scatter=0.0, friction=0.3, interface=law)
     dry = truth(found.dry)
     lubricated = truth(found.lubricated)
     assert (dry["slip_length"], dry["decay_length"]) == (2e-6, 1e-6)
@@ -316,4 +319,4 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
 ])  # fmt: skip
 def test_an_experiment_that_cannot_be_made_is_refused(options, problem) -> None:
     with pytest.raises(InputError, match=problem):
-        memscal.simulate_experiment(**{**FEW, **options})
+        simulate_experiment(**{**FEW, **options})

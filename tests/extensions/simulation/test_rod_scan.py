@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import RARE
+from helpers.scans import simulate
 from scipy.special import j1
 from scipy.stats import chi2
 
-from memscal import GaussianMixture, RadialKernel, SmoothedDisc, simulate
+from memscal import GaussianMixture, RadialKernel, SmoothedDisc
 from memscal.errors import InputError
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.arrays import FloatArray

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.machine import assert_same_to_rounding
+from helpers.scans import simulate, simulate_contacts, simulate_experiment
 
 import memscal
-from memscal import GaussianMixture, simulate_experiment
+from memscal import GaussianMixture
 from memscal.errors import InputError
-from memscal.extensions.simulation.experiment import simulate_contacts
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 KERNEL = GaussianMixture(sigmas=(400e-6,))
 QUIET = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 LINEAR = replace(PAPER_FILM, law="linear", poisson_ratio_uncertainty=None)
-BOTH = {"channels": ("zz", "xz"), "shear_kernel": KERNEL, "shear_conversion_constant": 4e-8}
+BOTH = {"shear": (KERNEL, 4e-8)}
 
 
 def test_the_normal_channel_is_the_same_with_and_without_the_other() -> None:
@@ -28,14 +28,14 @@ def test_the_normal_channel_is_the_same_with_and_without_the_other() -> None:
 
 
 def test_a_rod_s_shear_is_odd_about_the_sensor_and_falls_where_the_rod_is_beyond_it() -> None:
-    scan = memscal.simulate(film=LINEAR, centre=(0.0, 0.0), **QUIET, **BOTH)
+    scan = simulate(film=LINEAR, centre=(0.0, 0.0), **QUIET, **BOTH)
     u = scan.channels["u_xz"]
     np.testing.assert_allclose(u, -u[::-1], atol=1e-12 * np.abs(u).max())
     assert u[scan.x > 0].max() < 0 < u[scan.x < 0].min()
 
 
 def test_a_raster_s_shear_is_one_component_of_a_vector_field() -> None:
-    scan = memscal.simulate(raster=True, points=21, centre=(0.0, 0.0), **QUIET, **BOTH)
+    scan = simulate(raster=True, points=21, centre=(0.0, 0.0), **QUIET, **BOTH)
     u = scan.channels["u_xz"]
     np.testing.assert_allclose(u, -u[:, ::-1], atol=1e-12 * np.abs(u).max())
     np.testing.assert_allclose(u, u[::-1], atol=1e-12 * np.abs(u).max())
@@ -45,9 +45,9 @@ def test_a_raster_s_shear_is_one_component_of_a_vector_field() -> None:
 
 def test_a_narrow_g_shows_the_shear_of_rod_and_sphere_at_its_friction() -> None:
     options = {**QUIET, **BOTH, "centre": (0.0, 0.0), "film": LINEAR}
-    options["shear_kernel"] = GaussianMixture(sigmas=(5e-6,))
+    options["shear"] = (GaussianMixture(sigmas=(5e-6,)), 4e-8)
     exact = {"load_scatter": 0.0, "position_error": 0.0, "load": 1.37, **options}
-    scans = [(memscal.simulate(**options), 1.0, 0.0, 1e-3)]
+    scans = [(simulate(**options), 1.0, 0.0, 1e-3)]
     scans += [(simulate_contacts(friction=mu, **exact), 1.37, mu, 2e-3) for mu in (0.0, 0.3)]
     for scan, load, friction, close in scans:
         contact = memscal.indent(scan.film, scan.indenter, load=load, friction=friction)
@@ -57,7 +57,7 @@ def test_a_narrow_g_shows_the_shear_of_rod_and_sphere_at_its_friction() -> None:
 
 
 def test_the_truth_of_the_channel_is_stored() -> None:
-    scan = memscal.simulate(seed=5, **BOTH)
+    scan = simulate(seed=5, **BOTH)
     assert scan.synthetic["conversion_constant_xz"] == 4e-8
     assert scan.synthetic["gaussian_sigma_xz"] == 400e-6
 
@@ -68,7 +68,21 @@ def test_a_whole_experiment_has_the_channel_in_all_of_its_scans() -> None:
         assert scan.synthetic["conversion_constant_xz"] == 4e-8
 
 
-@pytest.mark.parametrize("channels", [(), ("xz",), ("zz", "yz"), ("zz", "xz", "xz")])
-def test_channels_that_a_line_along_x_has_not_are_refused(channels: tuple[str, ...]) -> None:
-    with pytest.raises(InputError, match="channels"):
-        memscal.simulate(channels=channels)
+@pytest.mark.parametrize(
+    ("shear", "problem"), [((KERNEL, 0.0), "channel xz is 0"), ((4e-4, 5e-8), "transform")]
+)
+def test_a_channel_without_an_apparatus_function_or_a_constant_is_refused(shear, problem) -> None:
+    with pytest.raises(InputError, match=problem):
+        memscal.simulate(shear=shear)
+
+
+def test_the_arguments_of_an_earlier_version_make_the_same_scan_with_a_warning() -> None:
+    old = {"channels": ("zz", "xz"), "shear_kernel": KERNEL, "noise": 0.01, "drift": 0.1}
+    with pytest.warns(DeprecationWarning, match="becomes") as warned:
+        found = memscal.simulate(**old, seed=2)
+    assert {warning.filename for warning in warned} == {__file__}
+    expected = simulate(shear=(KERNEL, 5e-8), noise=0.01, drift=0.1, seed=2)
+    np.testing.assert_array_equal(found.channels["u_xz"], expected.channels["u_xz"])
+    np.testing.assert_array_equal(found.u_zz, expected.u_zz)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'nois'"):
+        memscal.simulate_experiment(nois=0.01)
