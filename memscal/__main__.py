@@ -1,5 +1,6 @@
 """``python -m memscal`` is the command ``memscal``."""
 
+import gc
 import os
 import signal
 import sys
@@ -11,9 +12,13 @@ def run() -> int:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda number, _: os._exit(128 + number))
+    # Libraries that load leave no cycles to collect, and those of a process that ends go with it.
+    gc.set_threshold(50_000)
     from memscal.cli import main
 
-    return main()
+    code = main()
+    gc.freeze()
+    return code
 
 
 if __name__ == "__main__":

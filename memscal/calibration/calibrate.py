@@ -9,7 +9,6 @@ from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
-from memscal.calibration.field_uncertainty import field_errors
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.film_inference import free_thickness, require_free, weigh_laws
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
@@ -265,6 +264,8 @@ def _propagated(
     inputs = (effects, prepared.request.correlations, prepared.reading)
     results = uncertainties(solution, solution.deconvolution, *inputs)
     if isinstance(solution.fields, RasterFields):
+        from memscal.calibration.field_uncertainty import field_errors
+
         plane = field_errors(solution, solution.deconvolution, *inputs[:2])
         results = replace(results, field_errors=plane)
     # Some checks are of the division, whichever the method.
