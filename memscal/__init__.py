@@ -28,6 +28,7 @@ PUBLIC = {
     "formats.scan": ["read_scan", "write_scan"],
     "formats.stress": ["read_stress"],
     "formats.tables.scan": ["ImportedScan", "import_table"],
+    "formats.tables.stated": ["ScanConditions", "ScanUncertainties", "TableLayout"],
     "friction.compare": ["compare", "compare_shear"],
     "friction.results": [
         "BoundedEstimate",

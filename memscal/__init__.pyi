@@ -40,6 +40,9 @@ from .formats.scan import write_scan as write_scan
 from .formats.stress import read_stress as read_stress
 from .formats.tables.scan import ImportedScan as ImportedScan
 from .formats.tables.scan import import_table as import_table
+from .formats.tables.stated import ScanConditions as ScanConditions
+from .formats.tables.stated import ScanUncertainties as ScanUncertainties
+from .formats.tables.stated import TableLayout as TableLayout
 from .friction.compare import compare as compare
 from .friction.compare import compare_shear as compare_shear
 from .friction.results import BoundedEstimate as BoundedEstimate

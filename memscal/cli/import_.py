@@ -77,29 +77,22 @@ pip install "memscal[tables]".
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
-_SCAN_NAMES = [
-    *("x", "x_unit", "u", "u_unit", "u_sign", "y", "repeat", "branch", "u_xz"),
-    *(
-        "u_yz",
-        "u_errors",
-        "noise",
-        "holds",
-        "load_column",
-        "load_unit",
-        "load_uncertainty",
-        "title",
-    ),
-    *("title", "lubrication", "lubricant", "rod_friction"),
-]
+_COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "repeat", "branch")
+_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds")
+_CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
+_UNCERTAINTIES = ("noise", "load_uncertainty")
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
-_TABLE_NAMES = ["load", *_READING]
-
 _ONLY = {
     "scan": [
-        *(*_SCAN_NAMES, "load_scatter", "position_error", "figures", "laboratory"),
-        *(*_SENSOR_NAMES.values(), *_CELL_NAMES.values()),
+        *_COLUMNS,
+        *_LAYOUT,
+        *_CONDITIONS,
+        *_UNCERTAINTIES,
+        *("load_scatter", "position_error", "figures", "laboratory"),
+        *_SENSOR_NAMES.values(),
+        *_CELL_NAMES.values(),
     ],
     "reference": _REFERENCE_NAMES,
 }
@@ -310,18 +303,31 @@ def _set_up(options: dict[str, Any]) -> dict[str, Any]:
 
 def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     from memscal.formats.tables.scan import import_table
+    from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
     from memscal.model.instrument import LoadCell, StressSensor
 
-    sensor, load_cell = (
-        _stated({key: options[name] for key, name in names.items()}, [*names])
-        for names in (_SENSOR_NAMES, _CELL_NAMES)
+    conditions = ScanConditions(
+        **_stated(options, ("load", *_CONDITIONS)),
+        **_set_up(options),
+        sensor=StressSensor(**_renamed(options, _SENSOR_NAMES)),
+        load_cell=LoadCell(**_renamed(options, _CELL_NAMES)),
+    )
+    uncertainties = ScanUncertainties(
+        **_stated(options, _UNCERTAINTIES),
+        load_scatter=si(options["load_scatter"], -2),
+        x_error=si(options["position_error"], -6),
     )
     return import_table(
         path,
-        **_stated(options, [*_SCAN_NAMES, *_TABLE_NAMES]),
-        load_scatter=si(options["load_scatter"], -2),
-        x_error=si(options["position_error"], -6),
-        **_set_up(options),
-        sensor=StressSensor(**sensor),
-        load_cell=LoadCell(**load_cell),
+        **_stated(options, _COLUMNS),
+        layout=TableLayout(**_stated(options, (*_LAYOUT, *_READING))),
+        conditions=conditions,
+        uncertainties=uncertainties,
     )
+
+
+def _renamed(options: dict[str, Any], names: dict[str, str]) -> dict[str, Any]:
+    """Return the options that were given by the names of a record's fields."""
+    return {
+        field: options[option] for field, option in names.items() if options[option] is not None
+    }

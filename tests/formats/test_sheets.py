@@ -12,6 +12,7 @@ import openpyxl
 import pandas as pd
 import pyarrow as pa
 import pytest
+from helpers.tables import imported
 from pyarrow import parquet
 
 import memscal
@@ -43,15 +44,15 @@ def workbook(path: Path) -> Path:
 
 def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp_path: Path):
     book = workbook(tmp_path / "rod.xlsx")
-    scan = memscal.import_table(book, sheet="Daten", x="x", u="U")
+    scan = imported(book, sheet="Daten", x="x", u="U")
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3, 9e-3])
     np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3, np.nan])
     assert "The table says: Rod 12" in scan.notes
     assert "u_zz is missing (NaN) in row 8." in scan.notes
     with pytest.raises(InputError, match=r"'Info' of rod\.xlsx has no row(.|\n)*Info, Daten"):
-        memscal.import_table(book, x="x", u="U")
+        imported(book, x="x", u="U")
     with pytest.raises(InputError, match=r"no sheet 'Data'(.|\n)*Info, Daten"):
-        memscal.import_table(book, sheet="Data", x="x", u="U")
+        imported(book, sheet="Data", x="x", u="U")
 
 
 SHEET = (
@@ -97,18 +98,18 @@ def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
     fields = [pa.field("x", pa.float32(), metadata={"units": "mm"}), pa.field("U [uV]", pa.int64())]
     table = pa.table([pa.array(X, pa.float32()), pa.array([1, None, 3])], schema=pa.schema(fields))
     parquet.write_table(table, tmp_path / "rod.parquet")
-    scan = memscal.import_table(tmp_path / "rod.parquet", x="x", u="U")
+    scan = imported(tmp_path / "rod.parquet", x="x", u="U")
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3])
     np.testing.assert_allclose(scan.u_zz, [1e-6, np.nan, 3e-6])
     assert scan.source.file_name == "rod.parquet"
     columns = [pa.array(np.arange(5.0) * factor) for factor in (1, 1, 2)]
     twice = pa.Table.from_arrays(columns, names=["x", "u", "u"])
     parquet.write_table(twice, tmp_path / "twice.parquet")
-    third = memscal.import_table(tmp_path / "twice.parquet", x="x", u=3, x_unit="mm", u_unit="V")
+    third = imported(tmp_path / "twice.parquet", x="x", u=3, x_unit="mm", u_unit="V")
     np.testing.assert_array_equal(third.u_zz, 2 * np.arange(5.0))
     (tmp_path / "no.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(FormatError, match=r"no\.parquet cannot be read"):
-        memscal.import_table(tmp_path / "no.parquet", x="x", u="u")
+        imported(tmp_path / "no.parquet", x="x", u="u")
 
 
 @pytest.mark.parametrize(
@@ -121,7 +122,7 @@ def test_parquet_is_read_with_the_units_of_its_fields(tmp_path: Path):
     ids=["data frame", "mapping", "text with decimal commas"],
 )
 def test_columns_in_memory_are_a_table(frame: Any):
-    scan = memscal.import_table(frame, x="x", u="U", load=1.0)
+    scan = imported(frame, x="x", u="U", load=1.0)
     np.testing.assert_allclose(scan.x, [-8e-3, 0, 8e-3], rtol=1e-15)
     np.testing.assert_allclose(scan.u_zz, [0.1e-3, 2e-3, 0.2e-3], rtol=1e-15)
     assert scan.source is None
@@ -133,7 +134,7 @@ def test_columns_in_memory_are_a_table(frame: Any):
 ])  # fmt: skip
 def test_what_is_no_table_in_memory_is_refused(frame: Any, words):
     with pytest.raises(InputError, match=words):
-        memscal.import_table(frame, x="x", u="u", x_unit="mm", u_unit="mV")
+        imported(frame, x="x", u="u", x_unit="mm", u_unit="mV")
 
 
 def test_scans_are_made_of_arrays_in_any_units():
@@ -158,11 +159,11 @@ def test_scans_are_made_of_arrays_in_any_units():
 )
 def test_an_option_that_a_kind_of_table_has_no_use_for_is_refused(name, options, words):
     with pytest.raises(InputError, match=words):
-        memscal.import_table(name, x="x", u="u", **options)
+        imported(name, x="x", u="u", **options)
 
 
 def test_a_workbook_without_openpyxl_names_the_extra(tmp_path: Path, monkeypatch):
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     (tmp_path / "b.xlsx").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"openpyxl(.|\n)*memscal\[tables\]"):
-        memscal.import_table(tmp_path / "b.xlsx", x="x", u="u")
+        imported(tmp_path / "b.xlsx", x="x", u="u")

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.builders import make_film
+from helpers.tables import imported
 from hypothesis import given
 from hypothesis import strategies as st
 
 from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, import_table
+from memscal.formats.tables.stated import ScanConditions, TableLayout
 from memscal.formats.tables.text_table import TextTable
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod, Sphere
@@ -26,7 +28,7 @@ def scan_table(path: Path, text: str, **options: Any) -> ImportedScan:
     table.write_text(text, encoding="utf-8")
     given = {"x": "x", "u": "u", "x_unit": "mm", "u_unit": "mV", "load": 1.0}
     given |= {"film": make_film(), "indenter": Rod(radius=0.25e-3), **options}
-    return import_table(table, **given)
+    return imported(table, **given)
 
 
 def rows(*columns: Any, header: str, separator: str = ",") -> str:
@@ -235,7 +237,8 @@ def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, enco
     content = EXPORT.replace("\n", ends).encode(encoding)
     mark = b"\xfe\xff" if encoding == "utf-16-be" else b""
     (tmp_path / "t.csv").write_bytes(mark + content)
-    scan = import_table(tmp_path / "t.csv", x="Weg x", u="Spannung", missing=["N.A.", "-9999"])
+    layout = TableLayout(missing=["N.A.", "-9999"])
+    scan = import_table(tmp_path / "t.csv", x="Weg x", u="Spannung", layout=layout)
     np.testing.assert_allclose(scan.x, [-8e-3, -7e-3, 0, 8e-3])
     np.testing.assert_allclose(scan.u_zz, [100.5e-6, np.nan, np.nan, 200e-6])
     for words in (
@@ -488,7 +491,7 @@ def test_a_table_that_would_be_misread_is_refused(tmp_path: Path, text: str, wor
     table.write_text(text, encoding="utf-8")
     given = {"x": "x", "u": "u", "load": 1.0, "film": make_film(), "indenter": Rod(radius=0.25e-3)}
     with pytest.raises((FormatError, InputError), match=re.escape(words)):
-        import_table(table, **given)
+        imported(table, **given)
 
 
 def test_a_point_under_a_decimal_comma_is_no_decimal_mark(tmp_path: Path):
@@ -509,3 +512,15 @@ def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):
     found = scan_table(tmp_path, "x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
     assert found.x[0] == -1e-3
     assert np.isnan(found.u_zz).sum() == 1
+
+
+def test_fields_of_the_records_are_keywords_for_one_version_more():
+    table = {"x": [0.0, 1.0], "u [mV]": [1.0, 2.0]}
+    with pytest.warns(DeprecationWarning, match="becomes import_table") as caught:
+        old = import_table(table, x="x", u="u", x_unit="mm", load=0.5)
+    layout = TableLayout(x_unit="mm")
+    new = import_table(table, x="x", u="u", layout=layout, conditions=ScanConditions(load=0.5))
+    assert (old.load, old.x.tolist(), old.notes) == (0.5, new.x.tolist(), new.notes)
+    assert {warning.filename for warning in caught} == {__file__}
+    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
+        import_table(table, x="x", u="u", colour="red")

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.tables import imported
 
-import memscal
 from memscal.errors import InputError
 from memscal.model.notation import VOLTS
 from memscal.readings.find_holds import find_holds
@@ -74,7 +74,7 @@ def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
 
 def test_a_log_becomes_a_scan_and_a_figure():
     columns = log(3)
-    scan = memscal.import_table(
+    scan = imported(
         columns, x="x", u="u_zz", load_column="normal_load", x_unit="m", u_unit="V", holds=True
     )
     assert (scan.kind, scan.x.size) == ("line", PLACES.size)

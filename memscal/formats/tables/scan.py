@@ -1,6 +1,6 @@
 """Scans from tables with one row per reading."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import SimpleNamespace
 from typing import Any
@@ -11,11 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
-from memscal.formats.tables.text_table import Wanted
+from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
+from memscal.formats.tables.text_table import NamedColumns, Wanted
 from memscal.formats.units import reading_of, to_si
 from memscal.model.checks import Message, import_notes, marked_texts
+from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
+from memscal.model.old_keywords import with_old_keywords
+from memscal.model.provenance import SourceFile
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
@@ -27,6 +31,12 @@ from memscal.readings.mistaken_unit import require_plausible, require_recorded, 
 Column = str | int
 Columns = dict[str, NDArray[Any]]
 
+_RECORDS = {
+    "layout": TableLayout,
+    "conditions": ScanConditions,
+    "uncertainties": ScanUncertainties,
+}
+_U_UNIT = "u_unit (--u-unit)"
 #: Options that name columns, besides x and u.
 _ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "u_xz", "u_yz")
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
@@ -47,7 +57,7 @@ class ImportedScan(Scan):
     """
 
     messages: tuple[Message, ...] = ()
-    holds: Any = None  # memscal.model.holds.Holds, where they were asked for
+    holds: Holds | None = None
 
 
 @reported
@@ -57,33 +67,22 @@ def import_table(
     u: Column,
     x: Column | None = None,
     y: Column | None = None,
-    x_unit: str | None = None,
-    u_unit: str | None = None,
     u_errors: Column | None = None,
-    noise: float | None = None,
-    load: float | None = None,
-    load_column: Column | None = None,
-    load_unit: str | None = None,
-    load_scatter: float | None = None,
-    x_error: float | None = None,
-    repeat: Column | Sequence[Column] | None = None,
-    branch: Column | None = None,
     u_xz: Column | None = None,
     u_yz: Column | None = None,
-    u_sign: int = 1,
-    holds: bool = False,
-    sheet: str | None = None,
-    skip_rows: int = 0,
-    missing: Sequence[str] = (),
-    delimiter: str | None = None,
-    decimal: str | None = None,
+    load_column: Column | None = None,
+    repeat: Column | Sequence[Column] | None = None,
+    branch: Column | None = None,
+    layout: TableLayout | None = None,
+    conditions: ScanConditions | None = None,
+    uncertainties: ScanUncertainties | None = None,
     progress: Listener = None,  # noqa: ARG001 - @reported
-    **stated: Any,
+    **old: Any,
 ) -> ImportedScan:
     """Read a scan from a table with one row for each reading.
 
     The header is found below what precedes it.  Units stand in the heads (``x/mm``, ``x [mm]``,
-    ``U (µV)``) or in a row below the header; an option that contradicts them is refused.  Film and
+    ``U (µV)``) or in a row below the header; a layout that contradicts them is refused.  Film and
     indenter, where both are stated, are held against the positions.
 
     Parameters
@@ -93,30 +92,24 @@ def import_table(
     x, y, u : str or int
         Columns of the positions and of the normal channel's readings, by name, or by number from
         1.  Of positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.
-    x_unit, u_unit : str, optional
-        Units of ``x`` and ``y``, and of all channels, where the table states none.
-    u_errors, noise : str or int, float
-        Column of the standard uncertainty of each reading, or one number in the unit of ``u``.
-    load, load_column, load_unit : float, str or int, str
-        Nominal load in N, by default the median of its column; the column's unit, by default N.
-    load_scatter, x_error : float, optional
-        Standard uncertainties of the loads, relative, and of the positions, in m, both
-        independent from point to point.
+    u_errors : str or int, optional
+        Column of the standard uncertainty of each reading.
+    u_xz, u_yz, load_column, branch : str or int, optional
+        Columns of the tangential channels, of the load at each point, and of the branch (approach,
+        retreat).
     repeat : str or int, or several
         Columns that number the passes; each combination of several is one.
-    branch, u_xz, u_yz : str or int, optional
-        Columns of the branch (approach, retreat), and of the tangential channels.
-    u_sign : int
-        -1 where the voltage falls when the indenter presses.
-    holds : bool
-        The table is a log in the order of time: holds are found, and each is averaged.
-    sheet, skip_rows, missing, delimiter, decimal
-        Sheet of a workbook; lines before the header; words, or numbers as text, that mean a
-        missing value; what separates cells; decimal mark.
+    layout : TableLayout, optional
+        How the table is read: units, sign, holds, missing values, sheet, separators.
+    conditions : ScanConditions, optional
+        What was pressed on what, under which load, and measured by what.
+    uncertainties : ScanUncertainties, optional
+        Standard uncertainties of readings, loads and positions.
     progress : callable or True, optional
         Told how many rows are read: :class:`memscal.Progress`.
-    **stated
-        Further fields of :class:`memscal.Scan`: ``film``, ``indenter``, ``sensor``, ``title`` ...
+    **old
+        Fields of the three records (``load=1.0``), which were arguments of their own before: they
+        work for one version more, with a DeprecationWarning.
 
     Returns
     -------
@@ -132,139 +125,208 @@ def import_table(
     Examples
     --------
     >>> import memscal
-    >>> table = {"x [um]": [-8e3, -4e3, 0, 4e3, 8e3], "U (mV)": [0.1, 0.4, 2.0, 0.4, 0.1]}
+    >>> table = {"x": [-8e3, -4e3, 0, 4e3, 8e3], "U (mV)": [0.1, 0.4, 2.0, 0.4, 0.1]}
     >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> rod = memscal.Rod(radius=0.25e-3)
     >>> scan = memscal.import_table(
-    ...     table, x="x", u="U", load=1.0, film=film, indenter=memscal.Rod(radius=0.25e-3)
+    ...     table,
+    ...     x="x",
+    ...     u="U",
+    ...     layout=memscal.TableLayout(x_unit="um"),
+    ...     conditions=memscal.ScanConditions(film=film, indenter=rod, load=1.0),
+    ...     uncertainties=memscal.ScanUncertainties(noise=0.01, load_uncertainty=0.005),
     ... )
     >>> scan
     <ImportedScan: line, 5 points, x from -8 to 8 mm, load 1 N>
     """
-    if unknown := stated.keys() - {item.name for item in fields(Scan)}:
-        problem = f"import_table has no argument {', '.join(map(repr, sorted(unknown)))}."
-        cure = "Give fields of memscal.Scan, such as indenter=memscal.Rod(radius=0.25e-3)."
-        raise InputError(problem, cure=cure)
-    require_sign("sign of the voltage", u_sign)
-    no_load = load is None and load_column is None
-    of_u = (u_unit, "u_unit (--u-unit)")
-    noisy = u_errors is not None or noise is not None
-    for useless, problem, cure in (
-        (
-            load_unit and load_column is None,
-            "load_unit (--load-unit) belongs to a column of loads.",
-            "Give the load (--load) in N: 80 g weigh 0.785 N.",
-        ),
-        (
-            no_load and stated.get("load_uncertainty") is not None,
-            "load_uncertainty (--load-uncertainty) belongs to a load.",
-            "Give the load, too.",
-        ),
-        (
-            noisy and (holds or (u_errors is not None and noise is not None)),
-            "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or of holds.",
-            "Give one of them.",
-        ),
-    ):
-        if useless:
-            raise InputError(problem, cure=cure)
-    if x is None and y is None:
-        raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
+    named = {
+        "u_zz": u,
+        "u_xz": u_xz,
+        "u_yz": u_yz,
+        "u_zz_errors": u_errors,
+        "normal_load": load_column,
+        "x": x,
+        "y": y,
+    }
+    layout, conditions, uncertainties = with_old_keywords(
+        "import_table",
+        old,
+        stacklevel=4,
+        layout=layout or TableLayout(),
+        conditions=conditions or ScanConditions(),
+        uncertainties=uncertainties or ScanUncertainties(),
+    )
+    require_sign("sign of the voltage", layout.u_sign)
+    _require_use(named, layout, conditions, uncertainties)
     table = open_table(
         source,
-        sheet=sheet,
-        skip_rows=skip_rows,
-        missing=tuple(missing),
-        delimiter=delimiter,
-        decimal=decimal,
+        sheet=layout.sheet,
+        skip_rows=layout.skip_rows,
+        missing=tuple(layout.missing),
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
     )
-    u_unit = table.unit_of(u, *of_u)
+    u_unit = table.unit_of(u, layout.u_unit, _U_UNIT)
     reading = reading_of(u_unit, table.where(u))
-    volts = dimension_in("voltage", reading)
-    of_x = x_unit, "x_unit (--x-unit)", None
-    wanted = {
-        name: Wanted(column, table.unit_of(column, *unit), dimension)
-        for name, column, dimension, unit in (
-            ("u_zz", u, volts, (*of_u, None)),
-            ("u_xz", u_xz, volts, (*of_u, u_unit)),
-            ("u_yz", u_yz, volts, (*of_u, u_unit)),
-            ("u_zz_errors", u_errors, volts, (None, "", u_unit)),
-            ("normal_load", load_column, "force", (load_unit, "load_unit (--load-unit)", "N")),
-            ("x", x, "length", of_x),
-            ("y", y, "length", of_x),
-        )
-        if column is not None
-    }
-    units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items())
+    wanted = _wanted(table, named, layout, u_unit, dimension_in("voltage", reading))
     numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
-    wanted |= {f"repeat {i}": Wanted(c, words=BRANCHES) for i, c in enumerate(numbering)}
+    words = {f"repeat {i}": column for i, column in enumerate(numbering)}
     if branch is not None:
-        wanted["branch"] = Wanted(branch, words=BRANCHES)
-    columns: Columns = table.columns(wanted)
+        words["branch"] = branch
+    in_words = {name: Wanted(column, words=BRANCHES) for name, column in words.items()}
+    columns: Columns = table.columns(wanted | in_words)
+    units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items())
     notes = [*table.notes, f"Units: {units}."]
-    if u_sign < 0:
+    if layout.u_sign < 0:
         columns["u_zz"] *= -1
         notes.append("The sign of u_zz was changed.")
-    if noise is not None:
-        u_noise = float(to_si(noise, u_unit, volts, "noise"))
-        columns["u_zz_errors"] = np.full(columns["u_zz"].shape, u_noise)
+    if uncertainties.noise is not None:
+        noise = to_si(uncertainties.noise, u_unit, wanted["u_zz"].dimension, "noise")
+        columns["u_zz_errors"] = np.full(columns["u_zz"].shape, float(noise))
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
     if branch is not None:
         columns["branch"] = branch_numbers(table.where(branch), np.nan_to_num(columns["branch"]))
     if x is None:
         columns["x"] = np.zeros(columns["y"].size)
-    found = find_holds(columns, table.all_lines(), reading) if holds else None
-    if found is not None:
-        notes += found.notes
-        columns = dict(found.mean)
-        if found.u_errors.all():  # readings of few digits may not scatter
-            columns["u_zz_errors"] = found.u_errors
-    columns = _placed(columns, notes, (lambda _: "of holds") if found else table.lines)
-    stated |= {"load": load, "unit": reading.si, "source": table.source, "holds": found}
-    scan = _scan_of(columns, notes, reading, load_scatter, x_error, stated)
+    holds = find_holds(columns, table.all_lines(), reading) if layout.holds else None
+    if holds is not None:
+        notes += holds.notes
+        columns = dict(holds.mean)
+        if holds.u_errors.all():  # readings of few digits may not scatter
+            columns["u_zz_errors"] = holds.u_errors
+    columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
+    scan = _scan_of(columns, notes, reading, conditions, uncertainties, table.source, holds)
     del columns  # the scan has copies, and ten million rows are many
     if scan.film is not None:
-        (require_plausible if isinstance(scan.indenter, Rod) else require_span)(scan)
+        require_film = require_plausible if isinstance(scan.indenter, Rod) else require_span
+        require_film(scan)
     return scan
+
+
+def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
+    """Return a scan of arrays like ``u``, of which some options are; a row of ``u`` is a pass."""
+    readings = np.asarray(u, dtype=np.float64)
+    given = {name: options.pop(name) for name in _ARRAYS if options.get(name) is not None}
+    if readings.ndim == 2 and not given.keys() & {"y", "repeat"}:
+        given["repeat"] = np.arange(len(readings))[:, None]
+    columns = {"u": readings, "x": x, **given}
+    try:
+        table = {n: np.broadcast_to(v, readings.shape).ravel() for n, v in columns.items()}
+    except ValueError as error:
+        problem = f"An array does not have the shape of u, {readings.shape}: {error}."
+        raise InputError(problem, cure="Give one value for each reading.") from error
+    options = {"x_unit": "m", "u_unit": "V", **options}
+    records: dict[str, Any] = {}
+    for name, record in _RECORDS.items():
+        stated = options.keys() & {item.name for item in fields(record)}
+        records[name] = record(**{field: options.pop(field) for field in stated})
+    named: dict[str, Any] = {name: name for name in table}
+    return import_table(table, **named, **records, **options)
+
+
+def _require_use(
+    named: Mapping[str, Column | None],
+    layout: TableLayout,
+    conditions: ScanConditions,
+    uncertainties: ScanUncertainties,
+) -> None:
+    """Refuse what has no use: a unit or an uncertainty of nothing, or two of the same."""
+    if layout.load_unit and named["normal_load"] is None:
+        problem = "load_unit (--load-unit) belongs to a column of loads."
+        raise InputError(problem, cure="Give the load (--load) in N: 80 g weigh 0.785 N.")
+    no_load = conditions.load is None and named["normal_load"] is None
+    if no_load and uncertainties.load_uncertainty is not None:
+        problem = "load_uncertainty (--load-uncertainty) belongs to a load."
+        raise InputError(problem, cure="Give the load, too.")
+    if no_load and uncertainties.load_scatter is not None:
+        problem = "The scatter of the loads is given, but no load."
+        raise InputError(problem, cure="Give the load in N, or its column.")
+    given = (uncertainties.noise is not None, named["u_zz_errors"] is not None, layout.holds)
+    if sum(given) > 1:
+        problem = (
+            "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or of holds."
+        )
+        raise InputError(problem, cure="Give one of them.")
+    if named["x"] is None and named["y"] is None:
+        raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
+
+
+def _wanted(
+    table: NamedColumns,
+    named: Mapping[str, Column | None],
+    layout: TableLayout,
+    u_unit: str,
+    of_u: str,
+) -> dict[str, Wanted]:
+    """Return the columns that are named with their units; ``of_u`` is the dimension of readings."""
+    reading = (of_u, layout.u_unit, _U_UNIT, u_unit)
+    length = ("length", layout.x_unit, "x_unit (--x-unit)", None)
+    forms: dict[str, tuple[str, str | None, str, str | None]] = {
+        "u_zz_errors": (of_u, None, "", u_unit),
+        "normal_load": ("force", layout.load_unit, "load_unit (--load-unit)", "N"),
+        "x": length,
+        "y": length,
+    }
+    wanted = {}
+    for name, column in named.items():
+        if column is not None:
+            dimension, unit, option, default = forms.get(name, reading)
+            unit = table.unit_of(column, unit, option, default)
+            wanted[name] = Wanted(column, unit, dimension)
+    return wanted
 
 
 def _scan_of(
     columns: Columns,
     notes: list[str],
     reading: Reading,
-    load_scatter: float | None,
-    x_error: float | None,
-    stated: dict[str, Any],
+    conditions: ScanConditions,
+    uncertainties: ScanUncertainties,
+    source: SourceFile | None,
+    holds: Holds | None,
 ) -> ImportedScan:
     """Return the scan of columns without gaps in their positions, and add to the notes."""
-    words = _numbered_by_load(columns, notes)
-    if "normal_load" in columns:
-        _take_load(columns["normal_load"], notes, stated)
+    stated: dict[str, Any] = {**vars(conditions), **vars(uncertainties)}
+    del stated["noise"]  # that of each reading is a column
+    load_scatter = stated.pop("load_scatter")
+    x_error = stated.pop("x_error")
+    loads_in_words = _numbered_by_load(columns, notes)
+    stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
     if load_scatter is not None and "normal_load" not in columns:
-        if stated["load"] is None:
-            problem = "The scatter of the loads is given, but no load."
-            raise InputError(problem, cure="Give the load in N, or its column.")
         columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
-    stated = {"direction": _direction(columns, notes), **stated}
-    in_words = SimpleNamespace(**{**stated, "load": words or stated["load"]})
-    notes += [*_counted(columns), *_set_up_in_words(in_words)]
-    errors = columns.get("u_zz_errors")
-    u = None if errors is None else f"{reading.text(float(np.nanmedian(errors)))} (median)"
-    notes.append(f"Standard uncertainty of each reading: {u or 'not stated'}.")
+    along = _direction(columns, notes)
+    stated["direction"] = conditions.direction or along
+    notes += _counted(columns)
+    notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
+    notes.append(f"Standard uncertainty of each reading: {_noise_in_words(columns, reading)}.")
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
-        indenter = stated.get("indenter")
-        messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), indenter)
+        messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
     columns = _as_rows(columns)
     channels: Columns = {n: columns.pop(n) for n in ("u_xz", "u_yz") if n in columns}
     if load_scatter is not None:
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     if x_error is not None:
         columns["x_errors"] = np.full(columns["x"].size, x_error)
-    texts = "\n".join(marked_texts(messages))
-    told = {"channels": channels, "notes": texts, "messages": tuple(messages)}
-    fields: dict[str, Any] = {**columns, **stated, **told}
-    return ImportedScan(**fields)
+    arrays: dict[str, Any] = dict(columns)
+    return ImportedScan(
+        **arrays,
+        **stated,
+        unit=reading.si,
+        source=source,
+        channels=channels,
+        notes="\n".join(marked_texts(messages)),
+        messages=tuple(messages),
+        holds=holds,
+    )
+
+
+def _noise_in_words(columns: Columns, reading: Reading) -> str:
+    errors = columns.get("u_zz_errors")
+    if errors is None:
+        return "not stated"
+    return f"{reading.text(float(np.nanmedian(errors)))} (median)"
 
 
 def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
@@ -283,45 +345,40 @@ def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
     return words
 
 
-def _take_load(loads: NDArray[Any], notes: list[str], stated: dict[str, Any]) -> None:
+def _nominal_load(
+    loads: NDArray[Any] | None, stated: float | None, notes: list[str]
+) -> float | None:
     """Take the median of a column as the nominal load; refuse one that contradicts the column."""
-    if stated["load"] is None:
-        stated["load"] = float(np.nanmedian(loads))
-        notes.append(f"The nominal load is the median of the column: {stated['load']:.4g} N.")
-    require_recorded(stated["load"], loads)
+    if loads is None:
+        return stated
+    load = stated
+    if load is None:
+        load = float(np.nanmedian(loads))
+        notes.append(f"The nominal load is the median of the column: {load:.4g} N.")
+    require_recorded(load, loads)
+    return load
 
 
-def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
-    """Return a scan of arrays like ``u``, of which some options are; a row of ``u`` is a pass."""
-    readings = np.asarray(u, dtype=np.float64)
-    given = {name: options.pop(name) for name in _ARRAYS if options.get(name) is not None}
-    if readings.ndim == 2 and not given.keys() & {"y", "repeat"}:
-        given["repeat"] = np.arange(len(readings))[:, None]
-    columns = {"u": readings, "x": x, **given}
-    try:
-        table = {n: np.broadcast_to(v, readings.shape).ravel() for n, v in columns.items()}
-    except ValueError as error:
-        problem = f"An array does not have the shape of u, {readings.shape}: {error}."
-        raise InputError(problem, cure="Give one value for each reading.") from error
-    named: dict[str, Any] = {name: name for name in table}
-    return import_table(table, **named, **{"x_unit": "m", "u_unit": "V", **options})
-
-
-def _set_up_in_words(stated: Any) -> Iterator[str]:
+def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
     """Yield what was pressed on what, with each uncertainty, as it was taken."""
-    film, indenter = (getattr(stated, name, None) for name in ("film", "indenter"))
+    film = stated["film"]
+    indenter = stated["indenter"]
     shape = "indenter" if indenter is None else indenter.shape
     for name, owner, record in (
         (shape, indenter, ROUND_INDENTER),
-        ("pressed with", stated, LOAD),
+        ("pressed with", SimpleNamespace(**stated), LOAD),
         ("film", film, FILM),
     ):
         words = []
-        for q in (q for q in record.quantities if not q.name.endswith("_uncertainty")):
-            value, u = (getattr(owner, key, None) for key in (q.name, f"{q.name}_uncertainty"))
+        for quantity in record.quantities:
+            value = getattr(owner, quantity.name, None)
+            if quantity.name.endswith("_uncertainty") or value in (None, ""):
+                continue
             if isinstance(value, int | float) and np.isfinite(value):
-                value = format_measured(value / q.scale, u and u / q.scale, q.unit)
-            words += [f"{q.words} {value}"] if value not in (None, "") else []
+                u = getattr(owner, f"{quantity.name}_uncertainty", None)
+                scale = quantity.scale
+                value = format_measured(value / scale, u and u / scale, quantity.unit)
+            words.append(f"{quantity.words} {value}")
         yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
 
 
