@@ -18,7 +18,7 @@ from memscal.deconvolution.fourier_ratio import Field, reconvolve
 from memscal.errors import InputError
 from memscal.estimation.band import Band
 from memscal.estimation.forward import wave_table
-from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray
@@ -136,7 +136,7 @@ class LineFields:
         line = self.grid.inverse_on_axis(kernel.transform * self.stress.transform)
         return cut(line, self.grid, self.radius)
 
-    def on_support(self, kernel: FloatArray, _: PosteriorProfile | None) -> Field:
+    def on_support(self, kernel: FloatArray, _: ProfileEstimate | None) -> Field:
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
         inside = slice(0, self._inside.count)
@@ -265,7 +265,7 @@ class RasterFields:
         by_profile: VoltageMap = elsewhere @ smoothed.gain
         return (by_points + by_profile) * self.grid.cell_area
 
-    def on_support(self, kernel: FloatArray, profile: PosteriorProfile | None) -> Field:
+    def on_support(self, kernel: FloatArray, profile: ProfileEstimate | None) -> Field:
         """Return a kernel on its support."""
         step = float(self.grid.x[1] - self.grid.x[0])
         # Odd, so that the kernel's zero stays a point of the lattice.

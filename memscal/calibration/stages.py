@@ -143,7 +143,7 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
     a, g = fourier_ratio.normalise(fields.on_support(values, profile))
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
     model = estimate.model
-    signal = model.signal(model.geometry(estimate.centres), profile.transform(model.k))
+    signal = model.signal(model.geometry(estimate.centres), profile.kernel)
     predicted = signal + estimate.oval + estimate.background
     misfit = _misfit(estimate, predicted)
     return Deconvolution(quotient, a, g, sigma, predicted, misfit, divided=False)

@@ -21,16 +21,14 @@ def elliptic_columns(
 ) -> tuple[FloatArray, FloatArray]:
     """Response per A of an elliptic Gaussian and its derivatives by s, e1, e2; by the centre."""
     # Shapes (n, 4), and (2, n) of each point's own centre.
-    here = np.concatenate([[sigma], ellipticity])
+    here = np.append(sigma, ellipticity)
     steps = np.diag([_STEP * sigma, _STEP, _STEP])
-    places = [here, *(here + step for step in steps), *(here - step for step in steps)]
-    ellipses = [np.append(place[0], bounded(place[1:])) for place in places]
-    (values, *others), shift = model.elliptic(geometry, ellipses)
-    slopes = [
-        (above - below) / (2 * step.sum())
-        for above, below, step in zip(others[:3], others[3:], steps, strict=True)
-    ]
-    return np.stack([values, *slopes], axis=1), shift
+    ellipses = np.vstack([here, here + steps, here - steps])
+    for ellipse in ellipses:
+        ellipse[1:] = bounded(ellipse[1:])
+    responses, shift = model.elliptic(geometry, ellipses)
+    slopes = (responses[1:4] - responses[4:]) / (2 * steps.sum(axis=1)[:, None])
+    return np.vstack([responses[0], slopes]).T, shift
 
 
 def elliptic_departure(
@@ -39,9 +37,9 @@ def elliptic_departure(
     """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
     e1, e2 = bounded(ellipticity)
     plane_x, plane_y = np.meshgrid(x, y)
-    round_ = plane_x**2 + plane_y**2
     determinant = 1 - e1**2 - e2**2
-    form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
-    scale = 1 / (2 * np.pi * sigma**2)
-    elliptic = np.exp(-0.5 * form / (determinant * sigma**2)) / np.sqrt(determinant)
-    return np.asarray(scale * (elliptic - np.exp(-0.5 * round_ / sigma**2)))
+    square = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
+    elliptic = np.exp(-0.5 * square / (determinant * sigma**2)) / np.sqrt(determinant)
+    round_ = np.exp(-0.5 * (plane_x**2 + plane_y**2) / sigma**2)
+    departure: FloatArray = (elliptic - round_) / (2 * np.pi * sigma**2)
+    return departure

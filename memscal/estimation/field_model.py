@@ -56,8 +56,8 @@ class FieldModel(ForwardModel):
         points = self.points
         last = float(self.k[-1])
         span = max(float(np.ptp(points.x)), float(np.ptp(points.y)))
-        fields = [r.field for r in self.references if isinstance(r, FieldSpectrum)]
-        wide = max((np.ptp(axis) for f in fields for axis in (f.x, f.y)), default=0.0)
+        fields = [each.field for each in self.references if isinstance(each, FieldSpectrum)]
+        wide = max((max(np.ptp(field.x), np.ptp(field.y)) for field in fields), default=0.0)
         h = max(np.pi / (_OVERSAMPLING * last), points.step / _PER_STEP)
         count = scipy.fft.next_fast_len(int(np.ceil((1.5 * span + wide) / h)), real=True)
         ky = 2 * np.pi * scipy.fft.fftfreq(count, h)
@@ -95,18 +95,17 @@ class FieldModel(ForwardModel):
         shift = self.shift_derivative(geometry, kernel)
         return np.asarray(np.sum(geometry.towards * shift, axis=0))
 
-    def elliptic(
-        self, geometry: Geometry, ellipses: list[FloatArray]
-    ) -> tuple[list[FloatArray], FloatArray]:
-        """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
+    def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
         kx = self._plane.kx
         ky = self._plane.ky
         kernels = []
         for sigma, e1, e2 in ellipses:
             square = (1 + e1) * kx**2 + 2 * e2 * kx * ky + (1 - e1) * ky**2
             kernels.append(np.exp(-0.5 * sigma**2 * square))
+        responses = [self._read(geometry, kernel) for kernel in kernels]
         shift = [self._read(geometry, -1j * k * kernels[0]) for k in (kx, ky)]
-        return [self._read(geometry, kernel) for kernel in kernels], np.stack(shift)
+        return np.stack(responses), np.stack(shift)
 
     def around(
         self, m: int, cosines: FloatArray, sines: FloatArray, centres: FloatArray
@@ -114,11 +113,11 @@ class FieldModel(ForwardModel):
         """Voltages of kernels with cos or sin of m times the angle: (n, both), in V."""
         geometry = self.geometry(centres)
         angle = m * np.arctan2(self._plane.ky, self._plane.kx)
-        columns = [
-            self._read(geometry, (-1j) ** m * turn(angle) * spectrum)
-            for turn, kernels in ((np.cos, cosines), (np.sin, sines))
-            for spectrum in self._on_cells(kernels.T)
+        spectra = [
+            *(np.cos(angle) * kernel for kernel in self._on_cells(cosines.T)),
+            *(np.sin(angle) * kernel for kernel in self._on_cells(sines.T)),
         ]
+        columns = [self._read(geometry, (-1j) ** m * spectrum) for spectrum in spectra]
         return np.stack(columns, axis=1)
 
     def _on_cells(self, kernels: FloatArray) -> FloatArray:

@@ -116,10 +116,12 @@ class Geometry:
             return self.interpolation[rows] @ (self.table(wave).splines @ spread)
         if wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
-            unique, back = self._distinct
-            short = self.reach * self.k[-1] < _LONGEST_PHASE
-            at = self.table(wave).at(unique) if short else _wave(wave, unique, self.k, self.across)
-            self._waves[wave] = at[back]
+            unique, place = np.unique(self.radius, return_inverse=True)
+            if self.reach * self.k[-1] < _LONGEST_PHASE:
+                values = self.table(wave).at(unique)
+            else:
+                values = _wave(wave, unique, self.k, self.across)
+            self._waves[wave] = values[place]
         return self._waves[wave][rows] @ spread
 
     def table(self, wave: int) -> WaveTable:
@@ -130,11 +132,6 @@ class Geometry:
     def interpolation(self) -> csr_array:
         """From coefficients of the tables' splines to the points, shape (n, t), sparse."""
         return self.table(0).interpolation(self.radius)
-
-    @cached_property
-    def _distinct(self) -> tuple[FloatArray, NDArray[np.intp]]:
-        """Distances that differ, and the place of each point's among them."""
-        return np.unique(self.radius, return_inverse=True)
 
     @cached_property
     def _waves(self) -> dict[int, FloatArray]:
@@ -187,22 +184,28 @@ class ForwardModel:
     def drift_columns(self) -> FloatArray:
         """Baseline and drift (from -1 to 1) along each scan, shape (n, 2 or 3 a scan)."""
         columns = []
-        for i, free in enumerate(self.points.free):
-            inside = self.points.scan == i
+        for scan, free in enumerate(self.points.free):
+            inside = self.points.scan == scan
             columns.append(inside.astype(np.float64))
-            for along, position in zip(free, (self.points.x, self.points.y), strict=True):
-                if along:
-                    columns.append(np.zeros_like(position))
-                    columns[-1][inside] = _unit_range(position[inside])
+            for axis in np.flatnonzero(free):
+                position = (self.points.x, self.points.y)[axis]
+                measured = position[inside]
+                middle = (measured.max() + measured.min()) / 2
+                drift = (position - middle) / (np.ptp(measured) / 2)
+                columns.append(np.where(inside, drift, 0.0))
         return np.stack(columns, axis=1)
 
     @cached_property
     def reach(self) -> float:
         """Beyond the distances of all points from any centre, in m."""
         # Rounded up, so that parts of one raster share their tables.
-        return float(
-            1.25e-3 * np.ceil(1e3 * np.hypot(np.ptp(self.points.x), np.ptp(self.points.y)))
-        )
+        span = np.hypot(np.ptp(self.points.x), np.ptp(self.points.y))
+        return float(1.25e-3 * np.ceil(1e3 * span))
+
+    @cached_property
+    def _measures(self) -> list[FloatArray]:
+        """Weights of the quadrature times the reference of each scan."""
+        return [ref.wavenumbers.weights * ref.values for ref in self.references]
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
@@ -228,18 +231,17 @@ class ForwardModel:
         return np.asarray(-(geometry.towards[self.axis] * voltages.T).T)
 
     def framed(
-        self, geometry: Geometry, beside: Sequence[FloatArray]
+        self, geometry: Geometry, first: Sequence[FloatArray]
     ) -> tuple[FloatArray, FloatArray | None]:
-        """Columns (n, b + f), those ``beside`` first, and C (f, nodes): kernels K make F C K."""
+        """Columns (n, b + f): the ``first``, then F; and C (f, nodes): kernels K make F C K."""
         # By singular values: a film transmits few combinations of all waves.  No F and C where
         # there are not more points than columns.
         if self.points.u.size <= DENSE or not self.of_waves:
-            return np.hstack(beside), None
-        measures = [ref.wavenumbers.weights * ref.values for ref in self.references]
-        groups: dict[bytes, list[int]] = {}
-        for scan, measure in enumerate(measures):
-            groups.setdefault(measure.tobytes(), []).append(scan)
-        strongest = np.abs(measures).max(axis=0)
+            return np.hstack(first), None
+        alike: dict[bytes, list[int]] = {}
+        for scan, measure in enumerate(self._measures):
+            alike.setdefault(measure.tobytes(), []).append(scan)
+        strongest = np.abs(self._measures).max(axis=0)
         table = geometry.table(self.order)
         # One radius beyond the farthest point is within the reach of its interpolation.
         farthest = geometry.radius.max() + (table.radii[1] - table.radii[0])
@@ -247,26 +249,24 @@ class ForwardModel:
         _, size, right = np.linalg.svd(table.values[inside] * strongest, full_matrices=False)
         size = size[size > _NOTHING * size[0]]
         right = right[: size.size]
-        width = size.size
         splines = table.splines @ ((strongest[:, None] * right.T) / size)
         factor = self.points.load
-        first = sum(columns.shape[1] for columns in beside)
         if self.order:
             factor = -factor * geometry.towards[self.axis]
-        columns = np.zeros((factor.size, first + width * len(groups)))
+        start = sum(columns.shape[1] for columns in first)
+        columns = np.zeros((factor.size, start + size.size * len(alike)))
         mixes = []
-        np.concatenate(beside, axis=1, out=columns[:, :first])
-        for i, scans in enumerate(groups.values()):
-            place = slice(first + i * width, first + (i + 1) * width)
-            ours = factor
-            if len(groups) > 1:
-                ours = np.where(np.isin(self.points.scan, scans), factor, 0.0)
-            for start in range(0, factor.size, BLOCK):
-                block = slice(start, start + BLOCK)
-                columns[block, place] = geometry.interpolation[block] @ splines
-                columns[block, place] *= ours[block, None]
-            share = measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
+        np.concatenate(first, axis=1, out=columns[:, :start])
+        for scans in alike.values():
+            place = slice(start, start + size.size)
+            of_scans = np.where(np.isin(self.points.scan, scans), factor, 0.0)
+            for row in range(0, factor.size, BLOCK):
+                block = slice(row, row + BLOCK)
+                waves = geometry.interpolation[block] @ splines
+                columns[block, place] = waves * of_scans[block, None]
+            share = self._measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
             mixes.append(size[:, None] * right * share)
+            start += size.size
         return columns, np.vstack(mixes)
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
@@ -296,37 +296,31 @@ class ForwardModel:
         free = np.argwhere(self.points.free)
         return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
-    def elliptic(
-        self, geometry: Geometry, ellipses: list[FloatArray]
-    ) -> tuple[list[FloatArray], FloatArray]:
-        """Responses (n,) per A to s, e1 and e2; slopes (2, n) of the first by the centre."""
-        count = len(ellipses)
-        radius = geometry.radius
+    def elliptic(self, geometry: Geometry, ellipses: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Responses (m, n) per A to (s, e1, e2), (m, 3); slopes (2, n) of the first by place."""
         toward, across = geometry.towards
         angle = np.arctan2(-across, -toward)
-        totals = np.zeros((count, radius.size))
-        (slope, turn) = np.zeros((2, radius.size))
+        sigma, e1, e2 = ellipses.T
+        size = np.hypot(e1, e2)
+        tilt = 0.5 * np.arctan2(e2, e1)
+        half = 0.5 * np.multiply.outer(self.k, sigma) ** 2
+        responses = np.zeros((len(ellipses), angle.size))
+        slope = np.zeros_like(angle)
+        turn = np.zeros_like(angle)
         for m in range(_HARMONICS):
-            kernels = np.empty((self.k.size, count))
-            tilts = np.empty(count)
-            for i, (sigma, e1, e2) in enumerate(ellipses):
-                half = 0.5 * (sigma * self.k) ** 2
-                size = float(np.hypot(e1, e2))
-                kernels[:, i] = ive(m, half * size) * np.exp(-half * (1 - size))
-                tilts[i] = 0.5 * np.arctan2(e2, e1)
+            kernels = ive(m, half * size) * np.exp(-half * (1 - size))
             profiles = (1 if m == 0 else 2) * self._summed(geometry, 2 * m, kernels)
-            phase = 2 * m * np.subtract.outer(angle, tilts)
-            totals += (np.cos(phase) * profiles).T
+            phase = 2 * m * np.subtract.outer(angle, tilt)
+            responses += (np.cos(phase) * profiles).T
             # By J_n' = (J_(n-1) - J_(n+1))/2.
-            steps = [
-                self._summed(geometry, abs(2 * m + i), self.k * kernels[:, 0]) for i in (-1, 1)
-            ]
-            steepness = -steps[1] if m == 0 else steps[0] - steps[1]
+            steeper = self.k * kernels[:, 0]
+            steepness = -self._summed(geometry, 2 * m + 1, steeper)
+            if m > 0:
+                steepness += self._summed(geometry, 2 * m - 1, steeper)
             slope += np.cos(phase[:, 0]) * steepness
             turn -= 2 * m * np.sin(phase[:, 0]) * profiles[:, 0]
-        around = np.stack([-geometry.towards[1], geometry.towards[0]])
-        turned = np.divide(turn, radius, out=np.zeros_like(turn), where=radius > 0)
-        return list(totals), geometry.towards * slope + around * turned
+        turn = np.divide(turn, geometry.radius, out=turn, where=geometry.radius > 0)
+        return responses, geometry.towards * slope + np.stack([-across, toward]) * turn
 
     def around(
         self, m: int, cosines: FloatArray, sines: FloatArray, centres: FloatArray
@@ -347,20 +341,11 @@ class ForwardModel:
 
     def _summed(self, geometry: Geometry, wave: int, kernel: FloatArray) -> FloatArray:
         """Voltages by kernels, each scan through its reference: a wave summed over the nodes."""
-        load = self.points.load
         per_newton = np.empty((self.points.u.size, *kernel.shape[1:]))
-        for rows, measure in self._measures:
-            spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
-            per_newton[rows] = geometry.summed(wave, spread, rows)
-        return per_newton * (load if kernel.ndim == 1 else load[:, None])
-
-    @property
-    def _measures(self) -> list[tuple[Rows, FloatArray]]:
-        """Rows of each scan, and the quadrature's weights times its reference."""
-        measures = [ref.wavenumbers.weights * ref.values for ref in self.references]
-        if len(measures) == 1:
-            return [(slice(None), measures[0])]
-        return [(self.points.scan == i, measure) for i, measure in enumerate(measures)]
+        for scan, measure in enumerate(self._measures):
+            rows = slice(None) if len(self.references) == 1 else self.points.scan == scan
+            per_newton[rows] = geometry.summed(wave, (kernel.T * measure).T, rows)
+        return (per_newton.T * self.points.load).T
 
 
 def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> ForwardModel:
@@ -372,10 +357,5 @@ def forward_model(points: ScanPoints, references: Sequence[RadialSpectrum]) -> F
         cure = "Average neighbouring readings, or give a source without an edge (gaussian:S)."
         raise too_large("The scan", size, DENSE, "points for such a reference", cure=cure, why=why)
     models = [reference.model for reference in references if reference.model]
-    model: ForwardModel = (models or [ForwardModel])[0](points, tuple(references))
+    model: ForwardModel = [*models, ForwardModel][0](points, tuple(references))
     return model
-
-
-def _unit_range(positions: FloatArray) -> FloatArray:
-    middle = (positions.max() + positions.min()) / 2
-    return np.asarray((positions - middle) / (np.ptp(positions) / 2))

@@ -112,10 +112,10 @@ class ProfileEstimate:
         correction = self.basis.kernels(self.model.k) @ self.weighed.mean
         return self.gaussian.conversion_constant * gaussian + correction
 
-    def radial(self, r: FloatArray, shift: FloatArray | float = 0.0) -> FloatArray:
-        """A G at radii ``r`` (m), in V/Pa/m^2; its coefficients may be shifted, shape (p,)."""
+    def radial(self, r: FloatArray) -> FloatArray:
+        """A G at radii ``r`` (m), in V/Pa/m^2."""
         gaussian = self.gaussian.conversion_constant * unit_gaussian(r, self.gaussian.sigma)
-        return gaussian + self.basis.radial(r) @ (self.weighed.mean + shift)
+        return gaussian + self.basis.radial(r) @ self.weighed.mean
 
     @property
     def spectrum(self) -> RadialSpectrum:
@@ -156,30 +156,30 @@ class ProfileEstimate:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
         fit = self.gaussian
         kernel = fit.conversion_constant * elliptic_departure(x, y, fit.sigma, fit.ellipticity)
-        changes = self.oval_changes(x, y, self.weighed.mean[:, None])
-        return kernel + changes.reshape(kernel.shape)
+        return kernel + self.oval_changes(x, y, self.weighed.mean[:, None]).reshape(kernel.shape)
 
     def oval_changes(self, x: FloatArray, y: FloatArray, coefficients: FloatArray) -> FloatArray:
         """What of combinations (p, c) of the posterior's kernels is not round: (y x, c)."""
         fit = self.gaussian
-        around = self.basis.angular
+        angular = self.basis.angular
         flat = self.basis.flat
         changes = np.zeros((y.size * x.size, coefficients.shape[1]))
         if self.points.ellipse:
-            place = np.append(fit.sigma, fit.ellipticity)
-            steps = _STEP * np.diag([fit.sigma, 1.0, 1.0])
-            oval, *moved = (
-                elliptic_departure(x, y, p[0], p[1:]).ravel() for p in (place, *(place + steps))
-            )
-            end = fit.jacobian.shape[1]
-            a = fit.conversion_constant
+            ellipse = np.append(fit.sigma, fit.ellipticity)
+            oval = elliptic_departure(x, y, fit.sigma, fit.ellipticity).ravel()
             changes += np.outer(oval, coefficients[0])
-            for row, other, step in zip((1, end - 2, end - 1), moved, steps, strict=True):
-                changes += np.outer(a * (other - oval) / step.sum(), coefficients[row])
-        if around:
-            plane_x, plane_y = (axis.ravel() for axis in np.meshgrid(x, y))
-            theirs = coefficients[flat - around.count : flat]
-            changes += around.at(plane_x, plane_y, theirs)
+            end = fit.jacobian.shape[1]
+            for i, row in enumerate((1, end - 2, end - 1)):
+                step = _STEP * (fit.sigma if row == 1 else 1.0)
+                moved = ellipse.copy()
+                moved[i] += step
+                other = elliptic_departure(x, y, moved[0], moved[1:]).ravel()
+                slope = fit.conversion_constant * (other - oval) / step
+                changes += np.outer(slope, coefficients[row])
+        if angular:
+            plane_x, plane_y = np.meshgrid(x, y)
+            coefficients = coefficients[flat - angular.count : flat]
+            changes += angular.at(plane_x.ravel(), plane_y.ravel(), coefficients)
         return changes
 
     @property
@@ -193,11 +193,11 @@ class ProfileEstimate:
     @property
     def uneven(self) -> FloatArray:
         """What references that are not round add to the voltages, shape (n,), in V."""
-        mean = ForwardModel(self.points, self.model.references)
         if type(self.model) is ForwardModel:
             return np.zeros_like(self.points.u)
+        even = ForwardModel(self.points, self.model.references)
         whole = self.model.signal(self.model.geometry(self.centres), self.kernel)
-        return whole - mean.signal(mean.geometry(self.centres), self.kernel)
+        return whole - even.signal(even.geometry(self.centres), self.kernel)
 
     @property
     def offset(self) -> FloatArray:
@@ -246,15 +246,17 @@ def estimate_profile(
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
     angular = angular and points.planar and not model.order
-    first = 2 * OUTLIER_THRESHOLD
-    outlier = start.outlier_weight if start else point_weights(points, residual, stated, first)
+    if start:
+        outlier = start.outlier_weight
+    else:
+        outlier = point_weights(points, residual, stated, 2 * OUTLIER_THRESHOLD)
     for rounds_left in range(_WEIGHING_ROUNDS - 1, -1, -1):
         weights = stated * outlier
-        count = float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
         done_with("Gaussian fit")
         if angular:
             noise = raster_noise(points, residual) or noise
+        count = float(outlier.sum())
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
@@ -266,9 +268,9 @@ def estimate_profile(
             continue
         break
     done_with("departures")
-    within = bayesian.supported(basis, weighed)
+    within, averaged = bayesian.supported(basis, weighed)
     raster = raster_noise(points, residual) if angular else None
-    estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis, raster)
+    estimate = ProfileEstimate(model, fit, within, averaged, weights, outlier, basis, raster)
     _require_determined(estimate)
     return estimate
 
@@ -284,14 +286,14 @@ def _weighed(
 ) -> tuple[DepartureBasis, WeighedFit]:
     """Weigh departures from a fit for ``count`` readings and a least noise."""
     rings = AngularRings.about(fit) if angular else None
-    around = None
     reduced = ReducedScan.of(model, fit, weights, rings)
+    departures = None
     if rings:
         kernels = departure_basis(model, fit, reduced).kernels(model.k)
         radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
-        columns = reduced.data, reduced.flat, radial, reduced.rings
-        around = angular_departures(rings, fit, columns, noise)
-    basis = departure_basis(model, fit, reduced, around)
+        columns = (reduced.data, reduced.flat, radial, reduced.rings)
+        departures = angular_departures(rings, fit, columns, noise)
+    basis = departure_basis(model, fit, reduced, departures)
     return basis, bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
 
 
@@ -376,8 +378,7 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
         wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
         raise FitError(
             f"The conversion constant would be ({a / unit.scale:.2g} ± "
-            f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)}: "
-            f"it is {wrong}.",
+            f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)}: it is {wrong}.",
             why=_why_undetermined(estimate),
             cure=cure,
         )
@@ -400,11 +401,12 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
         return f"{varies}: it does not rise above its noise as the indenter passes."
     signal = np.abs(estimate.predicted - estimate.background)
     farthest = int(np.argmax(estimate.distance))
-    reach = float(estimate.distance.max()) * 1e3
-    if (left := signal[farthest] / signal.max()) > _LEFT:
+    left = signal[farthest] / signal.max()
+    if left > _LEFT:
         return (
-            f"{varies}, but the scan is too short or off centre to show the baseline: {reach:.3g} "
-            f"mm from the sensor's centre, where it ends, {left:.0%} of the largest signal is left."
+            f"{varies}, but the scan is too short or off centre to show the baseline: "
+            f"{estimate.distance[farthest] * 1e3:.3g} mm from the sensor's centre, where it ends, "
+            f"{left:.0%} of the largest signal is left."
         )
     centres = 2 + int(estimate.points.free.sum())
     flat = estimate.basis.flat
@@ -434,32 +436,12 @@ _REACH_IN_WIDTHS = 6.0
 _SLACK = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class PosteriorProfile:
-    """A G with the coefficients of the posterior mean, shifted."""
-
-    estimate: ProfileEstimate
-    shift: FloatArray
-
-    def radial(self, r: FloatArray) -> FloatArray:
-        """A G at radii ``r`` (m), in V/Pa/m^2."""
-        return self.estimate.radial(r, self.shift)
-
-    def transform(self, k: FloatArray) -> FloatArray:
-        """Hankel transform of A G at ``k`` (rad/m), in V/Pa."""
-        fit = self.estimate.gaussian
-        basis = self.estimate.basis
-        corrections = self.estimate.weighed.mean + self.shift
-        gaussian = fit.conversion_constant * gaussian_transfer(k, fit.sigma)
-        return gaussian + basis.kernels(k) @ corrections
-
-
 def constrained_profile(
     estimate: ProfileEstimate, *, nonnegative: bool, monotone: bool
-) -> PosteriorProfile:
+) -> ProfileEstimate:
     """Return the MAP estimate of A G under constraints; without any, the posterior mean."""
     if not (nonnegative or monotone):
-        return PosteriorProfile(estimate, np.zeros_like(estimate.weighed.mean))
+        return estimate
     width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
     r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
     profile = estimate.radial(r)
@@ -468,7 +450,7 @@ def constrained_profile(
         # A profile that falls all the way to zero is nowhere negative.
         profile = np.append(profile[:-1] - profile[1:], profile[-1])
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
-    scale = float(np.abs(profile).max())
+    scale = np.abs(profile).max()
     # A square root of the covariance, from its correlation matrix: amplitudes differ in size.
     deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
     deviation = np.where(deviation > 0, deviation, 1.0)
@@ -476,7 +458,8 @@ def constrained_profile(
     positive = values > 1e-12 * values[-1]
     root = deviation[:, None] * vectors[:, positive] * np.sqrt(values[positive])
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
-    return PosteriorProfile(estimate, root @ z)
+    weighed = replace(estimate.weighed, mean=estimate.weighed.mean + root @ z)
+    return replace(estimate, weighed=weighed)
 
 
 def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
@@ -484,9 +467,10 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
     # Lawson and Hanson, Solving Least Squares Problems, chapter 23: by non-negative least squares.
     from scipy.optimize import nnls
 
+    both = np.vstack([matrix.T, bound])
     target = np.append(np.zeros(matrix.shape[1]), 1.0)
-    dual, _ = nnls(np.vstack([matrix.T, bound]), target, maxiter=50 * bound.size)
-    residual = np.vstack([matrix.T, bound]) @ dual - target
+    dual, _ = nnls(both, target, maxiter=50 * bound.size)
+    residual = both @ dual - target
     if not residual[-1] < -1e-12:
         problem = "No apparatus function that meets the constraint comes near the scan."
         why = "It would have to be negative, or to rise, somewhere."
@@ -514,11 +498,12 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
         if points.repeat.any():
             place += f" of repeat {points.repeat[i] + 1}"
-        seen, expected = (points.reading.text(u[i], ".4g") for u in (points.u, estimate.predicted))
-        voltages = f"{seen} instead of {expected}"
+        seen = points.reading.text(points.u[i], ".4g")
+        voltages = f"{seen} instead of {points.reading.text(estimate.predicted[i], '.4g')}"
         text = f"Outlier at {place}: {voltages}; its weight is {weight[i]:.2g}."
         messages.append(Message("outlier", text))
-    if (more := outliers.size - _MOST_LISTED) > 0:
+    more = outliers.size - _MOST_LISTED
+    if more > 0:
         text = f"{more} more outliers depart by less and have reduced weights, too."
         messages.append(Message("outlier", text))
     return messages
