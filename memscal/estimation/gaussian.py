@@ -108,13 +108,16 @@ _SOURCE_WIDTHS = 8
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Parameters to start from: each scan's own, but A and the width at the medians of all."""
     points = model.points
-    starts = [
-        _robust_start_of_scan(model.only(i), weights[points.scan == i]) for i in range(points.scans)
-    ]
-    shape = np.median([start[:2] for start in starts], axis=0)
-    free = points.free.sum(axis=1)
-    centres = [start[2 : 2 + n] for start, n in zip(starts, free, strict=True)]
-    drifts = [start[2 + n : 3 + 2 * n] for start, n in zip(starts, free, strict=True)]
+    shapes = []
+    centres = []
+    drifts = []
+    for scan, free in enumerate(points.free):
+        start = _robust_start_of_scan(model.only(scan), weights[points.scan == scan])
+        last = 2 + int(free.sum())
+        shapes.append(start[:2])
+        centres.append(start[2:last])
+        drifts.append(start[last:])
+    shape = np.median(shapes, axis=0)
     return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
 
 
@@ -130,7 +133,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
         # A source may be far narrower than G.
         widest = 0.25 * np.hypot(np.ptp(points.x), np.ptp(points.y))
         widths = np.geomspace(0.5 * points.step, widest, _SOURCE_WIDTHS)
-    kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
+    kernels = np.stack([gaussian_transfer(model.k, width) for width in widths])
     # Profiles per newton of every width, on a table for quick trials.
     spectra = (model.reference.values * kernels).T
     wavenumbers = model.reference.wavenumbers
@@ -151,13 +154,14 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
         if amplitudes[i] > 0 and costs[i] < best_cost:
             baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
             best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
-            best_cost = float(costs[i])
+            best_cost = costs[i]
     if model.order:
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
-        trials = [_amplitudes(np.concatenate(shapes), data, drift) for shapes in (odd, even)]
-        _require_parity(points, *trials)
+        odd_trials = _amplitudes(np.concatenate(odd), data, drift)
+        even_trials = _amplitudes(np.concatenate(even), data, drift)
+        _require_parity(points, odd_trials, even_trials)
     if not best.size:
         raise _undetermined(model)
     return best
@@ -190,14 +194,15 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
 def _smoothing_length(model: ForwardModel) -> float:
     r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
     values = model.reference.scalar.values
+    fallen = np.flatnonzero(values / values[0] < 0.5)
     # A point's never falls.
-    fallen = np.append(values / values[0] < 0.5, True)
-    return float(1 / model.k[min(int(np.argmax(fallen)), model.k.size - 1)])
+    return float(1 / model.k[fallen[0] if fallen.size else -1])
 
 
 def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
-    stopped = conversion_constant is not None
-    end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
+    end = ""
+    if conversion_constant is not None:
+        end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)"
     return FitError(
         f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{end}.",
         why="The voltage does not rise and fall with the distance from one centre.",
@@ -248,9 +253,9 @@ class GaussianFit:
 
     def gain(self, weights: FloatArray) -> VoltageMap:
         """Derivative of the parameters by the voltages, shape (p, n)."""
-        twice = self.points.standardised(self.jacobian, weights)
         covariance = self.covariance(weights, 1.0)
-        right = self.points.unstandardise(twice, weights)
+        standardised = self.points.standardised(self.jacobian, weights)
+        right = self.points.unstandardise(standardised, weights)
         if len(right) > DENSE:
             return VoltageMap(((covariance, right),))
         return VoltageMap(((covariance @ right.T, None),))
@@ -261,22 +266,22 @@ def fit_gaussian_to_points(
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is not None:
-        return _solve(model, weights, _parameters(start), robust=False)
-    if weights.size <= _MOST_AT_START:
-        return _solve(model, weights, _robust_start(model, weights), robust=True)
-    # Some points, evenly chosen along the scan, give the start for all.
-    order = np.lexsort((model.points.x, model.points.y, model.points.scan))
-    chosen = np.sort(evenly(order, _MOST_AT_START))
-    some = replace(model, points=model.points.selected(chosen))
-    theta = _parameters(fit_gaussian_to_points(some, weights[chosen]))
-    return _solve(model, weights, theta, robust=True)
+        theta = _parameters(start)
+    elif weights.size <= _MOST_AT_START:
+        theta = _robust_start(model, weights)
+    else:
+        # Some points, evenly chosen along the scan, give the start for all.
+        order = np.lexsort((model.points.x, model.points.y, model.points.scan))
+        chosen = np.sort(evenly(order, _MOST_AT_START))
+        some = replace(model, points=model.points.selected(chosen))
+        theta = _parameters(fit_gaussian_to_points(some, weights[chosen]))
+    return _solve(model, weights, theta, robust=start is None)
 
 
 def _parameters(fit: GaussianFit) -> FloatArray:
-    centres = fit.centre[fit.points.free]
-    ellipticity = fit.ellipticity[: fit.points.ellipse]
     shape = [fit.conversion_constant, fit.sigma]
-    return np.concatenate([shape, centres, fit.drift, ellipticity])
+    ellipticity = fit.ellipticity[: fit.points.ellipse]
+    return np.concatenate([shape, fit.centre[fit.points.free], fit.drift, ellipticity])
 
 
 def _solve(
@@ -312,7 +317,8 @@ def _solve(
         return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
     # A robust fit is the start of the next one: a low accuracy is enough.
-    knee, tolerance = (_KNEE, 1e-4) if robust else (np.inf, 1e-9)
+    knee = _KNEE if robust else np.inf
+    tolerance = 1e-4 if robust else 1e-9
     begin = start / scale
     solution = gauss_newton(
         lambda scaled: (residual(scaled), slope(scaled)), begin, tolerance=tolerance, knee=knee
@@ -344,28 +350,29 @@ def _solve(
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
     free = model.points.free
-    elliptic = model.points.ellipse
+    ellipse = theta.size - model.points.ellipse
+    centres = 2 + int(free.sum())
     amplitude = float(theta[0])
     sigma = float(theta[1])
     centre = np.zeros(free.shape)
-    centre[free] = theta[2 : 2 + free.sum()]
-    drift = theta[2 + free.sum() : theta.size - elliptic]
+    centre[free] = theta[2:centres]
+    drift = theta[centres:ellipse]
     ellipticity = np.zeros(2)
-    ellipticity[:elliptic] = theta[theta.size - elliptic :]
+    ellipticity[: theta.size - ellipse] = theta[ellipse:]
     geometry = model.geometry(centre)
     kernel = gaussian_transfer(model.k, sigma)
-    if elliptic:
+    if model.points.ellipse:
         columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
-        signal, widening, *ovals = columns.T
-        shift = model.by_free_centres(amplitude * shift)
+        centring = model.by_free_centres(amplitude * shift)
     else:
-        shift = model.centre_derivative(geometry, amplitude * kernel)
+        centring = model.centre_derivative(geometry, amplitude * kernel)
         both = np.stack([kernel, gaussian_transfer_slope(model.k, sigma)], axis=1)
-        signal, widening, *ovals = model.signal(geometry, both).T
+        columns = model.signal(geometry, both)
+    signal = columns[:, :1]
+    by_shape = amplitude * columns[:, 1 : 2 + model.points.ellipse]
     baseline = model.drift_columns
-    oval = [amplitude * column for column in ovals[:elliptic]]
-    jacobian = np.column_stack([signal, amplitude * widening, shift, baseline, *oval])
-    predicted = amplitude * signal + baseline @ drift
+    jacobian = np.hstack([signal, by_shape[:, :1], centring, baseline, by_shape[:, 1:]])
+    predicted = amplitude * columns[:, 0] + baseline @ drift
     return GaussianFit(
         amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
     )
