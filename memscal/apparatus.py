@@ -119,7 +119,7 @@ class ApparatusFunction(Result, ApparatusData):
         radii, stress = self._checked(r, sigma_zz)
         profile = self.radial_profile
         # G is zero beyond the last wavenumber of its grid.
-        reach = float(radii[-1] + profile.r[-1])
+        reach = radii[-1] + profile.r[-1]
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
         blurred = kernel * hankel_transform(radii, stress, wavenumbers.k, order=self.order)
@@ -209,7 +209,7 @@ class ApparatusFunction(Result, ApparatusData):
         """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""
         radii, stress = self._checked(r, sigma_zz)
         profile = self.radial_profile
-        reach = float(radii[-1] + profile.r[-1])
+        reach = radii[-1] + profile.r[-1]
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
         kernel = j0(np.multiply.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
@@ -304,9 +304,9 @@ class ApparatusFunction(Result, ApparatusData):
             problem = f"r begins at {radii[0]:g} m."
             raise InputError(problem, cure="Give the stress from the axis (r = 0) outward.")
         # A step matters only where there is stress.
-        peak = float(np.abs(stress).max())
+        peak = np.abs(stress).max()
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
-        coarse = float(np.diff(radii)[strong].max(initial=0.0))
+        coarse = np.diff(radii)[strong].max(initial=0.0)
         self._require_fine(coarse)
         end = f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
         self._require_decayed(float(abs(stress[-1])), peak, end)

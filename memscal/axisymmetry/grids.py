@@ -252,7 +252,7 @@ def on_grid(
     profile: Callable[[FloatArray], FloatArray], grid: FieldGrid, step: float
 ) -> FloatArray:
     """Values of a radial function on a grid, by an even spline through it every ``step`` (m)."""
-    reach = float(np.max(grid.radius))
+    reach = np.max(grid.radius)
     table = np.linspace(0.0, reach, int(np.ceil(reach / step)) + 4)
     return radial_spline(table, profile(table))(grid.radius)
 

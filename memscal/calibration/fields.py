@@ -64,7 +64,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     # A shear's transform vanishes at k = 0, too: only what lies beyond its largest counts.
     beyond = np.arange(reference.size) > np.argmax(reference)
     closed = beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference)
-    last = float(band.k[int(np.argmax(closed))] if closed.any() else band.k[-1])
+    last = band.k[int(np.argmax(closed))] if closed.any() else band.k[-1]
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = support / (_COUNTED * np.ceil(support / spacing / _COUNTED))
@@ -267,7 +267,7 @@ class RasterFields:
 
     def on_support(self, kernel: FloatArray, profile: ProfileEstimate | None) -> Field:
         """Return a kernel on its support."""
-        step = float(self.grid.x[1] - self.grid.x[0])
+        step = self.grid.x[1] - self.grid.x[0]
         # Odd, so that the kernel's zero stays a point of the lattice.
         least, finer = (int(np.ceil(step / (each * self.step))) | 1 for each in (2.0, 2.0 / 3))
         refinement = max(min(5, finer), least)

@@ -351,7 +351,7 @@ def _budget(
 ) -> dict[str, float]:
     """Contribution of each source; of correlations with the sign of what they add."""
     budget = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
-    variance = float(covariance[row, row])
+    variance = covariance[row, row]
     excess = variance - sum(u**2 for u in budget.values())
     if abs(excess) > _ROUNDING * variance:
         budget["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))

@@ -59,8 +59,8 @@ class DivisionProblem:
         """Image of order one, point spread function of sum one, and the scale of their quotient."""
         image = self.grid.to_image(self.voltage)
         spread = self.grid.to_image(self.reference)
-        peak = float(np.abs(image).max())
-        total = float(spread.sum())
+        peak = np.abs(image).max()
+        total = spread.sum()
         # u = sum(g * spread) * cell area, with image / peak and spread / total.
         return image / peak, spread / total, peak / (total * self.grid.cell_area)
 

@@ -237,7 +237,7 @@ def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
 def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     r"""Fit eta of :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`; ``None`` for equal loads."""
     load = estimate.points.load
-    mean = float(load.mean())
+    mean = load.mean()
     if np.ptp(load) < _SAME_LOAD * mean:
         return None
     signal = estimate.predicted - estimate.background
@@ -329,7 +329,7 @@ def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
 def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Points of a scan that share its largest voltage to the last digit."""
     u = estimate.points.u
-    noise = float(np.median(_ordinary_noise(estimate)[inside]))
+    noise = np.median(_ordinary_noise(estimate)[inside])
     top: NDArray[np.bool_] = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
     finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
     curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
@@ -360,7 +360,7 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(model, fit, reduced, angular)
-    count = float((estimate.outlier_weight * ~plateau)[chosen].sum())
+    count = (estimate.outlier_weight * ~plateau)[chosen].sum()
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
     others = weigh_departures(reduced, basis, count, least_noise=least)
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.

@@ -12,7 +12,7 @@ _STEP = 1e-4
 
 def bounded(ellipticity: FloatArray) -> FloatArray:
     """Return an ellipticity (e1, e2) that an ellipse can have."""
-    size = float(np.hypot(*ellipticity))
+    size = np.hypot(*ellipticity)
     return ellipticity * min(1.0, _LARGEST / size) if size > 0 else ellipticity
 
 

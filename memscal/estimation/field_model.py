@@ -54,7 +54,7 @@ class FieldModel(ForwardModel):
     @cached_property
     def _plane(self) -> _Plane:
         points = self.points
-        last = float(self.k[-1])
+        last = self.k[-1]
         span = max(float(np.ptp(points.x)), float(np.ptp(points.y)))
         fields = [each.field for each in self.references if isinstance(each, FieldSpectrum)]
         wide = max((max(np.ptp(field.x), np.ptp(field.y)) for field in fields), default=0.0)

@@ -44,7 +44,7 @@ def gauss_newton(
         residual, slope = linearise(place)
         stretch = np.sqrt(1 + (residual / knee) ** 2)
         # The loss, in a form without cancellation where the knee is far away.
-        loss = float(np.sum(2 * residual**2 / (1 + stretch)))
+        loss = np.sum(2 * residual**2 / (1 + stretch))
         if not loss <= cost * (1 + _ROUNDING):
             halvings += 1
             if halvings > _MOST_HALVINGS:
@@ -56,7 +56,7 @@ def gauss_newton(
         # The triangular factor of both stands for them.
         both = triangular(np.column_stack([slope * root[:, None], -residual * root]))
         whole = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
-        longest = float(np.abs(whole).max())
+        longest = np.abs(whole).max()
         step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
         place = place + step
         cost = loss
@@ -75,8 +75,8 @@ def _require_parity(
     """Refuse a voltage that a shear of the other sign, or an even signal, fits far better."""
     # ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
     amplitudes, costs = odd
-    right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
-    turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
+    right = np.min(costs, where=amplitudes > 0, initial=np.inf)
+    turned = np.min(costs, where=amplitudes < 0, initial=np.inf)
     name = f"u_{points.channel}"
     along = points.channel[0]
     if float(even[1].min()) < _CLEARLY * min(right, turned):
@@ -238,7 +238,7 @@ class GaussianFit:
     def has_width(self, weights: FloatArray, noise: float) -> bool:
         """Whether the width is distinct from zero, where its slopes vanish."""
         try:
-            variance = float(self.covariance(weights, noise)[1, 1])
+            variance = self.covariance(weights, noise)[1, 1]
         except np.linalg.LinAlgError:
             return False
         return self.sigma >= _NO_WIDTH * float(np.sqrt(variance))

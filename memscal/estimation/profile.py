@@ -256,7 +256,7 @@ def estimate_profile(
         done_with("Gaussian fit")
         if angular:
             noise = raster_noise(points, residual) or noise
-        count = float(outlier.sum())
+        count = outlier.sum()
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
@@ -319,7 +319,7 @@ def log_marginal_likelihood(
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
-    count = float(estimate.outlier_weight.sum())
+    count = estimate.outlier_weight.sum()
     [weighing] = bayesian.weighings([(reduced, basis)], count, least_noise=least)
     return np.asarray(weighing.log_marginal_likelihoods) - volume / 2
 
@@ -393,7 +393,7 @@ _LEFT = 0.1
 def _why_undetermined(estimate: ProfileEstimate) -> str:
     """Say what keeps A from being determined: the noise, or the parameter it is confused with."""
     base = np.linalg.qr(estimate.model.drift_columns)[0]
-    rise = float(np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted)))
+    rise = np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted))
     ratio = rise / float(np.median(estimate.noise))
     varied = estimate.points.reading.text(rise)
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"

@@ -163,7 +163,7 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
             why="The stress beyond the table would be missing from every distant point.",
             cure="Extend the reference to where it has decayed, or leave it out to compute it.",
         )
-    first = float(profile.r[0])
+    first = profile.r[0]
     if first > 0.1 * needed:
         why = "The stress on the axis, its largest, is missing."
         cure = "Give the reference from r = 0 outward."
