@@ -74,14 +74,10 @@ class SmoothedProfile:
     """The radial profile of the voltages, per newton, as a linear function of them."""
 
     estimate: ProfileEstimate  # whose centre, baseline, drift and noise it takes
+    signal: FloatArray  # (n,): voltages of what is round alone, in V
     gain: VoltageMap  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
     predicted: FloatArray  # (n,): the smoothed signal at the points, in V
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
-
-    @cached_property
-    def signal(self) -> FloatArray:
-        """Voltages of what is round alone, shape (n,), in V."""
-        return _round_signal(self.estimate)
 
     @cached_property
     def spectrum(self) -> RadialSpectrum:
@@ -91,38 +87,33 @@ class SmoothedProfile:
     @cached_property
     def noise(self) -> FloatArray:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
-        floor = _FLOOR_OF_NOISE * float(np.abs(self.signal).max())
+        floor = _FLOOR_OF_NOISE * np.abs(self.signal).max()
         electronic = np.sum(self.estimate.scattered(self.gain) ** 2, axis=1)
         plain = np.diag(self.gain.covariance(np.ones_like(self.signal)))
-        return np.asarray(np.sqrt(electronic + floor**2 * plain))
+        variance: FloatArray = electronic + floor**2 * plain
+        return np.sqrt(variance)
 
 
 def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     """Smooth the voltages of scans about their centres; of several references, put together."""
     points = estimate.points
     references = estimate.model.references
+    alike: dict[bytes, list[int]] = {}
+    for scan, reference in enumerate(references):
+        alike.setdefault(reference.values.tobytes(), []).append(scan)
+    # Less the background and what of sensor and reference is not round.
+    signal = points.u - estimate.background - estimate.oval - estimate.uneven
     predicted = np.zeros(points.u.size)
     weight = np.ones(points.u.size)
     gains = []
-    groups = dict[bytes, list[int]]()
-    for scan, reference in enumerate(references):
-        groups.setdefault(reference.values.tobytes(), []).append(scan)
-    signal = _round_signal(estimate)
-    for scans in groups.values():
+    for scans in alike.values():
+        reference = references[scans[0]]
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
-        of_scans, smoothed, weight[rows] = _fitted(
-            estimate, signal[rows], references[scans[0]], rows
-        )
+        gain, smoothed, weight[rows] = _fitted(estimate, signal[rows], reference, rows)
         predicted[rows] = load * smoothed
-        gain = of_scans.over(1 / load, rows, points.u.size)
-        gains.append((references[scans[0]].values, gain))
-    return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
-
-
-def _round_signal(estimate: ProfileEstimate) -> FloatArray:
-    """Voltages less background and what of sensor and reference is not round, (n,), in V."""
-    return estimate.points.u - estimate.background - estimate.oval - estimate.uneven
+        gains.append((reference.values, gain.over(1 / load, rows, points.u.size)))
+    return SmoothedProfile(estimate, signal, _joined(gains, estimate), predicted, weight)
 
 
 def _joined(
@@ -136,10 +127,12 @@ def _joined(
     first, gain = gains[0]
     if len(gains) == 1:
         return gain
-    variances = [np.sum(estimate.scattered(g) ** 2, axis=1) for _, g in gains]
-    pairs = list(zip(gains, variances, strict=True))
-    below = np.sum([stress**2 / v for (stress, _), v in pairs], axis=0)
-    joined: VoltageMap = reduce(add, [g * (first * stress / v / below) for (stress, g), v in pairs])
+    shares = [stress / np.sum(estimate.scattered(each) ** 2, axis=1) for stress, each in gains]
+    below = np.sum(
+        [stress * share for (stress, _), share in zip(gains, shares, strict=True)], axis=0
+    )
+    parts = [each * (first * share / below) for (_, each), share in zip(gains, shares, strict=True)]
+    joined: VoltageMap = reduce(add, parts)
     return joined
 
 
@@ -148,10 +141,10 @@ def _fitted(
 ) -> tuple[VoltageMap, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
-    load = estimate.points.load[rows]
     points = estimate.points
-    y = signal / load
-    stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
+    y = signal / points.load[rows]
+    noise = estimate.noise[rows] / points.load[rows]
+    stated = 1 / (noise**2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
     if reference.source:
         # A source ends: what decays is G about it.
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
@@ -161,11 +154,12 @@ def _fitted(
     threshold = 2 * OUTLIER_THRESHOLD
     for rounds_left in range(_ROUNDS - 1, -1, -1):
         fitted = spline.fit(y, stated * weight)
-        left = (y - fitted.predicted) * np.sqrt(stated / np.clip(fitted.freedom, _LEAST_FREEDOM, 1))
         if points.planar:
             # Found by their neighbours in the plane.
             updated = estimate.outlier_weight[rows]
         else:
+            freedom = np.clip(fitted.freedom, _LEAST_FREEDOM, 1)
+            left = (y - fitted.predicted) * np.sqrt(stated / freedom)
             updated = outlier_weights(left, threshold, _LEAST_SCALE)
         threshold = OUTLIER_THRESHOLD
         # A residual counts by the root of its weight.
@@ -197,12 +191,11 @@ class _RadialSpline:
     @classmethod
     def through(cls, radius: FloatArray, reference: RadialSpectrum, step: float) -> _RadialSpline:
         """Place the splines for points at radii (m), ``step`` apart."""
-        reach = (1 + 2e-9) * rounded_reach(float(radius.max()), step)
+        reach = (1 + 2e-9) * rounded_reach(radius.max(), step)
         nodes = reference.wavenumbers
         arrays = (array.tobytes() for array in (nodes.k, nodes.weights, reference.values))
-        basis, intervals, *matrices = _layout(
-            reach, step, reference.order, reference.source, *arrays
-        )
+        layout = _layout(reach, step, reference.order, reference.source, *arrays)
+        basis, intervals, *matrices = layout
         interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
         return cls(basis(radius, 0), interval, *matrices)
 
@@ -211,29 +204,27 @@ class _RadialSpline:
         from scipy.linalg import solve_triangular
 
         root = np.sqrt(weight)
-        cells, reduced = self._reduced(root)
+        weighted = self.points.multiply(root[:, None]).tocsr()
+        # Between two knots few splines differ from zero: each interval has few rows in R.
+        few = root.size <= DENSE
+        cells, reduced = (
+            (None, weighted.toarray()) if few else _by_intervals(weighted, self.interval)
+        )
         design = solve_triangular(self.root, (reduced @ self.free).T, trans="T").T
         left, values, right = np.linalg.svd(design, full_matrices=False)
         data = root * y
         along = left.T @ (data if cells is None else cells.T @ data)
         smoothing = _restricted_likelihood(values, along, float(data @ data), y.size)
+        filters = values / (values**2 + smoothing)
         # The data, by the rows of the reduced design, to the coefficients.
-        back = solve_triangular(self.root, (right.T * (values / (values**2 + smoothing))) @ left.T)
+        back = solve_triangular(self.root, (right.T * filters) @ left.T)
         predicted = self.points @ (self.free @ (back @ (left @ along)))
-        kept = values**2 / (values**2 + smoothing)
+        kept = values * filters
         if cells is None:
             gain = VoltageMap(((back * root, None),))
             return _FittedSpline(gain, predicted, 1 - (left**2 @ kept))
         gain = VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),))
         return _FittedSpline(gain, predicted, 1 - _leverage(cells, (left * kept) @ left.T))
-
-    def _reduced(self, root: FloatArray) -> tuple[csr_array | None, FloatArray]:
-        """Columns Q (n, r), orthonormal, and R (r, b) of the weighted B-splines: Q R."""
-        # Between two knots few splines differ from zero: each interval has few rows in R.
-        weighted = self.points.multiply(root[:, None]).tocsr()
-        if root.size <= DENSE:
-            return None, weighted.toarray()
-        return _by_intervals(weighted, self.interval)
 
 
 def _by_intervals(weighted: csr_array, interval: NDArray[np.intp]) -> tuple[csr_array, FloatArray]:
@@ -258,7 +249,7 @@ def _by_intervals(weighted: csr_array, interval: NDArray[np.intp]) -> tuple[csr_
         parts.append((q.ravel(), np.repeat(rows, len(r)), places.ravel()))
         width = width + len(r)
         first = end
-    data, where, places = (np.concatenate(values) for values in zip(*parts, strict=True))
+    data, where, places = map(np.concatenate, zip(*parts, strict=True))
     orthonormal = csr_array((data, (where, places)), shape=(interval.size, width))
     return orthonormal, np.vstack(roots)
 
@@ -276,8 +267,8 @@ def _leverage(cells: csr_array, hat: FloatArray) -> FloatArray:
         for start in range(0, rows.size, BLOCK):
             block = slice(start, start + BLOCK)
             at = places[block]
-            square = hat[at[:, :, None], at[:, None, :]]
-            leverage[rows[block]] = np.einsum("ij,ijk,ik->i", values[block], square, values[block])
+            part = hat[at[:, :, None], at[:, None, :]]
+            leverage[rows[block]] = np.einsum("ij,ijk,ik->i", values[block], part, values[block])
     return leverage
 
 
@@ -285,23 +276,23 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
     """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
     # ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
     # the voltages along their vectors; ``total``: sum of the squares of all ``count``.
-    squares = values**2 / values[0] ** 2
+    relative = values**2 / values[0] ** 2
     power = data**2
 
     def ratios(logarithms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        ratio = squares / np.exp(logarithms)[:, None]
+        ratio = relative / np.exp(logarithms)[:, None]
         kept = ratio / (1 + ratio)
         return ratio, kept, np.maximum(total - kept @ power, _LEAST * total)
 
     grid = np.arange(-80.0, 11.0, 1.0)
-    ratio, kept, misfit = ratios(grid)
-    best = grid[int(np.argmin(count * np.log(misfit) + np.log1p(ratio).sum(axis=1)))]
+    ratio, _, misfit = ratios(grid)
+    best = grid[np.argmin(count * np.log(misfit) + np.log1p(ratio).sum(axis=1))]
     # There the loss's slope crosses zero upwards: between which of ten places, again and again.
     places = np.linspace(best - 1.0, best + 1.0, 10)
     for _ in range(_SECTIONS):
         ratio, kept, misfit = ratios(places)
         slope = count * ((kept / (1 + ratio)) @ power) / misfit - kept.sum(axis=1)
-        first = int(np.argmax(np.append(slope[1:-1] > 0, True)))
+        first = np.argmax(np.append(slope[1:-1] > 0, True))
         places = np.linspace(places[first], places[first + 1], 10)
     return float(values[0] ** 2 * np.exp(places.mean()))
 
@@ -317,17 +308,16 @@ def _layout(
 ) -> tuple[Splines, int, FloatArray, FloatArray, FloatArray]:
     """Splines by radii and derivative, their intervals; free ones, root and transforms of these."""
     # ``arrays``: the reference's wavenumbers with their weights, and its values.
-    k, of_k, per_newton = map(np.frombuffer, arrays)
-    reference = RadialSpectrum(Wavenumbers(k, of_k), per_newton, order)
+    k, measure, per_newton = map(np.frombuffer, arrays)
+    reference = RadialSpectrum(Wavenumbers(k, measure), per_newton, order)
     finest = min(_PER_STEP / step, _PER_RADIAN * k[-1])
     intervals = int(np.clip(np.ceil(finest * reach), _DEGREE, _MOST_INTERVALS))
     knots = np.linspace(0.0, reach, intervals + 1)
     basis = _even_splines(knots)
     nodes, weights = gauss_between(knots, _NODES)
-    stress = reference.at(np.append(nodes, [0.0, reach]))
-    peak = stress[-2]
-    end = stress[-1]
-    slope = -float((of_k * k * per_newton) @ j1(k * reach))
+    stress = reference.at(nodes)
+    peak, end = reference.at(np.array([0.0, reach]))
+    slope = -(measure * k * per_newton) @ j1(k * reach)
     # At R a spline has the logarithmic slope of the tail, which goes on from there.
     ending = basis(np.array([reach]), 0).toarray()
     tied = step * (end * basis(np.array([reach]), 1).toarray() - slope * ending)
@@ -335,7 +325,7 @@ def _layout(
     free = np.eye(tied.size) if source else np.linalg.svd(tied)[2][1:].T
     curved = basis(nodes, _ORDER).toarray() * step**_ORDER
     values = basis(nodes, 0).toarray()
-    rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
+    rho = 1 / (np.abs(stress) / peak + _FLOOR) ** 2
     # What no penalty holds, a parabola, is held by next to nothing.
     rows = np.vstack([curved, _NEXT_TO_NOTHING * values]) @ free
     rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
@@ -344,7 +334,7 @@ def _layout(
     bessel *= weights
     transform = bessel @ values @ free
     if not source:
-        transform += np.outer((per_newton - bessel @ stress[:-2]) / end, ending @ free)
+        transform += np.outer((per_newton - bessel @ stress) / end, ending @ free)
     return basis, intervals, free, np.linalg.qr(rows)[1], transform
 
 
