@@ -29,7 +29,7 @@ PUBLIC = {
     "formats.stress": ["read_stress"],
     "formats.tables.scan": ["ImportedScan", "import_table"],
     "formats.tables.stated": ["ScanConditions", "ScanUncertainties", "TableLayout"],
-    "friction.compare": ["compare", "compare_shear"],
+    "friction.compare": ["compare"],
     "friction.results": [
         "BoundedEstimate",
         "DryAgainstLubricated",
@@ -40,7 +40,6 @@ PUBLIC = {
         "Interval",
         "LawComparison",
         "LoadComparison",
-        "ShearComparison",
     ],
     "measurement.measure_stress": ["measure_stress"],
     "measurement.restoration": ["Restoration", "StressComparison"],

@@ -44,7 +44,6 @@ from .formats.tables.stated import ScanConditions as ScanConditions
 from .formats.tables.stated import ScanUncertainties as ScanUncertainties
 from .formats.tables.stated import TableLayout as TableLayout
 from .friction.compare import compare as compare
-from .friction.compare import compare_shear as compare_shear
 from .friction.results import BoundedEstimate as BoundedEstimate
 from .friction.results import DryAgainstLubricated as DryAgainstLubricated
 from .friction.results import FrictionComparison as FrictionComparison
@@ -54,7 +53,6 @@ from .friction.results import InterfaceLaw as InterfaceLaw
 from .friction.results import Interval as Interval
 from .friction.results import LawComparison as LawComparison
 from .friction.results import LoadComparison as LoadComparison
-from .friction.results import ShearComparison as ShearComparison
 from .measurement.measure_stress import measure_stress as measure_stress
 from .measurement.restoration import Restoration as Restoration
 from .measurement.restoration import StressComparison as StressComparison

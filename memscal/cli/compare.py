@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 from memscal.cli import output as out
-from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, Quantity, accept_altered_option, option, report_options
 from memscal.formats.files import together
 
@@ -130,18 +129,23 @@ def command(
     """
     _check_usage(options, scans)
     cache = cache_from(options["cache"], options["no_cache"])
-    if options["channel"] != "zz":
-        return _of_shear(artifact, scans[0], cache, options, as_json=as_json, force=force)
 
     from memscal.apparatus import load_apparatus
     from memscal.cli.failures import exit_code_of
+    from memscal.errors import InputError
     from memscal.formats.opened import opened_contacts
     from memscal.formats.reference import read_reference
     from memscal.friction.compare import compare, scans_of
     from memscal.summaries.comparison import file_json, notes
 
     accepted = {"accept_altered": options["accept_altered"]}
+    channel = options["channel"]
     apparatus = load_apparatus(artifact, **accepted)
+    given = apparatus.sensor.channel
+    if given != channel and (apparatus.order or channel != "zz"):
+        problem = f"The artifact {artifact} is of channel {given}, not of {channel}."
+        cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
+        raise InputError(problem, cure=cure)
     data = opened_contacts(scans, **accepted)
     references = [read_reference(path, **accepted) for path in options["references"]]
     single = options["single"]
@@ -188,11 +192,10 @@ def command(
     with together(folder):
         out.write_files(ready, force=force)
         if as_json:
-            files = {
-                "artifact": file_json(apparatus.source),
-                "references": [file_json(profile.source) for profile in references],
-                "figures": [str(path) for path in figures],
-            }
+            files: dict[str, Any] = {"artifact": file_json(apparatus.source)}
+            if channel == "zz":
+                files["references"] = [file_json(profile.source) for profile in references]
+                files["figures"] = [str(path) for path in figures]
             out.emit_json(comparison.to_dict() | files)
         else:
             out.emit_result(comparison, brief=options["brief"])
@@ -200,54 +203,6 @@ def command(
     for path in ready:
         out.message(f"Written: {path}")
     return exit_code_of(comparison.checks)
-
-
-def _of_shear(
-    artifact: Path,
-    stress: Path,
-    cache: Path | None,
-    options: Mapping[str, Any],
-    *,
-    as_json: bool,
-    force: bool,
-) -> int:
-    """Compare the points of a tangential channel in a file of measured stress."""
-    from memscal.apparatus import load_apparatus
-    from memscal.errors import InputError
-    from memscal.friction.compare import compare_shear
-    from memscal.summaries.comparison import file_json
-
-    accepted = {"accept_altered": options["accept_altered"]}
-    channel = options["channel"]
-    apparatus = load_apparatus(artifact, **accepted)
-    if (of_artifact := apparatus.sensor.channel) != channel:
-        problem = f"The artifact {artifact} is of channel {of_artifact}, not of {channel}."
-        cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
-        raise InputError(problem, cure=cure)
-    report: Path | None = options["report"]
-    out.prove_writable([report], force=force, inputs=[artifact, stress])
-    settings = {"friction": _frictions(options), "loading": options["loadings"]}
-    with out.working("Comparing with calculated contacts"):
-        comparison = compare_shear(
-            stress,
-            apparatus,
-            override=options["override"],
-            **accepted,
-            cache=cache,
-            workers=min(2, os.cpu_count() or 1),
-            **{name: value for name, value in settings.items() if value},
-        )
-    page = out.reported(comparison, report)
-    with together():
-        out.write_files(page, force=force)
-        if as_json:
-            out.emit_json(comparison.to_dict() | {"artifact": file_json(apparatus.source)})
-        else:
-            out.emit_result(comparison, brief=options["brief"])
-    out.show_messages(comparison.messages)
-    for path in page:
-        out.message(f"Written: {path}")
-    return DONE
 
 
 def _frictions(options: Mapping[str, Any]) -> list[float] | None:

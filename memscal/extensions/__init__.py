@@ -53,7 +53,6 @@ VIEWS = {
     "Holds": ("", "figures.holds.holds_figure"),
     "MeasuredStress": ("summaries.stress", "figures.stress.measured_stress_figure"),
     "Restoration": ("summaries.restoration", "figures.stress.restoration_figure"),
-    "ShearComparison": ("summaries.comparison", ""),
     "Design": ("extensions.planning.summary", "extensions.planning.figure.design_figure"),
     "FleetCalibration": ("extensions.fleet.calibration_summary", ""),
     "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),

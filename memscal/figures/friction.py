@@ -214,6 +214,8 @@ def comparison_figure(
             problem = f"The comparison has no figure {name!r}."
             raise InputError(problem, cure=f"Choose from {', '.join(figures)}.")
         return figures[name]()
+    if comparison.by_shear:
+        raise InputError("There is no figure of a comparison by the shear alone.")
     loads = profiles.chosen(comparison, loading, lubrication)
     with panels_of(5.6, 2, 2, note=_BOTH_NOTE) as (figure, panels):
         profiles.draw_profiles(panels[0, 0], comparison, loads)
@@ -231,6 +233,8 @@ def comparison_figure(
 def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[[], Figure]]:
     """Return what draws each figure of a comparison when called, by the stem of its file's name."""
     figures: dict[str, Callable[[], Figure]] = {}
+    if comparison.by_shear:
+        return figures
     measured = (profile.lubrication for profile in comparison.measured.profiles)
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""

@@ -18,7 +18,7 @@ from memscal.extensions import VIEWS, module
 from memscal.figures.calibration import values_text
 from memscal.figures.friction import comparison_figures
 from memscal.figures.style import render_figure
-from memscal.friction.results import FrictionComparison, ShearComparison, joint_text
+from memscal.friction.results import FrictionComparison, joint_text
 from memscal.measurement.restoration import Restoration
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData
@@ -261,28 +261,22 @@ _COMPARED = {
 }
 
 
-@report_of.register(ShearComparison)
-@report_of.register(FrictionComparison)
-def _of_comparison(compared: FrictionComparison | ShearComparison) -> Report:
+@report_of.register
+def _of_comparison(compared: FrictionComparison) -> Report:
     measured = compared.measured
     pictures = []
-    checks: Sequence[QualityCheck] = ()
-    messages = compared.messages
     joint = joint_text(compared.joint)
-    if isinstance(compared, FrictionComparison):
-        checks = compared.checks
-        messages = tuple(comparisons.notes(compared))
-        for stem, draw in comparison_figures(compared).items():
-            for name in (name for name in _COMPARED if stem.startswith(name)):
-                caption = _COMPARED[name].format(stem.removeprefix(name).replace("-", ", "))
-                alt = f"{caption.partition('.')[0]}. All loads together: {joint}."
-                pictures.append(Picture(draw, alt, caption))
+    for stem, draw in comparison_figures(compared).items():
+        for name in (name for name in _COMPARED if stem.startswith(name)):
+            caption = _COMPARED[name].format(stem.removeprefix(name).replace("-", ", "))
+            alt = f"{caption.partition('.')[0]}. All loads together: {joint}."
+            pictures.append(Picture(draw, alt, caption))
     return Report(
         title=f"Friction of {_contact_words(measured.scans[0])}",
         leading=1 + len(compared.loadings),
         pictures=pictures,
-        checks=checks,
-        messages=messages,
+        checks=compared.checks,
+        messages=tuple(comparisons.notes(compared)),
         **_of_measurement(measured),
     )
 

@@ -8,7 +8,7 @@ from memscal.errors import InputError
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import scan_from
-from memscal.formats.stress import read_stress, stress_from
+from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
@@ -38,20 +38,6 @@ def opened_scans(
     opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
     _require_different(opened)
     return tuple(opened)
-
-
-def opened_stress(
-    measured: MeasuredStress | Path, *, accept_altered: bool = False
-) -> MeasuredStress:
-    """Return measured stress that is given itself or as a path."""
-    if isinstance(measured, str | PathLike):
-        return read_stress(measured, accept_altered=accept_altered)
-    if not isinstance(measured, MeasuredStress):
-        raise InputError(
-            f"There is a {type(measured).__name__} where measured stress is needed.",
-            cure="Give what measure_stress returns, or the path of its file.",
-        )
-    return measured
 
 
 def opened_contacts(

@@ -30,94 +30,82 @@ _PATHS = 256
 _NEGLIGIBLE = 1e-2
 
 
-class Tables(NamedTuple):
-    """Statistics of J groups at M values of a parameter, their own nuisances integrated."""
+class Statistics(NamedTuple):
+    """What readings tell at values of a parameter, their own nuisances integrated; any shape."""
 
-    squares: FloatArray  # (M, J): rho^T Q rho
-    pulls: FloatArray  # (M, J, q): D^T Q rho
-    grips: FloatArray  # (M, J, q, q): D^T Q D
-    volumes: FloatArray  # (M, J): ln det N + ln det F^T N^-1 F
-
-    def together(self) -> Tables:
-        """Return the groups as one, of shape (M, 1): one parameter for all of them."""
-        return Tables(*(np.sum(array, axis=1, keepdims=True) for array in self))
-
-    def only(self, chosen: Sequence[int]) -> Tables:
-        """Return some of the groups."""
-        return Tables(*(array[:, list(chosen)] for array in self))
-
-    def group(self, index: int | Sequence[int]) -> Tables:
-        """Return some of the groups, as one."""
-        return self.only(np.atleast_1d(index).tolist()).together()
+    chi_square: FloatArray  # rho^T Q rho: without systematic errors
+    projection: FloatArray  # (..., q): D^T Q rho
+    information: FloatArray  # (..., q, q): D^T Q D
+    log_determinant: FloatArray  # ln det N + ln det F^T N^-1 F
 
 
-def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
-    """Return the logarithm of the likelihood, and chi-square, of each entry of tables."""
-    squares = tables.squares
-    q = tables.pulls.shape[-1]
+def added(several: Sequence[Statistics]) -> Statistics:
+    """Return the statistics of several groups of readings together."""
+    return Statistics(*(sum(arrays) for arrays in zip(*several, strict=True)))
+
+
+def log_likelihood(statistics: Statistics) -> tuple[FloatArray, FloatArray]:
+    """Return the logarithm of the likelihood, and chi-square, at each value."""
+    q = statistics.projection.shape[-1]
     # One factorisation gives both: the last pivot of M bordered by g is chi-square (plus one, so
     # that data without any misfit do not make it singular).
-    bordered = np.empty((*squares.shape, q + 1, q + 1))
-    bordered[..., :q, :q] = tables.grips + np.eye(q)
-    bordered[..., q, :q] = bordered[..., :q, q] = tables.pulls
-    bordered[..., q, q] = squares + 1
+    bordered = np.empty((*statistics.chi_square.shape, q + 1, q + 1))
+    bordered[..., :q, :q] = statistics.information + np.eye(q)
+    bordered[..., q, :q] = statistics.projection
+    bordered[..., q, q] = statistics.chi_square + 1
+    # Only the lower triangle is read.
     pivots = np.einsum("...ii->...i", np.linalg.cholesky(bordered))
     chi_square = np.maximum(pivots[..., q] ** 2 - 1, 0.0)
-    volume = 2 * np.log(pivots[..., :q]).sum(axis=-1) + tables.volumes
-    return -(chi_square + volume) / 2, chi_square
-
-
-def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> float:
-    """Return the logarithm of the evidence of a law with one parameter; ``weights`` (M,): prior."""
-    return float(logsumexp(log_likelihoods, b=weights))
+    log_determinant = 2 * np.log(pivots[..., :q]).sum(axis=-1) + statistics.log_determinant
+    return -(chi_square + log_determinant) / 2, chi_square
 
 
 def evidence_of_each(
-    tables: Sequence[Tables], weights: Sequence[FloatArray]
+    loads: Sequence[Statistics], weights: Sequence[FloatArray]
 ) -> tuple[float, float]:
     """Return the log evidence of a law with one parameter of each load, and its error."""
     # The parameter of each load is drawn (by a Sobol sequence) given those before; the evidence is
     # the mean over the draws of the product of what each load was expected to be.
     from scipy.stats.qmc import Sobol
 
-    tables = _compressed(tables)
-    steps = len(tables) - 1
-    # Without scrambling the first point is 0: it is moved into the middle of its cell.
-    draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS if steps else None
+    loads = _compressed(loads)
+    steps = len(loads) - 1
     paths = _PATHS if steps else 1
-    taken = Tables(*(np.zeros((paths, *array.shape[2:])) for array in tables[0]))
+    if steps:
+        # Without scrambling the first point is 0: it is moved into the middle of its cell.
+        draws = Sobol(steps, scramble=False).random(paths) + 0.5 / paths
+    drawn = Statistics(*(np.zeros((paths, *array.shape[1:])) for array in loads[0]))
     logs = np.zeros(paths)
     before = np.zeros(paths)
-    for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
-        both = Tables(
-            *(old[:, None] + new[None, :, 0] for old, new in zip(taken, table, strict=True))
-        )
+    for step, (load, weight) in enumerate(zip(loads, weights, strict=True)):
+        pairs = zip(drawn, load, strict=True)
+        both = Statistics(*(known[:, None] + new for known, new in pairs))
         with np.errstate(divide="ignore"):
             joint = log_likelihood(both)[0] + np.log(weight)
         expected = np.asarray(logsumexp(joint, axis=-1))
         logs += expected - before
-        if draws is None or step == steps:
-            continue
+        if step == steps:
+            break
         cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
-        drawn = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
-        drawn = np.minimum(drawn, weight.size - 1)
-        taken = Tables(*(array[np.arange(paths), drawn] for array in both))
-        before = log_likelihood(taken)[0]
+        nodes = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
+        nodes = np.minimum(nodes, weight.size - 1)
+        drawn = Statistics(*(array[np.arange(paths), nodes] for array in both))
+        before = log_likelihood(drawn)[0]
     mean = float(logsumexp(logs)) - math.log(paths)
     return mean, float(np.std(np.exp(logs - mean)) / np.sqrt(paths))
 
 
-def _compressed(tables: Sequence[Tables]) -> list[Tables]:
+def _compressed(loads: Sequence[Statistics]) -> list[Statistics]:
     """Keep the systematic directions that move any datum: the work goes with their cube."""
-    largest = np.sum([np.mean(table.grips[:, 0], axis=0) for table in tables], axis=0)
+    largest = np.sum([np.mean(load.information, axis=0) for load in loads], axis=0)
     values, vectors = np.linalg.eigh(largest)
     basis = vectors[:, values > _NEGLIGIBLE**2]
     return [
-        table._replace(
-            pulls=table.pulls @ basis,
-            grips=np.einsum("qa,mjqp,pb->mjab", basis, table.grips, basis, optimize=True),
+        load._replace(
+            projection=load.projection @ basis,
+            information=basis.T @ load.information @ basis,
         )
-        for table in tables
+        for load in loads
     ]
 
 

@@ -18,6 +18,13 @@ from memscal.model.result import Result
 
 _UM = 1e-6
 
+VALUE = "value"
+INTERVAL = "interval"
+LOWER_BOUND = "lower bound"
+UPPER_BOUND = "upper bound"
+UNKNOWN = "unknown"
+"""What data tell about a parameter; an interval is that of a parameter without a best value."""
+
 
 def percent(share: float) -> str:
     """Return a share in percent, with the space of ISO 80000: ``95 %``."""
@@ -99,26 +106,32 @@ class BoundedEstimate:
         """Value of the largest likelihood, ``inf`` included: to draw, not to report."""
         return float(self.values[np.argmin(self.deviance)]) if self.value is None else self.value
 
+    @property
+    def kind(self) -> str:
+        """What the data tell: value, interval without a value, lower or upper bound, or unknown."""
+        if self.interval.high is None:
+            return LOWER_BOUND if self.interval.low > 0 else UNKNOWN
+        if self.interval.low <= 0 and (self.value is None or self.value <= 0):
+            return UPPER_BOUND
+        return INTERVAL if self.value is None else VALUE
+
     def __str__(self) -> str:
         """Return the value with its interval, or the bound that is left of it."""
-        scale, tail = (_UM, " um") if self.unit else (1.0, "")
+        kind = self.kind
+        if kind == UNKNOWN:
+            return "not identifiable"
+        scale = _UM if self.unit else 1.0
+        tail = " um" if self.unit else ""
         low = self.interval.low / scale
-        level = percent(self.interval.level)
-        value = None if self.value is None else self.value / scale
-        if self.interval.high is None:
-            if low <= 0:
-                return "not identifiable"
-            bound = format_bound(low, upper=False)
-            if value is None:
-                return f"above {bound}{tail} ({level})"
-            return f"{value:.2g} [{bound}, ∞]{tail}"
-        high = self.interval.high / scale
-        if low <= 0 and (value is None or value <= 0):
-            return f"below {format_bound(high, upper=True)}{tail} ({level})"
-        if value is None:
-            ends = f"{format_bound(low, upper=False)}, {format_bound(high, upper=True)}"
-            return f"[{ends}]{tail} ({level})"
-        return f"{_rounded(value, low, high)}{tail}"
+        high = self.interval.upper / scale
+        if kind == VALUE and self.value is not None:
+            return _rounded(self.value / scale, low, high) + tail
+        tail += f" ({percent(self.interval.level)})"
+        lower = format_bound(low, upper=False)
+        if kind == LOWER_BOUND:
+            return f"above {lower}{tail}"
+        upper = format_bound(high, upper=True)
+        return f"below {upper}{tail}" if kind == UPPER_BOUND else f"[{lower}, {upper}]{tail}"
 
     def __repr__(self) -> str:
         """Return the text in place of the likelihood's arrays."""
@@ -215,7 +228,8 @@ class FrictionComparison(Result, Checked):
 
     ``joint``, of all loads together, is by normal stress and shear together where ``shear``, the
     apparatus function of a tangential channel, was given; all else is by the normal stress.
-    Printed, it is the tables of ``memscal compare``.
+    Of a tangential channel alone ``loads`` is empty; ``by_shear`` holds the coefficient of each
+    load by the loading in its place.  Printed, it is the tables of ``memscal compare``.
     """
 
     measured: MeasuredStress
@@ -228,6 +242,7 @@ class FrictionComparison(Result, Checked):
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = field(default=())
     shear: ApparatusFunction | None = None
+    by_shear: Mapping[str, tuple[BoundedEstimate, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
@@ -236,28 +251,7 @@ class FrictionComparison(Result, Checked):
     @property
     def loadings(self) -> tuple[str, ...]:
         """Definitions of the loading that were compared."""
-        return tuple(self.loads)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ShearComparison(Result):
-    """The friction that explains the shear at the base of a film."""
-
-    measured: MeasuredStress
-    apparatus: ApparatusFunction
-    friction: FloatArray
-    loads: Mapping[str, tuple[BoundedEstimate, ...]]
-    joint: Mapping[str, Mapping[str, BoundedEstimate]]
-    messages: tuple[Message, ...]
-
-    def __repr__(self) -> str:
-        """Return the coefficients of all loads together."""
-        return f"<ShearComparison: {joint_text(self.joint)}>"
-
-    @property
-    def loadings(self) -> tuple[str, ...]:
-        """Definitions of the loading that were compared."""
-        return tuple(self.loads)
+        return tuple(self.loads or self.by_shear)
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,8 @@ def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: boo
             f"The artifact is of the tangential channel {apparatus.sensor.channel}, but "
             f"{file_in_words(scan.source, 'scan')} is to be read as normal stress.",
             why="A shear is no normal stress: this cannot be overridden.",
-            cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
+            cure="Give the artifact of channel zz; memscal.compare() reads the shear of measured "
+            "stress.",
         )
     return accept_other_sensor(scan, apparatus, ("name", "channel"), override=override)
 

@@ -1,7 +1,7 @@
 """Comparisons of measured with calculated stress, as tables, JSON, data frames and notes."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -10,10 +10,14 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import (
+    INTERVAL,
+    LOWER_BOUND,
+    UNKNOWN,
+    UPPER_BOUND,
+    VALUE,
     BoundedEstimate,
     FrictionComparison,
     LoadComparison,
-    ShearComparison,
     percent,
 )
 from memscal.model import records
@@ -35,65 +39,56 @@ from memscal.summaries.table import (
 )
 
 
-def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
+def mapping(comparison: FrictionComparison) -> dict[str, Any]:
     """Return what ``compare --json`` prints but for the files that it was given and wrote."""
-    scans = [
+    tested = comparison.measured.noise_stated
+    whole: dict[str, Any] = {"schema_version": "1"}
+    whole["scans"] = [
         file_json(scan.source) | {"lubrication": scan.lubrication}
         for scan in comparison.measured.scans
     ]
-    head = {"schema_version": "1", "scans": scans}
-    tested = comparison.measured.noise_stated
-    joint = [
+    loads = range(len(comparison.measured.profiles))
+    whole["loads"] = [_load(comparison, i) for i in loads]
+    whole["joint"] = [
         {"lubrication": lubrication, "loading": loading, **_estimate(estimate, tested)}
         for lubrication, loading, estimate in _joint(comparison)
     ]
-    if isinstance(comparison, ShearComparison):
-        loads = [
-            {
-                "lubrication": profile.lubrication,
-                **members(records.STRESS_NUMBERS.quantities[:1], profile),
-                "by_loading": {
-                    loading or "given": _estimate(estimates[i], tested)
-                    for loading, estimates in comparison.loads.items()
-                },
-            }
-            for i, profile in enumerate(comparison.measured.profiles)
-        ]
-        return {**head, "loads": loads, "joint": joint, "warnings": texts_of(comparison.messages)}
-    laws = comparison.interface
-    sliding = comparison.macroscopic
-    first = comparison.loads[comparison.loadings[0]]
-    return {
-        **head,
-        "loads": [_load(i, comparison, load) for i, load in enumerate(first)],
-        "joint": joint,
-        **({"shear": file_json(comparison.shear.source)} if comparison.shear else {}),
-        "dry_against_lubricated": [
+    if not comparison.by_shear:
+        if comparison.shear is not None:
+            whole["shear"] = file_json(comparison.shear.source)
+        whole["dry_against_lubricated"] = [
             members(records.DRY_AGAINST_LUBRICATED, pair)
             for pair in comparison.dry_against_lubricated
-        ],
-        "interface": None if laws is None else laws.to_dict(),
-        "macroscopic": None if sliding is None else _sliding(*sliding),
-        "checks": checks_json(comparison.checks),
-        "overridden": list(comparison.measured.overridden),
-        "warnings": texts_of(comparison.messages),
-    }
+        ]
+        laws = comparison.interface
+        whole["interface"] = None if laws is None else laws.to_dict()
+        whole["macroscopic"] = None
+        if comparison.macroscopic is not None:
+            value, u = comparison.macroscopic
+            sliding = {"friction": value, "friction_uncertainty": u}
+            quantities = measured(records.FRICTION)
+            whole["macroscopic"] = members(quantities, None, **sliding)[records.FRICTION.name]
+        whole["checks"] = checks_json(comparison.checks)
+        whole["overridden"] = list(comparison.measured.overridden)
+    whole["warnings"] = texts_of(comparison.messages)
+    return whole
 
 
-def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
+def frame(comparison: FrictionComparison) -> DataFrame:
     """Return one row for each load and definition of the loading; open ends are infinite."""
     import pandas as pd
 
     rows = []
     tested = comparison.measured.noise_stated
     for loading in comparison.loadings:
-        loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
-        for profile, load in zip(comparison.measured.profiles, loads, strict=True):
+        for i, profile in enumerate(comparison.measured.profiles):
             row: dict[str, Any] = {"loading": loading, **columns(records.COMPARED_LOAD, profile)}
-            if isinstance(load, BoundedEstimate):
-                row |= _columns("friction", load, tested)
+            if comparison.by_shear:
+                row |= _columns("friction", comparison.by_shear[loading][i], tested)
             else:
-                row |= columns(records.COMPARED_MAXIMA, load) | {"bracketed": load.bracketed}
+                load = comparison.loads[loading][i]
+                row |= columns(records.COMPARED_MAXIMA, load)
+                row["bracketed"] = load.bracketed
                 row |= _columns("friction by maximum", load.by_maximum, tested)
                 row |= _columns("friction by profile", load.by_profile, tested)
             rows.append(row)
@@ -118,38 +113,39 @@ def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, fl
 _OF_ONE_SCAN = {"noise", "load_scatter", "position"}
 
 
-def correlated(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
+def correlated(comparison: FrictionComparison) -> dict[str, Any]:
     """Return the coefficients of all loads that have a standard uncertainty, by their names."""
     # Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
     # is common to them; each source moves all coefficients to the same side.
-    joint = [entry for entry in _joint(comparison) if entry[2].standard_uncertainty is not None]
-    if not joint:
+    names = []
+    values = []
+    uncertainties = []
+    budgets = []
+    for lubrication, loading, estimate in _joint(comparison):
+        if estimate.standard_uncertainty is not None:
+            names.append(f"friction_{lubrication or 'unstated'}_{loading or 'given'}")
+            values.append(estimate.best)
+            uncertainties.append(estimate.standard_uncertainty)
+            budget = {}
+            for source, u in estimate.budget.items():
+                budget[source, lubrication if source in _OF_ONE_SCAN else ""] = u
+            budgets.append(budget)
+    if not names:
         problem = "No friction coefficient of all loads has a standard uncertainty."
         why = "; ".join(estimate.reason for *_, estimate in _joint(comparison))
         cure = "Use summary() or to_dict(), which give its bounds."
         raise InputError(problem, why=why, cure=cure)
-    budgets = [
-        {(name, lubrication if name in _OF_ONE_SCAN else ""): u for name, u in of.budget.items()}
-        for lubrication, _, of in joint
-    ]
-    sources = {source for budget in budgets for source in budget}
+    sources = set().union(*budgets)
     shares = np.array([[budget.get(source, 0.0) for source in sources] for budget in budgets])
     # The budget is linear; the standard uncertainty is that of the likelihood.
     shares /= np.maximum(np.linalg.norm(shares, axis=1, keepdims=True), np.finfo(float).tiny)
-    spread = np.array([estimate.standard_uncertainty for *_, estimate in joint], dtype=np.float64)
-    names = [
-        "_".join(("friction", lubrication or "unstated", loading or "given"))
-        for lubrication, loading, _ in joint
-    ]
-    values = [estimate.best for *_, estimate in joint]
     correlation = shares @ shares.T
     np.fill_diagonal(correlation, 1.0)
-    return correlated_numbers(names, values, correlation * np.outer(spread, spread))
+    covariance = correlation * np.outer(uncertainties, uncertainties)
+    return correlated_numbers(names, values, covariance)
 
 
-def _joint(
-    comparison: FrictionComparison | ShearComparison,
-) -> Iterator[tuple[str, str, BoundedEstimate]]:
+def _joint(comparison: FrictionComparison) -> Iterator[tuple[str, str, BoundedEstimate]]:
     """Return lubrication, loading and coefficient of all loads together."""
     for lubrication, by_loading in comparison.joint.items():
         for loading, estimate in by_loading.items():
@@ -161,17 +157,22 @@ def file_json(source: SourceFile | None) -> dict[str, Any]:
     return {name: getattr(source, name, None) for name in ("file_name", "sha256")}
 
 
-def _sliding(value: float, uncertainty: float | None) -> dict[str, Any]:
-    values = {"friction": value, "friction_uncertainty": uncertainty}
-    [member] = members(measured(records.FRICTION), None, **values).values()
-    return dict(member)
-
-
-def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
+def _load(comparison: FrictionComparison, index: int) -> dict[str, Any]:
+    """Return what is compared of one load, by the loading."""
+    tested = comparison.measured.noise_stated
+    profile = comparison.measured.profiles[index]
+    if comparison.by_shear:
+        by_loading = {
+            loading or "given": _estimate(loads[index], tested)
+            for loading, loads in comparison.by_shear.items()
+        }
+        held = members(records.STRESS_NUMBERS.quantities[:1], profile)
+        return {"lubrication": profile.lubrication, **held, "by_loading": by_loading}
+    first = comparison.loads[comparison.loadings[0]][index]
     return {
-        "scan": getattr(load.profile.scan.source, "file_name", None),
-        **members(records.COMPARED_LOAD, load.profile),
-        **members(records.COMPARED_MAXIMA, load),
+        "scan": getattr(profile.scan.source, "file_name", None),
+        **members(records.COMPARED_LOAD, profile),
+        **members(records.COMPARED_MAXIMA, first),
         "by_loading": {
             loading or "given": _by_loading(comparison, loads[index])
             for loading, loads in comparison.loads.items()
@@ -180,22 +181,26 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
-    names = [quantity.name for quantity in records.CALCULATED]
-    mu = comparison.friction
-    sticking = np.isinf(comparison.friction).tolist()
+    tested = comparison.measured.noise_stated
+    profiles = []
+    for i, mu in enumerate(comparison.friction):
+        calculated = {
+            "friction": mu,
+            "sticking": bool(np.isinf(mu)),
+            "p_max": load.p_max[i],
+            "chi_square": load.chi_square[i],
+            "p_value": load.p_values[i],
+            "deviance": load.deviance[i],
+        }
+        profiles.append(members(records.CALCULATED, None, **calculated))
     return {
         "effective_friction_coefficient": {
-            "by_maximum": _estimate(load.by_maximum, comparison.measured.noise_stated),
-            "by_profile": _estimate(load.by_profile, comparison.measured.noise_stated),
+            "by_maximum": _estimate(load.by_maximum, tested),
+            "by_profile": _estimate(load.by_profile, tested),
         },
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
-        "profiles": [
-            members(records.CALCULATED, None, **dict(zip(names, row, strict=True)))
-            for row in zip(
-                mu, sticking, load.p_max, load.chi_square, load.p_values, load.deviance, strict=True
-            )
-        ],
+        "profiles": profiles,
     }
 
 
@@ -223,16 +228,16 @@ _FAR = 0.26
 
 def notes(comparison: FrictionComparison) -> Iterator[Message]:
     """Return what a user should know, each thing once."""
-    laws = comparison.interface
-    of_laws = () if laws is None else laws.messages
-    texts = (
-        f"{_which(lubrication, loading)}, all loads: {joint.reason}"
-        for lubrication, loading, joint in _joint(comparison)
-        if joint.reason
-    )
-    missing = (Message("no_value", text[:1].upper() + text[1:]) for text in texts)
-    about = (*comparison.messages, *missing, *_about_profiles(comparison), *of_laws)
-    yield from dict.fromkeys(about)
+    messages = list(comparison.messages)
+    if not comparison.by_shear:
+        for lubrication, loading, estimate in _joint(comparison):
+            if estimate.reason:
+                text = f"{_which(lubrication, loading)}, all loads: {estimate.reason}"
+                messages.append(Message("no_value", text[:1].upper() + text[1:]))
+        messages += _about_profiles(comparison)
+        if comparison.interface is not None:
+            messages += comparison.interface.messages
+    yield from dict.fromkeys(messages)
 
 
 def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
@@ -255,28 +260,40 @@ def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
 
 
 def _which(lubrication: str, loading: str) -> str:
-    words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
-    return ", ".join(word for word in words if word)
+    words = lubrication or "lubrication not stated"
+    return f"{words}, {loading} loading" if loading else words
 
 
-def answer(comparison: FrictionComparison | ShearComparison) -> str:
+#: How the symbol of the coefficient is joined to its estimate, by the estimate's kind.
+_EQUALS = {VALUE: " =", INTERVAL: " in", UNKNOWN: " is", LOWER_BOUND: "", UPPER_BOUND: ""}
+
+
+def answer(comparison: FrictionComparison) -> str:
     """Return the coefficients of all loads with their intervals, and how the checks stand."""
-    held = any(joint.beside for *_, joint in _joint(comparison))
+    held = any(estimate.beside for *_, estimate in _joint(comparison))
     lines = []
     for lubrication, by_loading in comparison.joint.items():
-        ways: dict[str, str] = {}
-        for loading, joint in by_loading.items():
-            ways.setdefault(str(joint), loading)
-        if all(text.startswith("below") for text in ways):  # the larger bound holds for both
-            ways = {max(ways, key=lambda text: float(text.split()[1])): ""}
-        told = ", ".join(f"{text} {way}" if len(ways) > 1 else text for text, way in ways.items())
-        equals = {"n": " is", "[": " in"}.get(told[0], " =" if told[0].isdigit() else "")
-        level = "" if "%" in told else f" ({percent(joint.interval.level)})"
-        beside = ", taken as 0" if held and lubrication == "lubricated" else ""
+        estimates = list(by_loading.values())
+        loadings: dict[str, str] = {}
+        for loading, estimate in by_loading.items():
+            loadings.setdefault(str(estimate), loading)
+        kinds = {estimate.kind for estimate in estimates}
+        if kinds == {UPPER_BOUND}:
+            # The larger bound holds for both.
+            largest = max(estimates, key=lambda estimate: estimate.interval.upper)
+            loadings = {str(largest): ""}
+        stated = ", ".join(loadings)
+        if len(loadings) > 1:
+            stated = ", ".join(f"{text} {loading}" for text, loading in loadings.items())
+        # Bounds state their level themselves.
+        level = f" ({percent(estimates[-1].interval.level)})"
+        if kinds & {LOWER_BOUND, UPPER_BOUND, INTERVAL}:
+            level = ""
+        taken = ", taken as 0" if held and lubrication == "lubricated" else ""
         name = (lubrication or "all contacts").capitalize()
-        lines.append(f"{name}: μ{equals} {told}{level}{beside}.")
-    checks = comparison.checks if isinstance(comparison, FrictionComparison) else ()
-    return ("\n".join(lines) + f" {verdict(checks)}").strip()
+        lines.append(f"{name}: μ{_EQUALS[estimates[0].kind]} {stated}{level}{taken}.")
+    lines_of_all = "\n".join(lines)
+    return f"{lines_of_all} {verdict(comparison.checks)}".strip()
 
 
 _LABELS = ("", "state", "load (N)")
@@ -285,25 +302,28 @@ _WIDE = 100
 _LONG = 1e5
 
 
-def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
+def tables(comparison: FrictionComparison) -> list[Table]:
     """Return what was measured, the friction by each loading, its budget, and the checks."""
     friction = [_friction_table(comparison, loading) for loading in comparison.loadings]
-    if isinstance(comparison, ShearComparison):
+    if comparison.by_shear:
         return [*friction, _budget_table(comparison)]
+    likelihoods = [_likelihood_table(comparison, loading) for loading in comparison.loadings]
+    laws = comparison.interface
     return [
         _maxima_table(comparison),
         *friction,
-        *(_likelihood_table(comparison, loading) for loading in comparison.loadings),
+        *likelihoods,
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
-        *([] if comparison.interface is None else comparison.interface.tables()),
+        *([] if laws is None else laws.tables()),
         checks_table(worst_checks(comparison.checks)),
     ]
 
 
 def _maxima_table(comparison: FrictionComparison) -> Table:
-    sphere = comparison.measured.profiles[0].scan.indenter
+    profiles = comparison.measured.profiles
+    sphere = profiles[0].scan.indenter
     title = (
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"
@@ -311,14 +331,10 @@ def _maxima_table(comparison: FrictionComparison) -> Table:
     force = records.COMPARED_LOAD[2]
     maxima = records.COMPARED_MAXIMA[::2]
     head = [*_LABELS, *(quantity.heading for quantity in (force, *maxima))]
-    rows = [
-        [
-            *_labels(i, load.profile),
-            cell(force, load.profile, unit=""),
-            *(cell(quantity, load, unit="") for quantity in maxima),
-        ]
-        for i, load in enumerate(comparison.loads[comparison.loadings[0]], start=1)
-    ]
+    rows = []
+    for i, load in enumerate(comparison.loads[comparison.loadings[0]], start=1):
+        numbers = [cell(quantity, load, unit="") for quantity in maxima]
+        rows.append([*_labels(i, load.profile), cell(force, load.profile, unit=""), *numbers])
     return Table(title, head, rows, labels=len(_LABELS))
 
 
@@ -327,46 +343,53 @@ def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
     return str(number), profile.lubrication or "not stated", f"{profile.load:.4g}"
 
 
-def _friction_table(comparison: FrictionComparison | ShearComparison, loading: str) -> Table:
-    level = next((percent(joint.interval.level) for *_, joint in _joint(comparison)), "95 %")
-    way = f"{loading} loading" if loading else "profiles as given"
-    shear = isinstance(comparison, ShearComparison)
-    loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
-    tests = ["χ²/ν", "p"] if comparison.measured.noise_stated else []
-    head = [*_LABELS, "by the shear", *tests]
-    if not shear:
-        head = [*_LABELS, "by the maximum", "by the profile", *tests, "bracketed"]
+def _friction_table(comparison: FrictionComparison, loading: str) -> Table:
+    """Return the coefficient of each load and of all loads of a kind, by one loading."""
+    tested = comparison.measured.noise_stated
+    with_shear = comparison.shear is not None and not comparison.by_shear
+    tests = ["χ²/ν", "p"] if tested else []
+    head = ["by the maximum", "by the profile", *tests, "bracketed"]
+    if comparison.by_shear:
+        head = ["by the shear", *tests]
     rows = []
-    fit = _fit if tests else lambda _: ()
+    level = "95 %"
     for lubrication, by_loading in comparison.joint.items():
+        joint = by_loading[loading]
+        level = percent(joint.interval.level)
         count = 0
-        for i, load in enumerate(loads):
-            profile = comparison.measured.profiles[i]
-            if profile.lubrication != lubrication:
-                continue
-            count += 1
-            labels = _labels(i + 1, profile)
-            if isinstance(load, BoundedEstimate):
-                rows.append([*labels, str(load), *fit(load)])
-            else:
-                cells = [str(load.by_maximum), str(load.by_profile), *fit(load.by_profile)]
-                rows.append([*labels, *cells, f"{100 * load.bracketed:.0f} %"])
-        sheared = isinstance(comparison, FrictionComparison) and comparison.shear is not None
-        if count > 1 or sheared:
-            joint = by_loading[loading]
+        for i, profile in enumerate(comparison.measured.profiles):
+            if profile.lubrication == lubrication:
+                count += 1
+                readings = _readings(comparison, loading, i)
+                rows.append([*_labels(i + 1, profile), *readings])
+        if count > 1 or with_shear:
             name = lubrication or "not stated"
             name += " + lubricated" if joint.beside else ""
-            name += ", with shear" if sheared else ""
-            cells = [str(joint), *fit(joint)]
-            rows.append(["", name, "all", *(cells if shear else ["", *cells, ""])])
+            name += ", with shear" if with_shear else ""
+            cells = [str(joint), *_fit(joint, tested)]
+            rows.append(["", name, "all", *(cells if comparison.by_shear else ["", *cells, ""])])
+    way = f"{loading} loading" if loading else "profiles as given"
     title = f"Effective friction coefficient, {way} [{level} interval]"
-    return Table(title, head, rows, labels=len(_LABELS))
+    return Table(title, [*_LABELS, *head], rows, labels=len(_LABELS))
 
 
-def _fit(reading: BoundedEstimate) -> tuple[str, str]:
-    if reading.degrees <= 0:
+def _readings(comparison: FrictionComparison, loading: str, index: int) -> list[str]:
+    """Return the coefficient of one load, with its fit."""
+    tested = comparison.measured.noise_stated
+    if comparison.by_shear:
+        estimate = comparison.by_shear[loading][index]
+        return [str(estimate), *_fit(estimate, tested)]
+    load = comparison.loads[loading][index]
+    fit = _fit(load.by_profile, tested)
+    return [str(load.by_maximum), str(load.by_profile), *fit, f"{100 * load.bracketed:.0f} %"]
+
+
+def _fit(estimate: BoundedEstimate, tested: bool) -> tuple[str, ...]:
+    if not tested:
+        return ()
+    if estimate.degrees <= 0:
         return "", ""
-    return f"{reading.least / reading.degrees:.2f}", f"{reading.p_value:.2g}"
+    return f"{estimate.least / estimate.degrees:.2f}", f"{estimate.p_value:.2g}"
 
 
 def _likelihood_table(comparison: FrictionComparison, loading: str) -> Table:
@@ -389,21 +412,22 @@ def _short(value: float) -> str:
     return f"{value:.1f}" if value < _WIDE else f"{value:.0f}"
 
 
-def _budget_table(comparison: FrictionComparison | ShearComparison) -> Table:
-    columns = {
-        _which(lubrication, loading).removesuffix(" loading"): joint
-        for lubrication, loading, joint in _joint(comparison)
-        if joint.value is not None and joint.budget
-    }
-    rows = [
-        [name.replace("_", " "), *(_share(joint.budget.get(name)) for joint in columns.values())]
-        for name in dict.fromkeys(name for joint in columns.values() for name in joint.budget)
-    ]
+def _budget_table(comparison: FrictionComparison) -> Table:
+    shown = {}
+    for lubrication, loading, joint in _joint(comparison):
+        if joint.value is not None and joint.budget:
+            name = f"{lubrication or 'lubrication not stated'}, {loading}".removesuffix(", ")
+            shown[name] = joint
+    sources = dict.fromkeys(source for joint in shown.values() for source in joint.budget)
+    rows = []
+    for source in sources:
+        shares = [_share(joint.budget.get(source)) for joint in shown.values()]
+        rows.append([source.replace("_", " "), *shares])
     if rows:
-        totals = [joint.standard_uncertainty for joint in columns.values()]
-        rows.append(["standard uncertainty", *(_share(total) for total in totals)])
+        totals = [_share(joint.standard_uncertainty) for joint in shown.values()]
+        rows.append(["standard uncertainty", *totals])
     title = "Contributions to the standard uncertainty of the coefficient of all loads"
-    return Table(title, ["source", *columns], rows)
+    return Table(title, ["source", *shown], rows)
 
 
 def _share(value: float | None) -> str:
@@ -419,8 +443,9 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
     title = f"Beside the macroscopic friction coefficient, {format_measured(value, u)}"
     rows = []
     for lubrication, loading, joint in _joint(comparison):
-        side = "below" if value < joint.interval.low else "above"
-        place = "within" if joint.interval.holds(value) else side
+        place = "within"
+        if not joint.interval.holds(value):
+            place = "below" if value < joint.interval.low else "above"
         interval = f"{place} the {percent(joint.interval.level)} interval"
         rows.append([_which(lubrication, loading), str(joint), interval])
     return Table(title, ["all loads of", "effective coefficient", "macroscopic one"], rows)

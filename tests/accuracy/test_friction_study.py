@@ -22,7 +22,7 @@ import memscal
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
-from memscal.friction.compare import _channels, _confronted, _joint, compare_measured
+from memscal.friction.compare import compare_measured, fit_families, fit_together
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import FrictionComparison
 
@@ -50,8 +50,8 @@ class Outcome:
     def apart(self) -> Any:
         """The same with the lubricated loads by themselves."""
         measured = self.comparison.measured
-        confronted = _confronted(measured, _channels(measured, self.apparatus, families()))
-        return _joint(measured, confronted)["dry"]["incremental"]
+        fits = fit_families(measured, self.apparatus, families())
+        return fit_together(measured, fits)["dry"]["incremental"]
 
     @property
     def readings(self) -> list[Any]:

@@ -88,15 +88,16 @@ def test_a_whole_profile_likelihood_costs_less_than_its_values_separately() -> N
     laboratory = Laboratory.of()
     points = laboratory.measured(0.2, seed=1)
     values = fine_values(laboratory.family)
-    members = laboratory.family.at(values)
-    single = [laboratory.family.at(value) for value in values]
+    channel = laboratory.channel(points)
+    members = channel.at(values)
+    single = [channel.at(value) for value in values]
 
     def together() -> None:
-        assert likelihood(points, laboratory.sensor, members, [0, 1]).chi_square.all()
+        assert likelihood(members).chi_square.all()
 
     def separately() -> None:
         for member in single:
-            assert likelihood(points, laboratory.sensor, member, [0, 1]).chi_square.all()
+            assert likelihood(member).chi_square.all()
 
     pairs = [(once(separately), once(together)) for _ in range(3)]
     ratio = median(whole / apart for apart, whole in pairs)

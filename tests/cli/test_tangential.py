@@ -69,7 +69,7 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
     page = (folder / "shear.html").read_text(encoding="utf-8")
     assert "by the shear" in page
     friction = (0.0, 0.1, np.inf)
-    alone = memscal.compare_shear(
+    alone = memscal.compare(
         measured, folder / "xz.apparatus.h5", friction=friction, loading="total"
     )
     joint = done.exits(0).json["joint"][0]

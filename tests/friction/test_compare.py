@@ -206,11 +206,6 @@ def test_options_that_make_no_sense_are_refused(made, apparatus, options, words)
         memscal.compare(made.lubricated, apparatus, **options)
 
 
-def test_what_is_no_measured_stress_is_refused(apparatus: memscal.ApparatusFunction) -> None:
-    with pytest.raises(InputError, match="where measured stress is needed"):
-        memscal.compare_shear(1.0, apparatus)
-
-
 def test_lubricated_loads_are_fitted_beside_the_dry_ones_unless_they_have_friction(
     made, apparatus, families, found
 ) -> None:

@@ -9,8 +9,8 @@ import pytest
 from helpers.linear_contacts import CONVERSION, Laboratory, bare_points
 from scipy.stats import kstest
 
-from memscal.friction.effective import dry_against_lubricated, lubricated_pairs
-from memscal.friction.likelihood import LoadPoints
+from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
+from memscal.friction.likelihood import Channel, LoadPoints
 from memscal.friction.results import DryAgainstLubricated
 
 CHANCE = 1e-4
@@ -47,12 +47,10 @@ def compared(
         after, before = (laboratory.predicted(0.0, LOAD, read).signal for read in (there, wet))
         moved = after - before
         wet = replace(there, u=wet.u + moved[0])
+    frictionless = laboratory.family.at(0.0).only([LOAD, LOAD])
     return dry_against_lubricated(
         (profile(dry, "dry"), profile(wet, "lubricated")),
-        (dry, wet),
-        laboratory.sensor,
-        laboratory.family.at(0.0),
-        (LOAD, LOAD),
+        Channel((dry, wet), laboratory.sensor, frictionless),
         conversion_share=0.01,
     )
 

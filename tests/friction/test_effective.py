@@ -23,7 +23,7 @@ def laboratory() -> Laboratory:
 @lru_cache
 def found(friction: float) -> list[BoundedEstimate]:
     first = 1000 * round(100 * min(friction, 9.0))
-    return [laboratory().drawn(friction, first + seed).effective([0, 1]) for seed in range(SEEDS)]
+    return [laboratory().drawn(friction, first + seed).coefficient([0, 1]) for seed in range(SEEDS)]
 
 
 def test_intervals_hold_the_truth_in_ninety_to_ninety_eight_percent() -> None:
@@ -67,9 +67,9 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
 
 
 def test_all_loads_together_tell_more_than_each() -> None:
-    confronted = laboratory().drawn(0.1, seed=1)
-    joint = confronted.effective([0, 1])
-    single = confronted.effective([0])
+    fit = laboratory().drawn(0.1, seed=1)
+    joint = fit.coefficient([0, 1])
+    single = fit.coefficient([0])
     width = joint.interval.high - joint.interval.low
     assert single.interval.high is None or single.interval.high - single.interval.low > width
     assert joint.degrees == 2 * (33 - 3) - 1
@@ -79,5 +79,6 @@ def test_the_other_loading_adds_a_rectangle() -> None:
     first = found(0.1)[0]
     second = found(0.2)[0]
     expected = abs(first.value - second.value) / np.sqrt(12)
-    assert with_loading(first, second).budget["loading"] == pytest.approx(expected)
-    assert "loading" not in with_loading(first, None).budget
+    both = with_loading({"incremental": first, "total": second})
+    assert [each.budget["loading"] for each in both.values()] == pytest.approx(2 * [expected])
+    assert "loading" not in with_loading({"incremental": first})["incremental"].budget

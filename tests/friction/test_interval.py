@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from memscal.friction.effective import friction_reason, profile_estimate
+from memscal.friction.interval import friction_reason, profile_estimate
 from memscal.friction.results import BoundedEstimate
 from memscal.model.arrays import FloatArray
 

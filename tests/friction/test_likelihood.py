@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
-from memscal.friction.effective import Confrontation
+from memscal.friction.effective import FrictionFit
 from memscal.friction.likelihood import Predicted, likelihood, predict
 
 CORRELATED = {"white": 0.0, "correlated": 0.6}
@@ -17,20 +17,17 @@ def laboratory(request: pytest.FixtureRequest) -> Laboratory:
     return Laboratory.of(points=bare_points(correlation=CORRELATED[request.param]))
 
 
-def dense(found: Confrontation, value: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def dense(found: FrictionFit, value: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residual, covariance without flat parameters, and flat columns, over all loads."""
-    members = found.family.at(value)
-    predicted = [
-        predict(points, found.sensor, members, load)
-        for load, points in zip(found.loads, found.points, strict=True)
-    ]
+    predicted = predicted_of(found, value)
+    measured = found.channel.points
     residual = np.concatenate(
-        [points.u - p.signal[0] for points, p in zip(found.points, predicted, strict=True)]
+        [points.u - p.signal[0] for points, p in zip(measured, predicted, strict=True)]
     )
-    sizes = [points.u.size for points in found.points]
+    sizes = [points.u.size for points in measured]
     noise = np.zeros((sum(sizes),) * 2)
     flat = np.zeros((sum(sizes), 3 * len(sizes)))
-    for i, (points, p) in enumerate(zip(found.points, predicted, strict=True)):
+    for i, (points, p) in enumerate(zip(measured, predicted, strict=True)):
         rows = slice(sum(sizes[:i]), sum(sizes[: i + 1]))
         inner = np.eye(points.u.size) if points.correlation is None else points.correlation
         block = np.outer(points.noise, points.noise) * inner
@@ -59,25 +56,24 @@ def generalised(residual: np.ndarray, covariance: np.ndarray, flat: np.ndarray) 
 
 def test_chi_square_is_that_of_generalised_least_squares(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=1)
-    chi_square, deviance = found.at(FRICTIONS, 0)
-    whole = found.whole.chi_square[np.isin(found.members.values, FRICTIONS)]
+    whole = found.whole.chi_square[np.isin(found.whole.values, FRICTIONS)]
+    assert whole.shape == FRICTIONS.shape
     for i, value in enumerate(FRICTIONS):
         assert whole[i] == pytest.approx(generalised(*dense(found, value)), rel=1e-6)
-    assert chi_square.shape == deviance.shape == FRICTIONS.shape
 
 
 def test_one_load_of_several_is_that_load_alone(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=2)
-    alone = likelihood(found.points[1:], found.sensor, found.members, [1])
+    alone = likelihood(found.fine.only([1]))
     assert found.whole.only([1]).chi_square == pytest.approx(alone.chi_square, rel=1e-9)
 
 
 def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=3)
-    i = int(np.argmin(np.abs(found.members.values - 0.15)))
-    budget = found.whole.budget(i)
+    there = likelihood(found.channel.at(0.15))
+    budget = there.budget()
     assert set(budget) == {"noise", "load_scatter", "position", "apparatus", "thickness", "load"}
-    variance = 1 / found.whole.information[i]
+    variance = 1 / there.information[0]
     assert sum(part**2 for part in budget.values()) == pytest.approx(variance, rel=1e-9)
 
 
@@ -90,7 +86,7 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
     at = laboratory.family.coordinate(0.15)
     step = 2e-3
     values = np.array([laboratory.family.value_at(at + shift) for shift in (-step, 0, step)])
-    found = likelihood(points, laboratory.sensor, laboratory.family.at(values), [0, 1])
+    found = likelihood(laboratory.channel(points).at(values))
     curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
     assert found.chi_square[1] == pytest.approx(0.0, abs=1e-9)
     assert curvature == pytest.approx(found.information[1], rel=0.02)
@@ -99,22 +95,22 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
 def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
     laboratory = Laboratory.of()
     found = laboratory.drawn(0.2, seed=5)
-    points = found.points[0]
+    points = found.channel.points[0]
     there = laboratory.predicted(0.2, 0, replace(points, offset=points.offset + 10e-6))
     here = laboratory.predicted(0.2, 0)
     u = points.u + there.signal[0] - here.signal[0] + points.flat @ np.array([3e-3, -2e-3])
-    moved = likelihood([replace(points, u=u)], found.sensor, found.members, [0])
+    moved = likelihood(replace(found.fine.only([0]), points=[replace(points, u=u)]))
     before = found.whole.only([0]).chi_square
     held = [replace(points, u=u, free_centre=False)]
-    fixed = likelihood(held, found.sensor, found.members, [0]).chi_square
+    fixed = likelihood(replace(found.fine.only([0]), points=held)).chi_square
     assert np.abs(moved.chi_square - before).max() < 0.3 < np.abs(fixed - before).max()
 
 
 def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
     laboratory = Laboratory.of(points=replace(bare_points(), log_load=0.1 * (-1) ** np.arange(33)))
     found = laboratory.drawn(0.2, seed=6)
-    ignored = [replace(points, log_load=np.zeros(33)) for points in found.points]
-    wrong = likelihood(ignored, found.sensor, found.members, [0, 1])
+    ignored = [replace(points, log_load=np.zeros(33)) for points in found.channel.points]
+    wrong = likelihood(replace(found.fine, points=ignored))
     assert found.whole.chi_square.min() < 100 < wrong.chi_square.min()
 
 
@@ -122,37 +118,38 @@ def test_chi_square_is_that_of_the_whole_covariance(laboratory: Laboratory) -> N
     whole = laboratory.drawn(0.1, seed=7).whole
     i = 30
     rest = np.concatenate([load.residual[i] for load in whole.loads])
-    columns = [np.hstack([c[i] for c in load.columns.values()]) for load in whole.loads]
-    root = np.vstack(columns)
+    root = np.vstack([load.columns[i] for load in whole.loads])
     expected = rest @ np.linalg.solve(np.eye(rest.size) + root @ root.T, rest)
     assert whole.chi_square[i] == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=8)
-    together = found.whole.only([0]).beside(found.whole.only([1]))
+    together = found.whole.only([0]).with_held(found.whole.only([1]))
     for value in (0.0, 0.1, 0.3):
         free, held = (dense(found, each) for each in (value, 0.0))
-        size = found.points[0].u.size
+        size = found.channel.points[0].u.size
         residual = np.concatenate([free[0][:size], held[0][size:]])
-        members = [found.family.at(each) for each in (value, 0.0)]
-        pairs = zip(found.points, members, (0, 1), strict=True)
-        shared = np.concatenate([joined(predict(p, found.sensor, m, i)) for p, m, i in pairs])
+        shared = np.concatenate(
+            [joined(predicted_of(found, each)[load]) for load, each in enumerate((value, 0.0))]
+        )
         noise = np.zeros((2 * size, 2 * size))
         for whole, at, rows in ((free, value, slice(size)), (held, 0.0, slice(size, None))):
             own = np.concatenate([joined(p) for p in predicted_of(found, at)])
             noise[rows, rows] = (whole[1] - own @ own.T)[rows, rows]
         flat = np.vstack([free[2][:size], held[2][size:]])
-        i = int(np.argmin(np.abs(found.members.values - value)))
+        i = int(np.argmin(np.abs(found.whole.values - value)))
         expected = generalised(residual, noise + shared @ shared.T, flat)
         assert together.chi_square[i] == pytest.approx(expected, rel=1e-6)
     assert together.information[30] > found.whole.only([0]).information[30]
 
 
-def predicted_of(found: Confrontation, value: float) -> list[Predicted]:
-    members = found.family.at(value)
-    pairs = zip(found.loads, found.points, strict=True)
-    return [predict(points, found.sensor, members, load) for load, points in pairs]
+def predicted_of(found: FrictionFit, value: float) -> list[Predicted]:
+    channel = found.channel.at(value)
+    return [
+        predict(points, channel.sensor, channel.family, load)
+        for load, points in enumerate(channel.points)
+    ]
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2])

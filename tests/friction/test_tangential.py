@@ -18,7 +18,7 @@ from scipy.linalg import block_diag
 from scipy.stats import binom
 
 import memscal
-from memscal import ApparatusFunction, Experiment, GaussianMixture, MeasuredStress, compare_shear
+from memscal import ApparatusFunction, Experiment, GaussianMixture, MeasuredStress, compare
 from memscal.errors import FormatError, InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.likelihood import (
@@ -146,14 +146,14 @@ def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_
         made = experiment(friction, seed)
         normal, shear = calibrated(made)
         measured = memscal.measure_stress(made.dry, normal)
-        found = compare_shear(measured, shear, loading="incremental", cache=cache)
+        found = compare(measured, shear, loading="incremental", cache=cache)
         joint = found.joint["dry"]["incremental"]
         held.append(joint.interval.holds(friction))
         assert joint.p_value > 1e-4
         alone, both = (
-            memscal.compare(measured, normal, shear=s, loading="incremental", cache=cache).joint[
-                "dry"
-            ]["incremental"]
+            compare(measured, normal, shear=s, loading="incremental", cache=cache).joint["dry"][
+                "incremental"
+            ]
             for s in (None, shear)
         )
         held_by_both.append(both.interval.holds(friction))
@@ -165,7 +165,7 @@ def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_
             bounded += 1
             assert joint.value is None
             assert "lower bound" in joint.reason
-        assert len(found.loads["incremental"]) == len(LOADS)
+        assert len(found.by_shear["incremental"]) == len(LOADS)
     for of_truth in (held, held_by_both):
         assert sum(of_truth) >= binom.ppf(CHANCE, EXPERIMENTS, 0.93)
     # Full stick is excluded as often as a truth is: once in twenty.
@@ -190,11 +190,9 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
         kept = np.arange(points.u.size) != 5 * order
         names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "flat")
         points = replace(points, **{name: getattr(points, name)[kept] for name in names})
-        channels.append(Channel([points], sensor, family))
-    normal, shear = channels
-    members = normal.family.at([0.1])
-    found = likelihood(normal.points, normal.sensor, members, [1], shear)
-    sides = [(c.points[0], predict(c.points[0], c.sensor, c.family.at([0.1]), 1)) for c in channels]
+        channels.append(Channel([points], sensor, family.only(1)))
+    found = likelihood(*(channel.at(0.1) for channel in channels))
+    sides = [(c.points[0], predict(c.points[0], c.sensor, c.family.at(0.1), 0)) for c in channels]
     # The same by the covariance of all voltages, one contact after the other.
     place = np.concatenate([points.offset for points, _ in sides])
     same = np.abs(np.subtract.outer(place, place)) < 1e-9
@@ -231,12 +229,12 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
     left = np.linalg.solve(root, rest)
     chi_square = left @ left - np.sum((basis.T @ left) ** 2)
     assert found.chi_square[0] == pytest.approx(chi_square, rel=1e-6)
-    assert found.degrees == rest.size - 5
+    assert found.loads[0].degrees == rest.size - 5
 
 
 def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
     low, high = (
-        compare_shear(*measured_with(experiment(friction, 5)), loading="incremental", cache=cache)
+        compare(*measured_with(experiment(friction, 5)), loading="incremental", cache=cache)
         for friction in (0.0, 1.0)
     )
     free, stuck = (found.joint["dry"]["incremental"].interval for found in (low, high))
@@ -244,7 +242,7 @@ def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
     assert "by the shear" in str(low)
     assert low.to_dict()["joint"][0]["interval"]["high"] == free.high
     assert list(low.to_dataframe()["friction, high"]) == [
-        load.interval.high or math.inf for load in low.loads["incremental"]
+        load.interval.high or math.inf for load in low.by_shear["incremental"]
     ]
 
 
@@ -253,37 +251,42 @@ def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
     normal, shear = calibrated(made)
     measured = memscal.measure_stress(made.dry, normal)
     options = {"friction": (0.0, math.inf), "loading": "total", "cache": cache}
-    with pytest.raises(InputError, match="not of a tangential"):
-        compare_shear(measured, normal, **options)
     named = {"sensor": replace(shear.sensor, name="another")}
     for changed in (named, {"film": replace(shear.film, thickness=3e-3)}):
         with pytest.raises(InputError, match=r'"another"|3 mm'):
-            compare_shear(measured, replace(shear, **changed), **options)
+            compare(measured, replace(shear, **changed), **options)
+    for beside in ({"shear": shear}, {"references": []}, {"macroscopic": 1.6}):
+        with pytest.raises(InputError, match="options of the normal one"):
+            compare(measured, shear, **beside)
+    with pytest.raises(InputError, match="reads the shear of measured"):
+        compare(made.dry, shear, **options)
+    with pytest.raises(InputError, match="no figure"):
+        compare(measured, shear, **options).plot()
     rod = memscal.measure_stress(made.rod, normal)
     with pytest.raises(InputError, match="rod"):
-        compare_shear(rod, shear, **options)
+        compare(rod, shear, **options)
     silent = replace(made.dry, channels={"u_xz": made.dry.channels["u_xz"]})
     with pytest.raises(InputError, match="u_xz_errors"):
-        compare_shear(memscal.measure_stress(silent, normal), shear, **options)
+        compare(memscal.measure_stress(silent, normal), shear, **options)
     without = memscal.measure_stress(replace(made.dry, channels={}), normal)
     with pytest.raises(InputError, match="no usable voltage u_xz"):
-        compare_shear(without, shear, **options)
+        compare(without, shear, **options)
     with pytest.raises(InputError, match="no usable voltage u_xz"):
-        memscal.compare(without, normal, shear=shear, **options)
+        compare(without, normal, shear=shear, **options)
     with pytest.raises(InputError, match="not of a tangential"):
-        memscal.compare(measured, normal, shear=normal, **options)
+        compare(measured, normal, shear=normal, **options)
     shear.save(path := cache / "xz.apparatus.h5")
     with h5py.File(path, "r+") as file:
         file["/entry/indenter/load"][()] *= 2
     with pytest.raises(FormatError, match=r"xz\.apparatus\.h5 was changed"):
-        memscal.compare(without, normal, shear=path, **options)
+        compare(without, normal, shear=path, **options)
     with pytest.raises(InputError, match="no usable voltage u_xz"):
-        memscal.compare(without, normal, shear=path, accept_altered=True, **options)
+        compare(without, normal, shear=path, accept_altered=True, **options)
     with pytest.raises(InputError, match="no shear"):
-        memscal.compare(measured, normal, shear=shear, references=[])
+        compare(measured, normal, shear=shear, references=[])
     measured.save(cache / "dry.stress.h5")
     with pytest.raises(InputError, match="No loading"):
-        compare_shear(cache / "dry.stress.h5", shear, loading=(), cache=cache)
+        compare(cache / "dry.stress.h5", shear, loading=(), cache=cache)
 
 
 def test_a_tangential_artifact_is_applied_to_no_normal_channel_whatever_is_overridden() -> None:

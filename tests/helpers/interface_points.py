@@ -9,10 +9,9 @@ import numpy as np
 from helpers.paper import LOADS, SPHERE
 
 from memscal import ElasticFilm
-from memscal.extensions.interface_laws.model_comparison import Measured
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import LoadPoints, Sensor
+from memscal.friction.likelihood import Channel, LoadPoints, Sensor
 
 MACROSCOPIC = 1.6
 FILM = ElasticFilm(
@@ -93,6 +92,6 @@ def read_without_error(truth: ProfileFamily, value: float, stated: Precision) ->
     return [LoadPoints(u, noise=stated.noise * u.max() * ones, **shared) for u in voltages]
 
 
-def measured(points: Sequence[LoadPoints], family: ProfileFamily) -> Measured:
+def measured(points: Sequence[LoadPoints], family: ProfileFamily) -> Channel:
     """Return points with the contacts that are to explain them."""
-    return Measured(points, sensor(family), family)
+    return Channel(points, sensor(family), family)

@@ -7,9 +7,9 @@ from typing import Self
 import numpy as np
 
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.friction.effective import Confrontation, confront
+from memscal.friction.effective import FrictionFit, fit_friction
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import LoadPoints, Predicted, Sensor, predict
+from memscal.friction.likelihood import Channel, LoadPoints, Predicted, Sensor, predict
 
 LOADS = (0.5, 2.0)
 FRICTIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, np.inf])
@@ -83,10 +83,13 @@ class Laboratory:
     def predicted(self, friction: float, load: int, points: LoadPoints | None = None) -> Predicted:
         return predict(points or self.points[load], self.sensor, self.family.at(friction), load)
 
-    def drawn(self, friction: float, seed: int) -> Confrontation:
+    def drawn(self, friction: float, seed: int) -> FrictionFit:
         """Draw everything that the likelihood counts, and hold it against the family."""
-        measured = self.measured(friction, seed)
-        return confront(self.family, self.sensor, measured, range(len(measured)))
+        return fit_friction(self.channel(self.measured(friction, seed)))
+
+    def channel(self, points: Sequence[LoadPoints]) -> Channel:
+        """Points of each load with the family and the sensor."""
+        return Channel(points, self.sensor, self.family)
 
     def measured(self, friction: float, seed: int, *, systematic: bool = True) -> list[LoadPoints]:
         """Draw the voltages of every load."""
@@ -97,6 +100,8 @@ class Laboratory:
             found = self.predicted(friction, load)
             u = found.signal[0] + noise_of(points, found, rng)
             for source, column in found.columns.items():
+                if not column.any():
+                    continue
                 if source not in common:
                     common[source] = rng.standard_normal(column.shape[-1]) * systematic
                 u = u + column[0] @ common[source]

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc
+from scipy.special import chdtrc, logsumexp
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
@@ -27,15 +27,15 @@ from memscal.friction.calculated import (
     normal_compliance_family,
     slipping_family,
 )
-from memscal.friction.effective import profile_estimate
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import LoadPoints, Sensor, likelihood, load_points, sensor_of
+from memscal.friction.interval import profile_estimate
+from memscal.friction.likelihood import Channel, likelihood, load_points, sensor_of
 from memscal.friction.marginal_likelihood import (
     Prior,
-    Tables,
+    Statistics,
+    added,
     bounded_prior,
     evidence_of_each,
-    evidence_of_one,
     log_likelihood,
     log_uniform_prior,
 )
@@ -60,22 +60,32 @@ _NORMAL_SHARES = (1e-2, 1.0)
 _SLIP_LENGTHS_CALCULATED = (1e-8, 1e-3)
 _NORMAL_SHARES_CALCULATED = (1e-3, 1.0)
 _LENGTHS = 81
+#: Nodes over all values, over those that the data do not exclude, and over those of one load,
+#: whose parameter is known better with others than alone.
+_COARSE = 81
+_FINE = 161
+_FINER = 321
+#: Values are excluded where twice the log-likelihood falls short of the best by this.
+_EXCLUDED = 25.0
+#: Sweeps over the loads that look for the best parameter of each.
+_SWEEPS = 200
+_SETTLED = 1e-3
 _UM = 1e-6
 
 
 def weigh_slip_length(
-    rigid: Measured, slipping: Measured, *, macroscopic: float, lubrication: str = "dry"
+    rigid: Channel, slipping: Channel, *, macroscopic: float, lubrication: str = "dry"
 ) -> LawComparison:
     """Weigh a slip length (``slipping``) against effective coefficients of a rigid interface."""
     friction_prior = bounded_prior(rigid.family.scale)
     length_prior = log_uniform_prior(*_SLIP_LENGTHS)
-    degrees = rigid.degrees
+    degrees = sum(points.degrees for points in rigid.points)
     name = "effective Amontons, one coefficient"
     laws = [one_of_all(name, curve(rigid), friction_prior, degrees)]
     if len(rigid.points) > 1:
-        of_each = [curve(rigid, load=j) for j in range(len(rigid.points))]
+        curves = [curve(rigid.only([i]), fine=_FINER) for i in range(len(rigid.points))]
         name = "effective Amontons, one for each load"
-        laws.append(one_of_each(name, of_each, friction_prior, degrees))
+        laws.append(one_of_each(name, curves, friction_prior, degrees))
     along = curve(slipping, also=np.geomspace(*_SLIP_LENGTHS_CALCULATED, _LENGTHS))
     name = f"elasto-plastic at {macroscopic:g}, slip length"
     laws.append(one_of_all(name, along, length_prior, degrees))
@@ -90,24 +100,24 @@ def weigh_slip_length(
     )
 
 
-def weigh_normal_compliance(measured: Measured) -> LawComparison:
+def weigh_normal_compliance(channel: Channel) -> LawComparison:
     """Weigh a normal compliance against a rigid interface, both without friction."""
-    largest = float(measured.family.values[-1])
+    largest = float(channel.family.values[-1])
     prior = log_uniform_prior(*(share * largest for share in _NORMAL_SHARES))
     low, high = (share * largest for share in _NORMAL_SHARES_CALCULATED)
-    along = curve(measured, also=np.geomspace(low, high, _LENGTHS))
+    along = curve(channel, also=np.geomspace(low, high, _LENGTHS))
     top = float(along.log_likelihood[0])
     least = float(along.chi_square[0])
-    degrees = measured.degrees
+    degrees = sum(points.degrees for points in channel.points)
     p_value = _p_value(degrees, least)
     rigid = InterfaceLaw("rigid, frictionless", (), top, top, 0.0, least, degrees, p_value)
     yielding = one_of_all("normal compliance, length", along, prior, degrees)
     return LawComparison(
         lubrication="lubricated",
-        loads=measured.family.loads,
+        loads=channel.family.loads,
         laws=(rigid, yielding),
         factors=_factors([rigid, yielding]),
-        length=interface_length(along, measured.family, "length of the normal law"),
+        length=interface_length(along, channel.family, "length of the normal law"),
     )
 
 
@@ -154,21 +164,22 @@ def compare_interface(
         law = partial(slipping_family, macroscopic, macroscopic_uncertainty, **contacts)
         rigid = family_at_loads(dry, amontons, partial(amontons_family, **contacts))
         tangential = weigh_slip_length(
-            _measured(dry, apparatus, rigid),
-            _measured(dry, apparatus, family_at_loads(dry, slipping, law)),
+            _channel(dry, apparatus, rigid),
+            _channel(dry, apparatus, family_at_loads(dry, slipping, law)),
             macroscopic=macroscopic,
             lubrication=dry[0].lubrication,
         )
     if wet:
         family = family_at_loads(wet, None, partial(normal_compliance_family, **contacts))
-        normal = weigh_normal_compliance(_measured(wet, apparatus, family))
+        normal = weigh_normal_compliance(_channel(wet, apparatus, family))
     messages = tuple(_messages(tangential, normal, macroscopic_uncertainty, dry))
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
 
 
-def _measured(
+def _channel(
     profiles: Sequence[MeasuredProfile], apparatus: ApparatusFunction, family: ProfileFamily
-) -> Measured:
+) -> Channel:
+    """Return what was measured with the contacts of a family, one for each profile."""
     reach = max(float(profile.r[-1]) for profile in profiles)
     points = []
     for profile, load in zip(profiles, family.loads, strict=True):
@@ -176,7 +187,7 @@ def _measured(
         # Loads count from that of the calculated contact.
         points.append(replace(of_load, log_load=of_load.log_load + math.log(profile.load / load)))
     scans = [profile.scan for profile in profiles]
-    return Measured(points, sensor_of(apparatus, family, reach, scans), family)
+    return Channel(points, sensor_of(apparatus, family, reach, scans), family)
 
 
 def _messages(
@@ -211,37 +222,6 @@ def _messages(
             )
 
 
-#: Nodes over all values, over those that the data do not exclude, and over those of one load,
-#: whose parameter is known better with others than alone.
-_COARSE = 81
-_FINE = 161
-_FINER = 321
-#: Values are excluded where twice the log-likelihood falls short of the best by this.
-_EXCLUDED = 25.0
-#: Sweeps over the loads that look for the best parameter of each.
-_SWEEPS = 200
-_SETTLED = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """Measured points, the sensor, and the contacts calculated at their loads, in their order."""
-
-    points: Sequence[LoadPoints]
-    sensor: Sensor
-    family: ProfileFamily
-
-    @property
-    def degrees(self) -> int:
-        """Points less flat nuisances, of all loads."""
-        return sum(points.degrees for points in self.points)
-
-    def tables(self, values: FloatArray) -> Tables:
-        """Return the statistics of the loads at values of the family's parameter."""
-        loads = range(len(self.points))
-        return likelihood(self.points, self.sensor, self.family.at(values), loads).tables
-
-
 @dataclass(frozen=True, eq=False)
 class LawCurve:
     """The likelihood of a law along its parameter, at M values."""
@@ -249,113 +229,107 @@ class LawCurve:
     values: FloatArray
     coordinates: FloatArray
     edges: FloatArray  # (M + 1,): between them each value stands for all others
-    tables: Tables  # of shape (M, 1)
+    statistics: Statistics
     log_likelihood: FloatArray
     chi_square: FloatArray
 
     @property
-    def best(self) -> int:
-        """Index of the largest likelihood."""
-        return int(np.argmax(self.log_likelihood))
-
-    @cached_property
     def near(self) -> NDArray[np.bool_]:
         """Nodes that the likelihood does not exclude."""
-        return np.asarray(2 * (self.log_likelihood.max() - self.log_likelihood) < _EXCLUDED)
-
-    @property
-    def near_tables(self) -> Tables:
-        """The tables at these nodes."""
-        return Tables(*(array[self.near] for array in self.tables))
-
-    def log_evidence(self, prior: Prior) -> float:
-        """Return the logarithm of the likelihood averaged over a prior."""
-        return evidence_of_one(self.log_likelihood, np.diff(prior(self.edges)))
+        fall = 2 * (self.log_likelihood.max() - self.log_likelihood)
+        return np.asarray(fall < _EXCLUDED)
 
 
-def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
-    """Return the likelihood along a family's parameter, of all loads or of one by its index."""
-    family = measured.family
+def curve(channel: Channel, *, also: Iterable[float] = (), fine: int = _FINE) -> LawCurve:
+    """Return the likelihood along the parameter of a family, one for all loads of a channel."""
+    family = channel.family
     first = family.coordinates[0]
     last = family.coordinates[-1]
     # Nodes are even in the bounded coordinate, closer where it matters.
     extra = [family.coordinate(value) for value in also]
-    coarse = np.unique(np.concatenate([np.linspace(first, last, _COARSE), extra]))
-
-    def tables_at(coordinates: FloatArray) -> Tables:
-        tables = measured.tables(family.values_at(coordinates))
-        return tables.together() if load is None else tables.group(load)
-
-    rough = tables_at(coarse)
-    rough_log = log_likelihood(rough)[0][:, 0]
-    near = np.flatnonzero(2 * (rough_log.max() - rough_log) < _EXCLUDED)
+    coarse = np.unique([*np.linspace(first, last, _COARSE), *extra])
+    rough = likelihood(channel.at(family.values_at(coarse))).statistics
+    fall = log_likelihood(rough)[0]
+    near = np.flatnonzero(2 * (fall.max() - fall) < _EXCLUDED)
     low = coarse[max(near[0] - 1, 0)]
     high = coarse[min(near[-1] + 1, coarse.size - 1)]
-    fine = np.setdiff1d(np.linspace(low, high, _FINE if load is None else _FINER), coarse)
-    close = tables_at(fine)
-    both = np.concatenate([coarse, fine])
+    between = np.setdiff1d(np.linspace(low, high, fine), coarse)
+    close = likelihood(channel.at(family.values_at(between))).statistics
+    both = np.concatenate([coarse, between])
     order = np.argsort(both)
-    tables = Tables(*(np.concatenate(pair)[order] for pair in zip(rough, close, strict=True)))
+    pairs = zip(rough, close, strict=True)
+    statistics = Statistics(*(np.concatenate(pair)[order] for pair in pairs))
     t = both[order]
-    logs, chi_square = log_likelihood(tables)
     middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
     values = family.values_at(t)
     edges = family.values_at(middles)
-    return LawCurve(values, t, edges, tables, logs[:, 0], chi_square[:, 0])
+    return LawCurve(values, t, edges, statistics, *log_likelihood(statistics))
 
 
 def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter for all loads; degrees are points less nuisances."""
-    best = float(along.values[along.best])
-    log_evidence = along.log_evidence(prior)
-    top = float(along.log_likelihood[along.best])
-    least = float(along.chi_square[along.best])
-    p_value = _p_value(degrees - 1, least)
-    return InterfaceLaw(name, (best,), log_evidence, top, 0.0, least, degrees - 1, p_value)
+    # The evidence is the likelihood averaged over the prior.
+    evidence = logsumexp(along.log_likelihood, b=np.diff(prior(along.edges)))
+    best = int(np.argmax(along.log_likelihood))
+    chi_square = float(along.chi_square[best])
+    return InterfaceLaw(
+        name=name,
+        best=(float(along.values[best]),),
+        log_evidence=float(evidence),
+        log_likelihood=float(along.log_likelihood[best]),
+        numerical_error=0.0,
+        least=chi_square,
+        degrees=degrees - 1,
+        p_value=_p_value(degrees - 1, chi_square),
+    )
 
 
 def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
-    near = [along.near for along in curves]
-    tables = [along.near_tables for along in curves]
-    log_evidence, error = _of_each(curves, prior)
-    start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
-    chosen, top, chi_square = _best_of_each(tables, start)
-    triples = zip(curves, near, chosen, strict=True)
-    best = tuple(float(along.values[nodes][place]) for along, nodes, place in triples)
+    loads = []
+    weights = []
+    for along in curves:
+        loads.append(Statistics(*(array[along.near] for array in along.statistics)))
+        weights.append(np.diff(prior(along.edges))[along.near])
+    log_evidence, error = evidence_of_each(loads, weights)
+    chosen, top, chi_square = _best_of_each(loads)
+    pairs = zip(curves, chosen, strict=True)
     left = degrees - len(curves)
-    p_value = _p_value(left, chi_square)
-    return InterfaceLaw(name, best, log_evidence, top, error, chi_square, left, p_value)
-
-
-def _of_each(curves: Sequence[LawCurve], prior: Prior) -> tuple[float, float]:
-    """Return the log evidence of one parameter of each load under a prior, and its error."""
-    weights = [np.diff(prior(along.edges))[along.near] for along in curves]
-    return evidence_of_each([along.near_tables for along in curves], weights)
+    return InterfaceLaw(
+        name=name,
+        best=tuple(float(along.values[along.near][node]) for along, node in pairs),
+        log_evidence=log_evidence,
+        log_likelihood=top,
+        numerical_error=error,
+        least=chi_square,
+        degrees=left,
+        p_value=_p_value(left, chi_square),
+    )
 
 
 def _p_value(degrees: int, least: float) -> float:
     return float(chdtrc(degrees, least)) if degrees > 0 else 1.0
 
 
-def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int], float, float]:
+def _best_of_each(loads: Sequence[Statistics]) -> tuple[list[int], float, float]:
     """Climb the likelihood, one load after the other, from node to node."""
-    chosen = list(start)
-    top = -np.inf
-    chi_square = 0.0
+    chosen = [int(np.argmax(log_likelihood(load)[0])) for load in loads]
+    top = -math.inf
     for _ in range(_SWEEPS):
         before = top
-        for j, table in enumerate(tables):
-            at = [[a[chosen[i]] for a in other] for i, other in enumerate(tables) if i != j]
-            sums = [np.sum(arrays, axis=0) for arrays in zip(*at, strict=True)] or [0.0] * 4
-            both = Tables(*(a + s for a, s in zip(table, sums, strict=True)))
-            logs, squares = log_likelihood(both)
-            chosen[j] = int(np.argmax(logs[:, 0]))
-            top = float(logs[chosen[j], 0])
-            chi_square = float(squares[chosen[j], 0])
+        for j, load in enumerate(loads):
+            others = [
+                Statistics(*(array[node] for array in other))
+                for other, node in zip(loads, chosen, strict=True)
+                if other is not load
+            ]
+            logs, chi_square = log_likelihood(added([load, *others]))
+            chosen[j] = int(np.argmax(logs))
+            top = float(logs[chosen[j]])
+            least = float(chi_square[chosen[j]])
         if top - before < _SETTLED:
             break
-    return chosen, top, chi_square
+    return chosen, top, least
 
 
 _NODES = 401
@@ -364,7 +338,7 @@ _STICK = 2e-4
 
 
 def implied_friction(
-    rigid: Measured, slipping: Measured, length: BoundedEstimate, friction: float
+    rigid: Channel, slipping: Channel, length: BoundedEstimate, friction: float
 ) -> ImpliedFriction:
     """Return what a slip length and its interval mean at each load, read from the maximum."""
     order = np.argsort(rigid.family.loads, kind="stable")
@@ -381,10 +355,10 @@ def implied_friction(
     return ImpliedFriction(family.loads[order], np.array(implied), pressures, stiffnesses)
 
 
-def _maxima(measured: Measured, values: FloatArray) -> FloatArray:
+def _maxima(channel: Channel, values: FloatArray) -> FloatArray:
     """Return stresses on the axis behind G, times A, shape (V, L)."""
-    sensor = measured.sensor
-    spectra = measured.family.at(values).spectra
+    sensor = channel.sensor
+    spectra = channel.family.at(values).spectra
     return np.asarray(spectra @ (sensor.transfer * sensor.wavenumbers.weights))
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 from memscal.friction import results
 from memscal.friction.results import percent
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, Quantity
 from memscal.model.records import ESTIMATE_FIT, SLIP_LENGTH
 from memscal.summaries.comparison import bounded_json, friction_name
@@ -63,16 +64,11 @@ def _law_table(direction: str, compared: results.LawComparison) -> Table:
         f"Laws of the {compared.lubrication or 'contact'} interface, {direction}: "
         "evidence over all loads, below the best"
     )
-    rows = [
-        [
-            law.name,
-            _best(compared, law),
-            f"{law.log_evidence - best:.1f}",
-            f"{law.least / law.degrees:.2f}" if law.degrees > 0 else "",
-            f"{law.p_value:.2g}",
-        ]
-        for law in compared.laws
-    ]
+    rows = []
+    for law in compared.laws:
+        below = f"{law.log_evidence - best:.1f}"
+        reduced = f"{law.least / law.degrees:.2f}" if law.degrees > 0 else ""
+        rows.append([law.name, _best(compared, law), below, reduced, f"{law.p_value:.2g}"])
     return Table(title, ["law", "best", "ln of evidence", "χ²/ν", "p"], rows)
 
 
@@ -85,17 +81,23 @@ def _best(compared: results.LawComparison, law: results.InterfaceLaw) -> str:
 
 def _length_table(direction: str, compared: results.LawComparison) -> Table:
     words = "slip length" if direction == "tangential" else "length"
-    length = str(compared.length)
     rows = []
     for factor in compared.factors:
-        yielding = factor.favoured == compared.laws[-1].name
-        law, side = (factor.against, "for") if yielding else (factor.favoured, "against")
+        law = factor.favoured
+        side = "against"
+        sign = -1
+        if law == compared.laws[-1].name:
+            law = factor.against
+            side = "for"
+            sign = 1
         value = f"{factor.value:.3g}" if factor.value < 1e6 else f"{factor.value:.1e}"
         ratio = factor.log_likelihood_ratio
-        likelier = "" if ratio is None else f"{ratio if yielding else -ratio:+.1f}"
+        likelier = "" if ratio is None else f"{sign * ratio:+.1f}"
         rows.append([law, value, f"{side} it, {factor.words}", likelier])
-    level = f" [{percent(compared.length.interval.level)} interval]" if "[" in length else ""
-    title = f"The law that yields, {words} {length}{level}, against the others"
+    length = str(compared.length)
+    if compared.length.kind in (results.VALUE, results.INTERVAL):
+        length += f" [{percent(compared.length.interval.level)} interval]"
+    title = f"The law that yields, {words} {length}, against the others"
     return Table(title, ["law", "Bayes factor", "evidence", "ln of likelihoods"], rows)
 
 
@@ -104,23 +106,18 @@ def _implied_table(implied: results.ImpliedFriction) -> Table:
     for load, friction, pressure, stiffness in zip(
         implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
     ):
-        low, high = sorted((friction[0], friction[2]))
-        soft, stiff = sorted((stiffness[0], stiffness[2]))
-        rows.append(
-            [
-                f"{load:.4g}",
-                _between(friction[1], low, high),
-                f"{pressure / KPA:.4g}",
-                _between(*(value / _STIFFNESS.scale for value in (stiffness[1], soft, stiff))),
-            ]
-        )
+        stiff = _between(stiffness / _STIFFNESS.scale)
+        rows.append([f"{load:.4g}", _between(friction), f"{pressure / KPA:.4g}", stiff])
     head = [quantity.heading for quantity in IMPLIED]
     return Table("What the slip length means at each load [its 95 % interval]", head, rows)
 
 
-def _between(value: float, low: float, high: float) -> str:
-    best, least, most = (friction_name(float(f"{number:.2g}")) for number in (value, low, high))
-    return f"{best} [{least}, {most}]"
+def _between(ends_about_best: FloatArray) -> str:
+    """Return the best of three values, and the others as its interval."""
+    first, best, last = (float(f"{number:.2g}") for number in ends_about_best)
+    low = friction_name(min(first, last))
+    high = friction_name(max(first, last))
+    return f"{friction_name(best)} [{low}, {high}]"
 
 
 def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:

@@ -44,8 +44,7 @@ def relative_uncertainty(length: float, precision: Precision) -> float:
     """Return what the likelihood's slope tells about a slip length, everything else free."""
     family = slipping()
     points = read_without_error(family, length, precision)
-    found = measured(points, family)
-    curve = likelihood(points, found.sensor, family.at(length), range(len(LOADS)))
+    curve = likelihood(measured(points, family).at(length))
     t = family.coordinate(length)
     return float(1 / np.sqrt(curve.information[0])) / (t * (1 - t))
 

@@ -1,0 +1,172 @@
+"""Dry less lubricated stress at one load, in which errors of A and G nearly cancel."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from memscal.friction.effective import random_uncertainty
+from memscal.friction.likelihood import (
+    Channel,
+    LoadPoints,
+    Predicted,
+    points_at,
+    predict,
+    standardise,
+)
+from memscal.friction.results import DryAgainstLubricated
+from memscal.model.arrays import FloatArray
+from memscal.model.measured_stress import MeasuredProfile
+
+#: Loads that differ by less than this share are one.
+_SAME_LOAD = 0.05
+#: Places that are nearer than this share of a step are one.
+_CLOSE = 0.25
+_FEWEST_PLACES = 6
+
+
+def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int]]:
+    """Return the indices of dry and lubricated profiles of one load."""
+    pairs = []
+    for (i, dry), (j, lubricated) in product(enumerate(profiles), repeat=2):
+        kinds = (dry.lubrication, lubricated.lubrication)
+        if kinds == ("dry", "lubricated") and abs(dry.load / lubricated.load - 1) < _SAME_LOAD:
+            pairs.append((i, j))
+    return pairs
+
+
+def dry_against_lubricated(
+    profiles: Sequence[MeasuredProfile],  # dry, lubricated
+    frictionless: Channel,  # their points, and how voltages change with load and place
+    conversion_share: float,  # relative standard uncertainty of A
+) -> DryAgainstLubricated | None:
+    """Compare the dry and the lubricated profile of one load; None of too few places in common."""
+    # Errors of A, G and film nearly cancel in the difference: noise, the scatter of the loads, and
+    # each scan's own baseline, drift and centre are left.
+    averaged = [_averaged(points) for points in frictionless.points]
+    places = _common_places(averaged[0].offset, averaged[1].offset)
+    if places[0].size < _FEWEST_PLACES:
+        return None
+    readings = []
+    for i, points in enumerate(averaged):
+        common = _at_places(points, places[i])
+        predicted = predict(common, frictionless.sensor, frictionless.family, i)
+        readings.append((common, predicted))
+    points, predicted = readings[0]
+    # What the frictionless contact says of other places and loads is taken off both.
+    beyond = [own.u - calculated.signal[0] for own, calculated in readings]
+    noise, correlation = _noise_of_difference(readings)
+    apart = points_at(points.offset, points, beyond[0] - beyond[1], noise)
+    flat = np.column_stack([points.flat, predicted.slope[0] * points.side])
+    apart = replace(apart, flat=flat, correlation=correlation)
+    nothing = np.zeros((1, noise.size))
+    standardised = standardise(apart, Predicted(nothing, nothing, nothing, nothing, {}))
+    chi_square = float(standardised.statistics.chi_square[0])
+    stress = [_stress_at(profile, common) for profile, common in zip(profiles, places, strict=True)]
+    (dry, dry_variance), (lubricated, lubricated_variance) = stress
+    other, predicted = readings[1]
+    farther = predicted.slope[0] * (points.radius - other.radius)
+    heavier = predicted.by_load[0] * math.log(profiles[0].load / profiles[1].load)
+    moved = (farther + heavier) / frictionless.sensor.conversion_constant
+    difference = dry - lubricated - moved
+    conversion_variance = (conversion_share * difference) ** 2
+    errors = np.sqrt(dry_variance + lubricated_variance + conversion_variance)
+    top = profiles[0].maximum - profiles[1].maximum
+    random = [random_uncertainty(profile.maximum_budget) for profile in profiles]
+    top_uncertainty = math.hypot(conversion_share * top, *random)
+    return DryAgainstLubricated(
+        load=profiles[0].load,
+        r=points.radius,
+        difference=difference,
+        difference_errors=errors,
+        chi_square=chi_square,
+        degrees=apart.degrees,
+        p_value=float(chdtrc(apart.degrees, chi_square)),
+        maximum=top,
+        maximum_uncertainty=top_uncertainty,
+        relative=top / profiles[1].maximum,
+        relative_uncertainty=top_uncertainty / profiles[1].maximum,
+    )
+
+
+def _averaged(points: LoadPoints) -> LoadPoints:
+    """Return the mean of the repeats at each position, sorted by position."""
+    rounded = np.round(points.offset, 12)
+    order = np.argsort(rounded, kind="stable")
+    places, starts, counts = np.unique(rounded[order], return_index=True, return_counts=True)
+
+    def mean(values: FloatArray) -> FloatArray:
+        return np.asarray((np.add.reduceat(values[order], starts, axis=0).T / counts).T)
+
+    noise = np.sqrt(mean(points.noise**2) / counts)
+    correlation = None
+    if points.correlation is not None:
+        single = np.outer(points.noise, points.noise) * points.correlation
+        covariance = mean(mean(single).T)
+        noise = np.sqrt(np.diag(covariance))
+        correlation = covariance / np.outer(noise, noise)
+    return replace(
+        points,
+        u=mean(points.u),
+        offset=places,
+        log_load=mean(points.log_load),
+        noise=noise,
+        load_errors=np.sqrt(mean(points.load_errors**2) / counts),
+        # The stage errs alike in every repeat.
+        x_errors=mean(points.x_errors),
+        flat=mean(points.flat),
+        correlation=correlation,
+    )
+
+
+def _common_places(
+    dry: FloatArray, lubricated: FloatArray
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the indices of places that both scans measured, a quarter of a step apart at most."""
+    nearest = np.searchsorted((lubricated[1:] + lubricated[:-1]) / 2, dry)
+    step = float(np.median(np.diff(dry))) if dry.size > 1 else 0.0
+    close = np.flatnonzero(np.abs(dry - lubricated[nearest]) < _CLOSE * step)
+    matched, first = np.unique(nearest[close], return_index=True)
+    return close[first], matched
+
+
+def _stress_at(profile: MeasuredProfile, places: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+    """Return the stress at places of the sorted line, and its variance without that of A."""
+    order = np.argsort((profile.x, profile.y)[profile.axis])[places]
+    sources = [source for source in profile.roots if source != "conversion_constant"]
+    return profile.s_zz[order], profile.errors_by(*sources)[order] ** 2
+
+
+def _at_places(points: LoadPoints, places: NDArray[np.intp]) -> LoadPoints:
+    arrays: dict[str, Any] = {
+        name: getattr(points, name)[places]
+        for name in ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "flat")
+    }
+    if points.correlation is not None:
+        arrays["correlation"] = points.correlation[np.ix_(places, places)]
+    return replace(points, **arrays)
+
+
+def _noise_of_difference(
+    readings: Sequence[tuple[LoadPoints, Predicted]],
+) -> tuple[FloatArray, FloatArray | None]:
+    """Noise of a difference, in V, without what both scans share, and its correlation if any."""
+    variance = np.zeros(())
+    shared = None
+    for points, predicted in readings:
+        by_load = predicted.by_load[0] * points.load_errors
+        by_place = predicted.slope[0] * points.x_errors
+        variance = variance + points.noise**2 + by_load**2 + by_place**2
+        if points.correlation is not None:
+            apart = points.correlation - np.eye(points.u.size)
+            covariance = np.outer(points.noise, points.noise) * apart
+            shared = covariance if shared is None else shared + covariance
+    noise = np.sqrt(variance)
+    if shared is None:
+        return noise, None
+    return noise, np.eye(noise.size) + shared / np.outer(noise, noise)

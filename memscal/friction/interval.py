@@ -1,0 +1,94 @@
+"""The interval of a friction coefficient, or of a length, by its profile likelihood."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri
+
+from memscal.friction.results import BoundedEstimate, Interval
+from memscal.model.arrays import FloatArray
+from memscal.model.notation import format_bound
+
+#: Level of one standard deviation of a normal distribution.
+_ONE_SIGMA = 0.6827
+
+
+def profile_estimate(
+    values: FloatArray,
+    coordinates: FloatArray,
+    deviance: FloatArray,
+    chi_square: FloatArray,
+    value_at: Callable[[float], float],
+    *,
+    reason: Callable[[Interval], str],
+    two_sided: bool = False,
+    level: float = 0.95,
+    unit: str = "",
+) -> BoundedEstimate:
+    """Return best value and interval of -2 ln p (m,) along an increasing bounded coordinate."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(coordinates, deviance)
+    # The lowest point of the spline next to the lowest node.
+    i = int(np.argmin(deviance))
+    around = coordinates[max(i - 1, 0) : i + 2]
+    turns = spline.derivative().roots(extrapolate=False)
+    turns = turns[(around[0] < turns) & (turns < around[-1])]
+    best = float(min([coordinates[i], *turns], key=spline))
+    lowest = float(spline(best))
+
+    def interval_of(level: float) -> Interval:
+        top = lowest + float(chdtri(1, 1 - level))
+        inside = np.append(coordinates[deviance <= top], best)
+        low = _crossing(spline, coordinates, float(inside.min()), -1, top)
+        high = _crossing(spline, coordinates, float(inside.max()), 1, top)
+        lower = 0.0 if low is None else value_at(low)
+        return Interval(lower, None if high is None else value_at(high), level)
+
+    interval = interval_of(level)
+    value = None
+    spread = None
+    # Without an upper end there is no value, with ``two_sided`` without both; ``reason`` says why.
+    if interval.two_sided or (interval.high is not None and not two_sided):
+        value = value_at(best)
+        narrow = interval_of(_ONE_SIGMA)
+        if narrow.high and narrow.low > 0:
+            spread = (narrow.high - narrow.low) / 2
+    least = float(CubicSpline(coordinates, chi_square)(best))
+    above = deviance - lowest + least
+    return BoundedEstimate(
+        value, spread, interval, reason(interval), values, above, least, unit=unit
+    )
+
+
+def _crossing(
+    spline: Any, coordinates: FloatArray, start: float, side: int, level: float
+) -> float | None:
+    """Where the spline rises through a level next to an inside point; None beyond the ends."""
+    beyond = coordinates[coordinates * side > start * side]
+    if not beyond.size:
+        return None
+    outside = float(beyond.min() if side > 0 else beyond.max())
+    if spline(outside) <= level:
+        return None
+    roots = spline.solve(level, extrapolate=False)
+    between = roots[(min(start, outside) <= roots) & (roots <= max(start, outside))]
+    return float(min(between, key=lambda root: abs(root - start), default=start))
+
+
+def friction_reason(interval: Interval, last: float) -> str:
+    """Say why there is no friction coefficient, ``last`` being the last one that was calculated."""
+    if interval.high is not None:
+        return ""
+    end = "full stick" if np.isinf(last) else f"{last:.3g}, the last one calculated,"
+    if interval.low <= 0:
+        return (
+            f"The friction coefficient is not identifiable: no friction and {end} agree with the "
+            "data equally well."
+        )
+    bound = format_bound(interval.low, upper=False)
+    return (
+        f"The friction coefficient is not identifiable above {bound}: every larger one, {end} "
+        "included, agrees with the data as well. This is a lower bound."
+    )
