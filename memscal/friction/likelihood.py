@@ -465,15 +465,14 @@ class Likelihood:
         """Fit the slopes by the systematic columns: what is left, squared, and coefficients."""
         # By Woodbury's identity, C^-1 = 1 - D (1 + D^T D)^-1 D^T.
         information = self.statistics.information
-        square = np.zeros(())
-        projection = np.zeros(())
+        square: FloatArray = np.zeros(())
+        projection: FloatArray = np.zeros(())
         for load in self.loads:
             square = square + np.sum(load.slope**2, axis=-1)
             projection = projection + (load.slope[:, None] @ load.columns)[:, 0]
         prior = np.eye(information.shape[-1])
-        response = np.linalg.solve(information + prior, projection[..., None])[..., 0]
-        left = square - np.sum(projection * response, axis=-1)
-        return np.asarray(left, dtype=np.float64), response
+        response = np.asarray(np.linalg.solve(information + prior, projection[..., None]))[..., 0]
+        return square - np.sum(projection * response, axis=-1), response
 
     def budget(self) -> dict[str, float]:
         """Contribution of each source to the coordinate's uncertainty, at the first value."""
