@@ -5,19 +5,18 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from itertools import chain, islice, repeat
 from numbers import Integral
-from threading import Lock, Thread, get_ident
-from types import ModuleType
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from memscal.errors import InputError, MemscalError
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future, ProcessPoolExecutor
+    from concurrent.futures import Executor, Future
     from multiprocessing.connection import Connection
 
     from threadpoolctl import ThreadpoolController
@@ -31,12 +30,8 @@ THREAD_VARIABLES = (
 )
 
 
-#: Those of them that an open pool has set, which the user has not.
-_SET_BY_POOL: set[str] = set()
-
-
 def _set_by_user() -> bool:
-    return any(name in os.environ for name in THREAD_VARIABLES if name not in _SET_BY_POOL)
+    return any(name in os.environ for name in THREAD_VARIABLES)
 
 
 def one_thread_per_process() -> None:
@@ -65,8 +60,7 @@ def single_threaded() -> Iterator[None]:
             yield
 
 
-#: Windows refuses more than 61.
-_MOST_WORKERS = 61 if sys.platform == "win32" else 512
+_MOST_WORKERS = 512
 
 
 def cores() -> int:
@@ -82,103 +76,45 @@ def require_workers(workers: Any) -> None:
         raise InputError(problem, cure="Give one process per core, at the most.")
 
 
-_OF_SCRIPT = ("init_main_from_name", "init_main_from_path")
-_STARTING = Lock()
-
-
 @contextmanager
-def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes, started afresh: one forked from one with threads may hang."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import spawn
-    from multiprocessing.context import SpawnContext
+def worker_pool(workers: int) -> Iterator[Executor]:
+    """Yield a pool of processes; they end with this one, however it ends."""
+    import signal
+    from multiprocessing import Pipe, resource_tracker
 
-    # BLAS reads its number of threads, one, from the environment, which is put back afterwards.
-    unset = [name for name in THREAD_VARIABLES if name not in os.environ]
-    os.environ.update(dict.fromkeys(unset, "1"))
-    _SET_BY_POOL.update(unset)
-    context: Any = SpawnContext()
-    context.Process = _process
-    data = spawn.get_preparation_data("")
-    theirs, ours = context.Pipe(duplex=False)
-    told = theirs, {key: data[key] for key in _OF_SCRIPT if key in data}
-    pool = ProcessPoolExecutor(workers, context, initializer=_begin_worker, initargs=told)
+    from loky import ProcessPoolExecutor
+
+    # loky starts them afresh, for one forked from one with threads may hang, and without this
+    # one's script, which needs no guard then.  A worker that grows by a large scan does not leak.
+    environment = {name: "1" for name in THREAD_VARIABLES if name not in os.environ}
+    environment["LOKY_MAX_MEMORY_LEAK_SIZE"] = "1e18"
+    watched, lifeline = Pipe(duplex=False)
+    pool = ProcessPoolExecutor(workers, initializer=_watch, initargs=(watched,), env=environment)
     try:
+        # Ctrl-C is this process's affair: workers inherit that it is blocked while they start.
+        resource_tracker.ensure_running()  # at its own start it would lift the block
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        pool.submit(int)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         with workers_that_last():
             yield pool
             pool.shutdown()
     finally:
-        ours.close()  # ends the workers at once, where their work is not wanted any more
-        pool.shutdown(cancel_futures=True)
-        theirs.close()
-        _SET_BY_POOL.difference_update(unset)
-        for name in unset:
-            os.environ.pop(name, None)
+        lifeline.close()  # ends the workers at once, where their work is not wanted any more
+        pool.shutdown()
+        watched.close()
 
 
-def _process(*args: Any, **kwargs: Any) -> Any:
-    """Return a process that does not import the script of this one, which needs no guard then."""
-    from multiprocessing.context import SpawnProcess
+def _watch(lifeline: Connection) -> None:
+    """Have a worker end with its parent, whose end of the pipe closes with it."""
 
-    process: Any = SpawnProcess(*args, **kwargs)
-    process._Popen = _start_without_script
-    return process
-
-
-def _start_without_script(process: Any) -> Any:
-    from multiprocessing import spawn
-    from multiprocessing.context import SpawnProcess
-
-    with _STARTING:
-        prepared = spawn.get_preparation_data
-        ours = get_ident()
-
-        def without_script(name: str) -> dict[str, object]:
-            left_out = _OF_SCRIPT if get_ident() == ours else ()
-            return {k: v for k, v in prepared(name).items() if k not in left_out}
-
-        spawn.get_preparation_data = without_script
-        try:
-            return SpawnProcess._Popen(process)
-        finally:
-            spawn.get_preparation_data = prepared
-
-
-class _Script(ModuleType):
-    """``__main__`` of a worker: the parent's script, run when a class or function of it is met."""
-
-    def __init__(self, script: Mapping[str, Any]) -> None:
-        super().__init__("__main__")
-        self.__dict__["__script__"] = script
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        from multiprocessing import current_process, spawn
-
-        process: Any = current_process()
-        process._inheriting = True  # refuses processes that the script would start
-        try:
-            spawn.prepare(self.__script__)
-        finally:
-            del process._inheriting
-        return getattr(sys.modules["__main__"], name)
-
-
-def _begin_worker(lifeline: Connection, script: Mapping[str, Any]) -> None:
-    """Prepare a worker to end with its parent, whose end of the pipe closes with it."""
-    import signal
-
-    def watch() -> None:
+    def end() -> None:
         try:
             lifeline.poll(None)
         finally:
             os._exit(1)
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's affair
-    if script:
-        sys.modules["__main__"] = _Script(script)
-    Thread(target=watch, daemon=True).start()
+    Thread(target=end, daemon=True).start()
 
 
 #: Items that a task has at the most; tasks in flight for each worker.
@@ -208,7 +144,7 @@ def shared(
         chunk = max(2, min(chunk, len(items) // (4 * workers)))
         workers = min(workers, -(-len(items) // chunk))
     else:  # the first tasks are small, for there may be no more
-        small = [size for size in (1, 2, 4, 8) for _ in range(workers)]
+        small = sorted([1, 2, 4, 8] * workers)
     failed: list[BaseException] = []
     chunks = _chunks(source, chain(small, repeat(chunk)), failed)
     with ExitStack() as stack:

@@ -74,6 +74,7 @@ ONLY_IN = {
 
 SLOW = {
     "distributed",
+    "loky",
     "matplotlib",
     "meshio",
     "openpyxl",
