@@ -17,9 +17,10 @@ from memscal.errors import FormatError, InputError, MemscalError
 from memscal.extensions.fleet.results import FleetResults
 from memscal.formats.files import atomic_write_bytes, read_bytes
 from memscal.model.apparatus import ApparatusData
+from memscal.model.arrays import FloatArray
 from memscal.model.checks import OVERRIDE, Message
 from memscal.model.notation import VOLTS, Reading
-from memscal.model.quantities import ESTIMATED, parameter_quantity
+from memscal.model.quantities import ESTIMATED, MM, PER_MM, PER_MM2, parameter_quantity
 from memscal.version import __version__
 
 FLEET_SCHEMA = "memscal-fleet"
@@ -73,7 +74,8 @@ def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
     """Read a table with a column ``path``, or without a head a path a line, commas included."""
     head: list[str] = []
     for number, line in enumerate(lines, start=1):
-        if not (text := line.strip()) or text.startswith("#"):
+        text = line.strip()
+        if not text or text.startswith("#"):
             continue
         cells = [cell.strip() for cell in next(csv.reader([text]))]
         if not head:
@@ -121,7 +123,6 @@ _TEXTS = (
     "unit",
 )
 _CHECK = ("value", "limit", "p_value")
-_UNCERTAINTY = ("quantity", "source")
 
 
 def arrow() -> Any:
@@ -138,53 +139,91 @@ def _schema(readings: Iterable[Reading]) -> Any:
     """Return names, types and units of the columns, for sensors with readings in some units."""
     pa = arrow()
     single = pa.float32()
-    text = pa.string()
     double = pa.float64()
+    text = pa.string()
+    message = {"kind": text, "text": text}
+    source = {"quantity": text, "source": text, "errors": single}
     check = {"name": text, "passed": pa.bool_(), **dict.fromkeys(_CHECK, single)}
-    source = {**dict.fromkeys(_UNCERTAINTY, text), "errors": single}
-    columns = {"place": pa.int64(), **dict.fromkeys(_TEXTS, text), "passed": pa.bool_()}
-    columns |= dict.fromkeys(("wafer_x", "wafer_y", "resolved_wavenumber"), double)
-    columns |= {name: pa.list_(single) for name in ("r", "g", "g_errors", "correlation")}
-    columns |= {"correlated": pa.list_(text), "checks": pa.list_(pa.struct(check))}
-    columns |= {"messages": pa.list_(pa.struct(dict.fromkeys(("kind", "text"), text)))}
-    columns |= {"budget": pa.list_(pa.struct(source))}
-    units = {"wafer_x": "mm", "wafer_y": "mm", "r": "mm", "resolved_wavenumber": "rad/mm"}
-    units |= {"g": "1/mm^2", "g_errors": "1/mm^2", "correlation": "1"}
-    for name in _PARAMETERS:
-        stated = " or ".join(sorted({ESTIMATED[name].read_in(r).unit_text for r in readings}))
-        columns |= {name: double, f"{name}_errors": double}
-        units |= {name: stated, f"{name}_errors": stated}
-    about = {name: {"units": unit} for name, unit in units.items()}
-    return pa.schema([pa.field(n, kind, metadata=about.get(n)) for n, kind in columns.items()])
+    columns = {
+        "place": pa.int64(),
+        **dict.fromkeys(_TEXTS, text),
+        "passed": pa.bool_(),
+        "wafer_x": double,
+        "wafer_y": double,
+        "resolved_wavenumber": double,
+        "r": pa.list_(single),
+        "g": pa.list_(single),
+        "g_errors": pa.list_(single),
+        "correlation": pa.list_(single),
+        "correlated": pa.list_(text),
+        "checks": pa.list_(pa.struct(check)),
+        "messages": pa.list_(pa.struct(message)),
+        "budget": pa.list_(pa.struct(source)),
+    }
+    units = {
+        "wafer_x": "mm",
+        "wafer_y": "mm",
+        "resolved_wavenumber": "rad/mm",
+        "r": "mm",
+        "g": "1/mm^2",
+        "g_errors": "1/mm^2",
+        "correlation": "1",
+    }
+    for parameter in _PARAMETERS:
+        stated = {ESTIMATED[parameter].read_in(reading).unit_text for reading in readings}
+        for name in (parameter, f"{parameter}_errors"):
+            columns[name] = double
+            units[name] = " or ".join(sorted(stated))
+    fields = []
+    for name, kind in columns.items():
+        about = {"units": units[name]} if name in units else None
+        fields.append(pa.field(name, kind, metadata=about))
+    return pa.schema(fields)
 
 
 def fleet_row(data: ApparatusData) -> dict[str, Any]:
     """Return an apparatus function as a row, in the units of files."""
     parameters = data.parameters
     radial = data.radial_profile
-    scales = {name: parameter_quantity(parameters, name).scale for name in parameters.names}
-    names = [name for name in _PARAMETERS if name in scales]
-    row: dict[str, Any] = {"passed": data.passed, "calibrated_at": data.process.date}
-    row |= {"method": data.process.configuration["method"], "reading": data.reading}
-    row["unit"] = parameter_quantity(parameters, "conversion_constant").unit_text
-    row["messages"] = [{"kind": m.kind, "text": m.text} for m in data.process.messages]
-    row |= {name: parameters[name] / scales[name] for name in names}
-    row |= {f"{name}_errors": parameters.uncertainty(name) / scales[name] for name in names}
-    covariance = parameters.only(names).covariance
-    above = np.triu_indices(len(names), 1)
+    quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
+    names = [name for name in _PARAMETERS if name in quantities]
+    row: dict[str, Any] = {
+        "passed": data.passed,
+        "calibrated_at": data.process.date,
+        "method": data.process.configuration["method"],
+        "reading": data.reading,
+        "unit": quantities["conversion_constant"].unit_text,
+        "messages": [{"kind": m.kind, "text": m.text} for m in data.process.messages],
+        "checks": [
+            {key: getattr(check, key) for key in ("name", "passed", *_CHECK)}
+            for check in data.checks
+        ],
+        "correlated": names,
+        "correlation": _correlation(parameters.only(names).covariance),
+        "resolved_wavenumber": data.resolved_wavenumber / PER_MM,
+        "r": radial.r / MM,
+        "g": radial.g / PER_MM2,
+        "g_errors": radial.g_errors / PER_MM2,
+    }
+    for name in names:
+        scale = quantities[name].scale
+        row[name] = parameters[name] / scale
+        row[f"{name}_errors"] = parameters.uncertainty(name) / scale
+    row["budget"] = []
+    for name, sources in data.budget.items():
+        for source, u in sources.items():
+            if u > 0:
+                errors = u / quantities[name].scale
+                row["budget"].append({"quantity": name, "source": source, "errors": errors})
+    return row
+
+
+def _correlation(covariance: FloatArray) -> FloatArray:
+    """Coefficients of correlation above the diagonal, row by row."""
     u = np.sqrt(np.diag(covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
-        row |= {"correlated": names, "correlation": (covariance / np.outer(u, u))[above]}
-    row["budget"] = [
-        {"quantity": name, "source": source, "errors": u / scales[name]}
-        for name, sources in data.budget.items()
-        for source, u in sources.items()
-        if u > 0
-    ]
-    of_check = ("name", "passed", *_CHECK)
-    row["checks"] = [{key: getattr(check, key) for key in of_check} for check in data.checks]
-    row["resolved_wavenumber"] = data.resolved_wavenumber * 1e-3
-    return row | {"r": radial.r * 1e3, "g": radial.g * 1e-6, "g_errors": radial.g_errors * 1e-6}
+        correlation = covariance / np.outer(u, u)
+    return np.asarray(correlation[np.triu_indices(u.size, 1)])
 
 
 def write_shard(path: Path, rows: Sequence[Mapping[str, Any]], digest: str) -> None:
@@ -209,7 +248,8 @@ def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
         stated = file.schema_arrow.metadata or {}
         if stated.get(b"memscal_schema") != FLEET_SCHEMA.encode():
             raise FormatError(f"{path} is a Parquet file, but none of memscal batch.")
-        if missing := set(columns or ()) - set(file.schema_arrow.names):
+        missing = set(columns or ()) - set(file.schema_arrow.names)
+        if missing:
             cure = "Run memscal batch --resume with this one."
             problem = f"{path} was written by an earlier memscal."
             raise FormatError(problem, why=f"It lacks {', '.join(sorted(missing))}.", cure=cure)
@@ -251,7 +291,7 @@ _NUMBERS = (
     "wafer_x",
     "wafer_y",
 )
-_OF_SUMMARY = (
+_SUMMARISED = (
     *_NUMBERS,
     "path",
     "passed",
@@ -267,14 +307,14 @@ _OF_SUMMARY = (
 
 
 @dataclass
-class _Told:
+class _Statements:
     """What the rows of a batch say beside their numbers; scans by their numbers."""
 
     paths: list[str] = field(default_factory=list)
     failed: dict[int, tuple[str, ...]] = field(default_factory=dict)
     errors: dict[int, tuple[str, str]] = field(default_factory=dict)
     units: dict[str, int] = field(default_factory=dict)  # the first scan in each
-    done_with: dict[tuple[str, ...], int] = field(default_factory=dict)  # and with each setting
+    settings: dict[tuple[str, ...], int] = field(default_factory=dict)  # and with each setting
     overridden: dict[int, str] = field(default_factory=dict)
     contents: set[int] = field(default_factory=set)
     repeated: list[int] = field(default_factory=list)
@@ -285,34 +325,37 @@ class _Told:
         self.paths += table["path"].to_pylist()
         for place in np.flatnonzero(~table["passed"].to_numpy().astype(bool)):
             row = table.slice(place, 1).to_pylist()[0]
-            checks = row["checks"] or ()
             number = start + int(place)
-            self.failed[number] = tuple(c["name"] for c in checks if not c["passed"])
+            checks = row["checks"] or ()
+            self.failed[number] = tuple(check["name"] for check in checks if not check["passed"])
             if row["error"]:
-                self.errors[number] = row["error_class"], row["error"]
-        settings = zip(*(table[n].to_pylist() for n in ("options_sha256", "version")), strict=True)
-        for i, setting in enumerate(settings, start):
-            self.done_with.setdefault(setting, i)
-        for i, unit in enumerate(table["unit"].to_pylist(), start):
+                self.errors[number] = (row["error_class"], row["error"])
+        names = ("options_sha256", "version", "unit", "messages", "input_sha256")
+        columns = [table[name].to_pylist() for name in names]
+        for number, row in enumerate(zip(*columns, strict=True), start):
+            options, version, unit, messages, digest = row
+            self.settings.setdefault((options, version), number)
             if unit:
-                self.units.setdefault(unit, i)
-        for i, messages in enumerate(table["messages"].to_pylist(), start):
+                self.units.setdefault(unit, number)
             for message in messages or ():
                 if message["kind"] == OVERRIDE:
-                    self.overridden.setdefault(i, message["text"])
-        for i, digest in enumerate(table["input_sha256"].to_pylist(), start):
-            if digest and (short := int(digest[:15], 16)) in self.contents:
-                self.repeated.append(i)
-            elif digest:
-                self.contents.add(short)
+                    self.overridden.setdefault(number, message["text"])
+            if digest:
+                self._add_content(number, int(digest[:15], 16))
+
+    def _add_content(self, number: int, digest: int) -> None:
+        if digest in self.contents:
+            self.repeated.append(number)
+        self.contents.add(digest)
 
     def messages(self, scans: int) -> Iterator[Message]:
         """Yield what is missing of so many scans, mixed, repeated or overridden."""
         if len(self.paths) < scans:
             text = f"The batch is not finished: {len(self.paths)} of {scans} scans are done."
             yield Message("unfinished", f"{text} memscal batch --resume does the rest.", "warning")
-        if (kinds := len(self.done_with)) > 1:
-            first = ", ".join(self.paths[i] for i in self.done_with.values())
+        kinds = len(self.settings)
+        if kinds > 1:
+            first = ", ".join(self.paths[i] for i in self.settings.values())
             text = f"The scans were calibrated with {kinds} different options or versions"
             yield Message("mixed", f"{text}; the first of each: {first}.", "warning")
         if self.repeated:
@@ -329,27 +372,30 @@ class _Told:
 
 def read_fleet(results: Path) -> FleetResults:
     """Read what a summary needs of the tables of a batch, one after the other."""
-    if not (shards := shard_paths(results)):
+    shards = shard_paths(results)
+    if not shards:
         cure = "Give the folder that memscal batch -o wrote."
         raise InputError(f"{results} holds no results of a batch.", cure=cure)
-    told = _Told()
+    statements = _Statements()
     numbers = []
     for shard in shards:
-        table = read_shard(shard, _OF_SUMMARY)
+        table = read_shard(shard, _SUMMARISED)
         numbers.append([table[name].to_numpy().astype(np.float64) for name in _NUMBERS])
-        told.add(table)
-    if len(told.units) > 1:
-        kinds = ", ".join(f"{unit} (as {told.paths[i]})" for unit, i in told.units.items())
+        statements.add(table)
+    if len(statements.units) > 1:
+        kinds = ", ".join(
+            f"{unit} (as {statements.paths[i]})" for unit, i in statements.units.items()
+        )
         cure = "Run a batch for each unit of readings."
         why = f"The conversion constants are in {kinds}."
         raise FormatError(f"{results} holds sensors of several kinds.", why=why, cure=cure)
     columns = dict(zip(_NUMBERS, np.concatenate(numbers, axis=1), strict=True))
     return FleetResults(
-        paths=told.paths,
-        failed=told.failed,
-        errors=told.errors,
-        unit=next(iter(told.units), ""),
+        paths=statements.paths,
+        failed=statements.failed,
+        errors=statements.errors,
+        unit=next(iter(statements.units), ""),
         name=os.path.basename(os.path.realpath(results)),
-        messages=tuple(told.messages(read_batch(results).get("scans", 0))),
+        messages=tuple(statements.messages(read_batch(results).get("scans", 0))),
         **columns,
     )
