@@ -31,7 +31,7 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.progress import counted
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
@@ -131,7 +131,7 @@ class _Band:
     at_nodes: tuple[ComplexArray, ComplexArray]  # (ky, m), (kx, n)
     at_g: tuple[ComplexArray, ComplexArray]
     at_points: tuple[ComplexArray, ComplexArray]
-    nodes: tuple[NDArray[np.intp], NDArray[np.intp]]  # rows and columns of G in the lattice
+    nodes: tuple[IndexArray, IndexArray]  # rows and columns of G in the lattice
     twice: FloatArray  # (kx,): components of negative kx are the conjugates of the others
     every: int  # nodes of the lattice for each of the nodes
     count: int  # nodes of the lattice
@@ -143,7 +143,7 @@ class _Band:
         ratio: ComplexArray,
         window: FloatArray,
         axes: tuple[FloatArray, FloatArray],
-        stated: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+        stated: tuple[BoolArray, BoolArray],
     ) -> _Band:
         """Return the band in which a window is open; ``axes``, ``stated``: x and y of nodes."""
         open_ = window > _CLOSED
@@ -211,7 +211,7 @@ class _OfParameters:
         cls,
         estimate: ProfileEstimate,
         axes: tuple[FloatArray, FloatArray],
-        inside: NDArray[np.intp],
+        inside: IndexArray,
         taper: FloatArray,
         band: _Band,
         divided: Callable[[FloatArray], FloatArray],

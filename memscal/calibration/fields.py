@@ -9,7 +9,6 @@ from typing import ClassVar, TypeAlias
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
@@ -21,7 +20,7 @@ from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.places import EvenAxis
 from memscal.readings.find_places import even_lattice
 
@@ -157,7 +156,7 @@ class RasterFields:
     support: float
     step: float
     oval: Callable[[FloatArray, FloatArray], FloatArray]
-    index: tuple[NDArray[np.intp], NDArray[np.intp]]
+    index: tuple[IndexArray, IndexArray]
     even: bool
 
     @classmethod
@@ -302,7 +301,7 @@ Fields: TypeAlias = LineFields | RasterFields
 """Voltage and stress on one grid, with the ways back from the grid."""
 
 
-def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray, NDArray[np.intp]]:
+def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray, IndexArray]:
     """Continue a raster's axis on both sides, to an odd number of nodes; index the points."""
     steps = int(np.rint(reach / axis.step))
     padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step))) + 1

@@ -7,7 +7,6 @@ of freedom.  Others predict a group of points from the rest, or look for a ceili
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
 
 from memscal.axisymmetry.kernels import gaussian_transfer
@@ -20,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.model.checks import FALSE_ALARM
 
 #: More groups than this are held out several at a time.
@@ -40,14 +39,14 @@ class HeldOut(TestOutcome):
     alone: bool  # whether each group was held out by itself: of more than ten, several are at once
 
 
-def load_groups(load: FloatArray) -> NDArray[np.intp]:
+def load_groups(load: FloatArray) -> IndexArray:
     """Number the loads: those closer than a twentieth of their mean are one, shape (n,)."""
     levels = np.unique(load)
     start = np.concatenate([[0], np.cumsum(np.diff(levels) > _SAME_LOAD * load.mean())])
     return np.asarray(start[np.searchsorted(levels, load)], dtype=np.intp)
 
 
-def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
+def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     """Predict each group of points from the others; ``None`` with fewer than two such groups."""
     # The distance of the group's data from the prediction, in the covariance of noise and
     # parameters, is S(all) - S(others) of residual sums of squares (Chow, Econometrica 28, 1960).
@@ -56,19 +55,23 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     # Clipped: many outliers in one group count together, and a single one counts little.
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
-    nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
+    nuisances = slice(
+        2, 2 + int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
+    )
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
     # The triangular factors of each fold's design and data stand for them.
-    roots = {}
-    for i in np.unique(fold):
-        rows = np.flatnonzero(fold == i)
-        both = np.column_stack([model.design[rows], model.data[rows]])
-        roots[int(i)] = triangular(both), rows.size
-    predicted = {i: _predict(model.stated, roots, i, slice(2, 2 + nuisances)) for i in roots}
-    outcomes = {i: outcome for i, outcome in predicted.items() if outcome is not None}
-    if (folds := len(outcomes)) < 2:
+    both = np.column_stack([model.design, model.data])
+    roots = {int(i): triangular(both[fold == i]) for i in np.unique(fold)}
+    sizes = {i: int(np.sum(fold == i)) for i in roots}
+    outcomes = {}
+    for i in roots:
+        outcome = _predict(model.stated, roots, sizes, i, nuisances)
+        if outcome is not None:
+            outcomes[i] = outcome
+    folds = len(outcomes)
+    if folds < 2:
         return None
     worst = min(outcomes, key=lambda i: outcomes[i][0])
     p_value, value, degrees, rest = outcomes[worst]
@@ -80,24 +83,23 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
 
 
 def _predict(
-    stated: bool, roots: dict[int, tuple[FloatArray, int]], out: int, nuisances: slice
+    stated: bool, roots: dict[int, FloatArray], sizes: dict[int, int], out: int, nuisances: slice
 ) -> tuple[float, float, int, int | None] | None:
     """P-value, chi-square per degree, its degrees, those of the others if no noise is stated."""
-    rest = [root for i, root in roots.items() if i != out]
-    (own, own_count) = roots[out]
-    joined = np.vstack([root for root, _ in rest])
-    count = sum(number for _, number in rest)
+    own = roots[out]
+    rest = np.vstack([root for i, root in roots.items() if i != out])
+    both = np.vstack([rest, own])
     # What a fold alone determines is zero in the others but for rounding.
-    size = np.linalg.norm(np.vstack([joined, own])[:, :-1], axis=0)
-    others, rank = _left_over(joined, size)
-    others_degrees = count - rank
-    beside = np.vstack([np.zeros((len(joined), own[:, nuisances].shape[1])), own[:, nuisances]])
-    whole = np.hstack([beside, np.vstack([joined, own])])
-    both, rank = _left_over(whole, np.append(size[nuisances], size))
-    degrees = count + own_count - rank - others_degrees
+    size = np.linalg.norm(both[:, :-1], axis=0)
+    others, rank = _left_over(rest, size)
+    others_degrees = sum(sizes.values()) - sizes[out] - rank
+    of_own = both[:, nuisances].copy()
+    of_own[: len(rest)] = 0.0
+    left, rank = _left_over(np.hstack([of_own, both]), np.append(size[nuisances], size))
+    degrees = sum(sizes.values()) - rank - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
-    value = max(both - others, 0.0) / degrees
+    value = max(left - others, 0.0) / degrees
     if stated:
         return float(chdtrc(degrees, degrees * value)), value, degrees, None
     value /= max(others / others_degrees, np.finfo(float).tiny)
@@ -129,24 +131,28 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     shifted = np.diff(scan, prepend=-1) == 0
     common, apart, links = _without_repeats(estimate, model, own, shifted)
     size: FloatArray = np.linalg.norm(model.design, axis=0)
-    (without, rank), (left, _) = (_left_over(np.vstack(stack), size) for stack in (common, apart))
+    stack = np.vstack(apart)
+    without, rank = _left_over(np.vstack(common), size)
+    left, _ = _left_over(stack, size)
     count = int(shifted.sum())
     degrees = model.data.size - 2 * repeats.size - rank - count
     if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
         return None
-    stack = np.vstack(apart)
     coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
+    shifts = []
+    for link in links:
+        of_shifts = link[:, : len(link)]
+        others = link[:, len(link) : -1]
+        shifts.append(np.linalg.solve(of_shifts, link[:, -1] - others @ coefficients))
     places = np.zeros(repeats.size)
-    known = [link[:, -1] - link[:, len(link) : -1] @ coefficients for link in links]
-    pairs = zip(links, known, strict=True)
-    places[shifted] = np.concatenate([np.linalg.solve(a[:, : len(a)], b) for a, b in pairs])
+    places[shifted] = np.concatenate(shifts)
     # Over the scatter that is left: exact whether the noise is stated or not.
     value = max(without - left, 0.0) / count / (left / degrees)
     return CentresApart(
         value=value,
         limit=float(fdtri(count, degrees, 1 - FALSE_ALARM)),
         p_value=float(fdtrc(count, degrees, value)),
-        distance=float(max(np.ptp(places[scan == i]) for i in range(points.scans))),
+        distance=max(float(np.ptp(places[scan == i])) for i in range(points.scans)),
     )
 
 
@@ -154,7 +160,7 @@ def _without_repeats(
     estimate: ProfileEstimate,
     model: residuals.FreeModel,
     own: FloatArray,
-    shifted: NDArray[np.bool_],
+    shifted: BoolArray,
 ) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
     """Eliminate what is each repeat's own (n, 3), with one centre and with shifts; what links both.
 
@@ -163,21 +169,26 @@ def _without_repeats(
     points = estimate.points
     weights = estimate.weights / estimate.outlier_weight
     repeats = np.unique(points.repeat)
-    alone = points.decorrelation is None
-    groups = [[i] for i in range(repeats.size)] if alone else [list(range(repeats.size))]
+    independent = points.decorrelation is None
+    numbers = range(repeats.size)
     common = []
     apart = []
     links = []
-    for group in groups:
-        rows = np.flatnonzero(points.repeat[model.point] == repeats[group[0]])
-        rows = rows if alone else np.arange(model.point.size)
-        columns = [own * (points.repeat == repeats[i])[:, None] for i in group]
-        standard = [points.standardised(c, weights)[model.point[rows]] for c in columns]
-        parts = [c[:, :2] for c in standard]
-        parts += [c[:, 2:] for i, c in zip(group, standard, strict=True) if shifted[i]]
-        first = 2 * len(group)
-        last = 2 * len(group) + int(shifted[group].sum())
-        root = triangular(np.hstack([*parts, model.design[rows], model.data[rows, None]]))
+    for group in [[i] for i in numbers] if independent else [[*numbers]]:
+        inside = points.repeat[model.point] == repeats[group[0]]
+        rows = np.flatnonzero(inside) if independent else np.arange(model.point.size)
+        lines = []
+        shifts = []
+        for i in group:
+            columns = own * (points.repeat == repeats[i])[:, None]
+            columns = points.standardised(columns, weights)[model.point[rows]]
+            lines.append(columns[:, :2])
+            if shifted[i]:
+                shifts.append(columns[:, 2:])
+        first = 2 * len(lines)
+        last = first + len(shifts)
+        columns = [*lines, *shifts, model.design[rows], model.data[rows, None]]
+        root = triangular(np.hstack(columns))
         common.append(root[first:, last:])
         apart.append(root[last:, last:])
         links.append(root[first:last, first:])
@@ -229,9 +240,9 @@ def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
 def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Test whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
     dx, dy = estimate.offset
-    quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
-    columns = [quadrupole * shape[:, None] for shape in _widened(estimate, (0.5, 1.0)).T]
-    return _add(estimate, np.hstack(columns))
+    quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy])
+    columns = [quadrupole * shape for shape in _widened(estimate, (0.5, 1.0)).T]
+    return _add(estimate, np.vstack(columns).T)
 
 
 def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
@@ -245,7 +256,7 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
 
 
 def hysteresis_test(
-    estimate: ProfileEstimate, owner: NDArray[np.intp] | None = None
+    estimate: ProfileEstimate, owner: IndexArray | None = None
 ) -> ExtraColumns | None:
     """Compare approach and retreat within each scan that has both; ``None`` without any."""
     # Columns, each approach minus retreat: of A, relative; of the centre along the scan, in m; of
@@ -256,7 +267,8 @@ def hysteresis_test(
     owner = points.scan if owner is None else owner
     sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
     for scan in np.unique(owner):
-        if np.ptp(sign[inside := owner == scan]) < 1:
+        inside = owner == scan
+        if np.ptp(sign[inside]) < 1:
             sign[inside] = 0
     if not sign.any():
         return None
@@ -279,25 +291,25 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
 
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     """Fit the columns together with a round Gaussian, the departures subtracted as estimated."""
+    points = estimate.points
     weights = estimate.weights / estimate.noise_scale**2
-    standardised = estimate.points.standardised
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
-    round_ = estimate.gaussian.jacobian
-    round_ = round_[:, : round_.shape[1] - estimate.points.ellipse]
-    parts = [round_ / np.linalg.norm(round_, axis=0), columns]
-    parts.append((estimate.weighed.residual + estimate.oval)[:, None])
+    jacobian = estimate.gaussian.jacobian
+    count = jacobian.shape[1] - points.ellipse
+    gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
+    left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.
-    root = triangular(standardised(np.hstack(parts), weights))[round_.shape[1] :]
-    free = root[:, round_.shape[1] : -1]
-    residual = root[:, -1]
+    root = triangular(points.standardised(np.hstack([gaussian, columns, left]), weights))
+    free = root[count:, count:-1]
+    residual = root[count:, -1]
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
     fall = float(residual @ free @ coefficients)
     # The adopted noise counts what the columns explain, but it is no less than the stated one.
-    least = 0.0 if estimate.points.u_errors is None else estimate.noise_scale**-2
-    left = max(1 - fall / max(float(residual @ residual), np.finfo(float).tiny), least)
-    errors = np.sqrt(left * np.diag(information))
+    least = 0.0 if points.u_errors is None else estimate.noise_scale**-2
+    share = max(1 - fall / max(float(residual @ residual), np.finfo(float).tiny), least)
+    errors = np.sqrt(share * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)
 
@@ -316,28 +328,30 @@ _LITTLE = 1e-9
 _ENOUGH = 10_000
 
 
-def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
+def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,); of a shear none is told."""
     clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
-    for scan in range(estimate.points.scans if estimate.model.order == 0 else 0):
+    if estimate.model.order:
+        return clipped
+    for scan in range(estimate.points.scans):
         inside = estimate.points.scan == scan
         equal = _equal_at_top(estimate, inside)
         clipped |= equal if equal.any() else _flattened(estimate, inside)
     return clipped
 
 
-def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _equal_at_top(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     """Points of a scan that share its largest voltage to the last digit."""
     u = estimate.points.u
     noise = np.median(_ordinary_noise(estimate)[inside])
-    top: NDArray[np.bool_] = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
+    top: BoolArray = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
     finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
     curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
     clipped = top.sum() >= _FEWEST and (curved or finest < noise / _FINE)
     return top if clipped else np.zeros_like(top)
 
 
-def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _flattened(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     """Plateau of a scan that the profile through all other points rises above."""
     plateau = _plateau(estimate, inside)
     none = np.zeros_like(inside)
@@ -349,8 +363,9 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     chosen = np.arange(plateau.size)
     if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
         # Some of the plateau, and of the others.
-        both = (np.flatnonzero(plateau == is_of) for is_of in (True, False))
-        chosen = np.sort(np.concatenate([evenly(rows, _ENOUGH) for rows in both]))
+        some = evenly(np.flatnonzero(plateau), _ENOUGH)
+        others = evenly(np.flatnonzero(~plateau), _ENOUGH)
+        chosen = np.sort(np.append(some, others))
         model = replace(model, points=points.selected(chosen))
         weights = weights[chosen]
     try:
@@ -362,12 +377,13 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     basis = departure_basis(model, fit, reduced, angular)
     count = (estimate.outlier_weight * ~plateau)[chosen].sum()
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
-    others = weigh_departures(reduced, basis, count, least_noise=least)
+    weighed = weigh_departures(reduced, basis, count, least_noise=least)
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()
-    overshoot = -float(share @ others.residual)
+    overshoot = -(share @ weighed.residual)
     slope = reduced.summed(share) @ basis.columns(reduced)
-    variance = share**2 @ _ordinary_noise(estimate)[chosen] ** 2 + slope @ others.covariance @ slope
+    noise = _ordinary_noise(estimate)[chosen]
+    variance = share**2 @ noise**2 + slope @ weighed.covariance @ slope
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 
 
@@ -377,7 +393,7 @@ def _ordinary_noise(estimate: ProfileEstimate) -> FloatArray:
     return estimate.noise_scale * (np.ones_like(estimate.points.u) if stated is None else stated)
 
 
-def _plateau(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _plateau(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     """Points of a scan about its centre that are equal within the noise."""
     order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
     u = estimate.points.u[order]
@@ -387,8 +403,7 @@ def _plateau(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np
     half = int(inside.sum()) // 2
     weight = noise[:half] ** -2
     offset = u[:half] - u[:1]
-    sums = (np.cumsum(weight * offset**power) for power in range(3))
-    total, first, second = sums
+    total, first, second = (np.cumsum(weight * offset**power) for power in range(3))
     scatter = second - first**2 / total
     count = np.arange(1, half + 1)
     beyond = (scatter > chdtri(np.maximum(count - 1, 1), _ALIKE)) & (count >= _FEWEST)

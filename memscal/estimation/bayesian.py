@@ -26,7 +26,6 @@ from itertools import compress, product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.estimation.departures import (
     FAMILIES,
@@ -37,7 +36,7 @@ from memscal.estimation.departures import (
     Shape,
 )
 from memscal.estimation.voltage_map import VoltageMap
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 
 #: The smallest noise, over the largest residual of a Gaussian, that is distinct from rounding.
 _ROUNDING = 1e-9
@@ -134,9 +133,9 @@ class _Conditionals:
     """
 
     sensors: _Sensors
-    fit: NDArray[np.intp]  # (h,): which of several it is about
-    number: NDArray[np.intp]  # (h,): places among HYPOTHESES
-    family: NDArray[np.intp]  # (h,): of the sensor
+    fit: IndexArray  # (h,): which of several it is about
+    number: IndexArray  # (h,): places among HYPOTHESES
+    family: IndexArray  # (h,): of the sensor
     prior: FloatArray  # (h,): variance of the amplitudes
     by_amplitude: FloatArray  # (h, p, m): changes of all parameters, the flat ones fitted anew
     left: FloatArray  # (h, n, s)
@@ -176,7 +175,7 @@ class _Conditionals:
         decomposed = (by_amplitude, left, singular, right, data)
         return cls(sensors, fit, number, family, prior, *decomposed, *likelihoods)
 
-    def __getitem__(self, rows: NDArray[np.bool_]) -> _Conditionals:
+    def __getitem__(self, rows: BoolArray) -> _Conditionals:
         """Some of the hypotheses."""
         kept = {f.name: getattr(self, f.name)[rows] for f in fields(self)[1:]}
         return replace(self, **kept)
@@ -242,7 +241,7 @@ class _Conditionals:
 
 def _likelihoods(
     sensors: _Sensors,
-    family: NDArray[np.intp],
+    family: IndexArray,
     signal: FloatArray,
     power: FloatArray,
     noise: _Noise,
@@ -446,9 +445,9 @@ class Weighing:
 class _Choice(NamedTuple):
     """The columns that hypotheses choose, times factors; of none of them the factor is zero."""
 
-    number: NDArray[np.intp]  # (h,): places among HYPOTHESES
-    family: NDArray[np.intp]  # (h,): of the sensor: 0 of the Gaussian
-    places: NDArray[np.intp]  # (h, m)
+    number: IndexArray  # (h,): places among HYPOTHESES
+    family: IndexArray  # (h,): of the sensor: 0 of the Gaussian
+    places: IndexArray  # (h, m)
     factors: FloatArray  # (h, m)
     strength: FloatArray  # (h,): standard deviation of the amplitudes
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded, solve_triangular
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.correlation import is_banded
 
 
@@ -17,7 +16,7 @@ class Decorrelation:
     r"""Makes noise of covariance :math:`(1 + S S^T) C` or :math:`C`, block by block, white."""
 
     # Points of each block, and the lower Cholesky factor of their correlation C, or its diagonals.
-    blocks: tuple[tuple[NDArray[np.intp], FloatArray], ...]
+    blocks: tuple[tuple[IndexArray, FloatArray], ...]
     # Orthonormal columns (n, q) of what changes all points in common, after that; its growth (q,).
     common: FloatArray | None = None
     growth: FloatArray | None = None

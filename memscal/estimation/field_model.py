@@ -13,11 +13,10 @@ from typing import ClassVar, cast
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.estimation.forward import ForwardModel, Geometry
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.stress import StressField
 
 #: Points of the grid for each half wave of the last wavenumber, and at most for each step.
@@ -40,7 +39,7 @@ class _Plane:
     spacing: float
     ky: FloatArray  # (c,): of the cells up to the last wavenumber
     kx: FloatArray
-    cells: tuple[NDArray[np.intp], ...]
+    cells: tuple[IndexArray, ...]
     # (scans, c): transform of each reference, with what makes splines of it.
     stress: FloatArray
 

@@ -25,19 +25,18 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ive, j1
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Rows: TypeAlias = slice | NDArray[np.bool_]
+Rows: TypeAlias = slice | BoolArray
 
 #: Above :data:`DENSE` points of lines, no more waves are decomposed: minutes and gigabytes.
 _MOST_WAVES = 1000

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.model.correlation import is_banded, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.places import Places
@@ -96,10 +96,10 @@ class ScanPoints:
     load: FloatArray  # (n,): load, in N
     u_errors: FloatArray | None  # (n,): stated standard uncertainty of each voltage, in V
     x_errors: FloatArray  # (n,): standard uncertainty of each position along the scan, in m
-    repeat: NDArray[np.intp]  # (n,): number of each point's repeat, counted through all scans
+    repeat: IndexArray  # (n,): number of each point's repeat, counted through all scans
     branch: NDArray[np.int64]  # (n,): 1 where the indenter approached, 2 where it retreated, or 0
-    scan: NDArray[np.intp]  # (n,): number of each point's scan
-    free: NDArray[np.bool_]  # (scans, 2): along x and y, whether the centre is a free parameter
+    scan: IndexArray  # (n,): number of each point's scan
+    free: BoolArray  # (scans, 2): along x and y, whether the centre is a free parameter
     missing: int  # how many points were missing
     decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
     channel: str = "zz"
@@ -138,7 +138,7 @@ class ScanPoints:
         chosen = [self.scan == scan for scan in range(self.scans)]
         return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in chosen)
 
-    def of_places(self, name: str) -> NDArray[np.intp]:
+    def of_places(self, name: str) -> IndexArray:
         """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
         values = np.empty(self.u.size, dtype=np.intp)
         for scan, places in enumerate(self.places):
@@ -164,7 +164,7 @@ class ScanPoints:
         single = self.selected(np.flatnonzero(self.scan == scan))
         return replace(single, scan=np.zeros_like(single.scan), free=self.free[scan : scan + 1])
 
-    def selected(self, chosen: NDArray[np.intp]) -> ScanPoints:
+    def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
         columns: dict[str, Any] = {
             item.name: value[chosen]
@@ -237,7 +237,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     return points
 
 
-def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
+def measured_mask(scan: Scan, channel: str = "zz") -> BoolArray:
     """Say which voltages of a channel were measured: they, their loads and errors are numbers."""
     u, errors = channel_signal(scan, channel)
     stated = [values for values in (u, errors, scan.normal_load) if values is not None]
@@ -355,7 +355,7 @@ def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
     return Decorrelation(tuple(blocks))
 
 
-def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> Decorrelation | None:
+def _decorrelation(scan: Scan, keep: BoolArray) -> Decorrelation | None:
     """Cholesky factors of the correlation of all kept points, repeat by repeat."""
     if scan.u_zz_correlation is None:
         return None
@@ -414,7 +414,7 @@ def require_size(scans: Sequence[Scan]) -> None:
         raise too_large(named, size, most, of, why=why, cure=cure)
 
 
-def across(correlation: FloatArray, group: NDArray[np.intp]) -> bool:
+def across(correlation: FloatArray, group: IndexArray) -> bool:
     """Whether points of different groups (n,) are correlated."""
     if not is_banded(correlation):
         return bool(correlation[np.not_equal.outer(group, group)].any())

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
@@ -22,7 +21,7 @@ from memscal.estimation.gaussian import (
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -420,7 +419,7 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
     return f"{varies}, but the conversion constant cannot be told from {confused}."
 
 
-def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
+def _share(estimate: ProfileEstimate, block: IndexArray) -> float:
     """Share of the variance of A that would go if the parameters of a block were known."""
     covariance = estimate.covariance
     integrals = estimate.basis.integrals

@@ -25,7 +25,7 @@ from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, evenly, orthonormalised, triangular
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
@@ -46,7 +46,7 @@ class FreeModel:
     # variance where the noise is stated.
     data: FloatArray
     design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
-    point: NDArray[np.intp]  # (m,): which points of the scan they are
+    point: IndexArray  # (m,): which points of the scan they are
     stated: bool  # whether the noise is stated
 
 
@@ -129,9 +129,9 @@ class Residuals:
 
     values: FloatArray  # (n,): weighted; of unit variance before the projection, if as stated
     basis: FloatArray  # (n, r): orthonormal basis of what was projected out
-    point: NDArray[np.intp]  # (n,): the point of the scan that each belongs to
-    place: NDArray[np.intp]  # (n,): its place along the scan, outliers counted
-    sequence: NDArray[np.intp]  # (n,): which pass over the sensor: a repeat, or a raster's row
+    point: IndexArray  # (n,): the point of the scan that each belongs to
+    place: IndexArray  # (n,): its place along the scan, outliers counted
+    sequence: IndexArray  # (n,): which pass over the sensor: a repeat, or a raster's row
     stated: bool  # whether the noise is stated
 
     @property
@@ -140,7 +140,7 @@ class Residuals:
         return int(self.basis.shape[0] - self.basis.shape[1])
 
     @cached_property
-    def independent(self) -> tuple[FloatArray, NDArray[np.intp]]:
+    def independent(self) -> tuple[FloatArray, IndexArray]:
         """Independent residuals of equal variance and the same sum of squares, and their points."""
         from scipy.linalg import qr
 
@@ -311,7 +311,7 @@ def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, f
     )
 
 
-def grouped(*keys: NDArray[Any]) -> NDArray[np.intp]:
+def grouped(*keys: NDArray[Any]) -> IndexArray:
     """Number of the group of each point, (n,), of equal keys (n,)."""
     order = np.lexsort(keys)
     new = np.any([np.diff(key[order], prepend=key[order[:1]]) != 0 for key in keys], axis=0)

@@ -28,7 +28,6 @@ from operator import add
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, gauss_between
@@ -36,7 +35,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, outlier_weights
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, DENSE, VoltageMap
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -137,7 +136,7 @@ def _joined(
 
 
 def _fitted(
-    estimate: ProfileEstimate, signal: FloatArray, reference: RadialSpectrum, rows: NDArray[np.intp]
+    estimate: ProfileEstimate, signal: FloatArray, reference: RadialSpectrum, rows: IndexArray
 ) -> tuple[VoltageMap, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
@@ -183,7 +182,7 @@ class _RadialSpline:
     """Even splines on [0, R], continued by the reference's tail."""
 
     points: csr_array  # (n, b): B-splines at the points, of which few differ from zero at each
-    interval: NDArray[np.intp]  # (n,): the interval between knots that each point lies in
+    interval: IndexArray  # (n,): the interval between knots that each point lies in
     free: FloatArray  # (b, m): splines with the slope of the tail at R, by B-splines
     root: FloatArray  # (m, m): triangular root of the penalty
     transform: FloatArray  # (k, m): transforms of the splines
@@ -227,7 +226,7 @@ class _RadialSpline:
         return _FittedSpline(gain, predicted, 1 - _leverage(cells, (left * kept) @ left.T))
 
 
-def _by_intervals(weighted: csr_array, interval: NDArray[np.intp]) -> tuple[csr_array, FloatArray]:
+def _by_intervals(weighted: csr_array, interval: IndexArray) -> tuple[csr_array, FloatArray]:
     """QR decomposition of B-splines at points, interval by interval: Q (n, r) and R (r, b)."""
     from scipy.sparse import csr_array
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -61,7 +61,7 @@ class VoltageMap:
         """How many numbers there are."""
         return len(self.parts[0][0])
 
-    def __getitem__(self, rows: slice | NDArray[np.intp] | list[int]) -> VoltageMap:
+    def __getitem__(self, rows: slice | IndexArray | list[int]) -> VoltageMap:
         """Some of the numbers."""
         return VoltageMap(tuple((left[rows], right) for left, right in self.parts))
 
@@ -98,7 +98,7 @@ class VoltageMap:
         terms = [left if right is None else (right @ left.T).T for left, right in self.parts]
         return np.asarray(sum(terms))
 
-    def over(self, factors: FloatArray, rows: NDArray[np.intp], count: int) -> VoltageMap:
+    def over(self, factors: FloatArray, rows: IndexArray, count: int) -> VoltageMap:
         """Derivatives by ``count`` voltages, of which these, times factors (n,), are ``rows``."""
         parts: list[tuple[FloatArray, Tall | None]] = []
         for left, right in self.parts:
@@ -126,7 +126,7 @@ class VoltageMap:
         return total
 
 
-def _placed(right: Tall, factors: FloatArray, rows: NDArray[np.intp], count: int) -> Tall:
+def _placed(right: Tall, factors: FloatArray, rows: IndexArray, count: int) -> Tall:
     if isinstance(right, np.ndarray):
         wide = np.zeros((count, right.shape[1]))
         wide[rows] = right * factors[:, None]

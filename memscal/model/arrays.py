@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError, UnitWarning
 
 FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
 
 
 #: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.
