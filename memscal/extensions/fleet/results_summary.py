@@ -15,9 +15,13 @@ _VALUES = {"conversion_constant": "A", "gaussian_sigma": "sigma"}
 
 def counts(fleet: FleetResults) -> dict[str, int]:
     """Return how many sensors there are, passed, failed a check, and were not calibrated."""
-    sensors, failed, errors = (len(of) for of in (fleet.paths, fleet.failed, fleet.errors))
-    numbers = {"sensors": sensors, "passed": sensors - failed, "failed_checks": failed - errors}
-    return numbers | {"errors": errors}
+    errors = len(fleet.errors)
+    return {
+        "sensors": len(fleet.paths),
+        "passed": len(fleet.paths) - len(fleet.failed),
+        "failed_checks": len(fleet.failed) - errors,
+        "errors": errors,
+    }
 
 
 def verdict(fleet: FleetResults) -> str:
@@ -59,76 +63,96 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
     chosen |= fleet.failed.keys() - fleet.errors.keys()
     reasons = {}
     for i in sorted(chosen, key=lambda i: (-farthest[i], i)):
-        texts = [
-            f"{symbol} {abs(z[i]):.1f} deviations {'above' if z[i] > 0 else 'below'} the median"
-            for symbol, z in deviations.items()
-            if abs(z[i]) > limit
-        ]
-        if names := fleet.failed.get(i):
-            texts.append("failed " + ", ".join(names).replace("_", " "))
+        texts = []
+        for symbol, z in deviations.items():
+            side = "above" if z[i] > 0 else "below"
+            if abs(z[i]) > limit:
+                texts.append(f"{symbol} {abs(z[i]):.1f} deviations {side} the median")
+        if i in fleet.failed:
+            texts.append("failed " + ", ".join(fleet.failed[i]).replace("_", " "))
         reasons[i] = "; ".join(texts)
     return reasons
 
 
 def tables(fleet: FleetResults) -> list[Table]:
     """Return counts and distributions, failed checks, errors, and the farthest outliers."""
-    told = mapping(fleet)
-    total = len(fleet.paths)
-    shares, checks = (
-        [(name.replace("_", " "), str(n), f"{n / total:.2%}") for name, n in numbers.items()]
-        for numbers in (counts(fleet), told["checks"])
-    )
-    values = []
-    for name, symbol in _VALUES.items():
-        unit, *numbers = told[name].values()
-        if numbers[0] is not None:
-            values.append((f"{symbol} ({unit})", *(f"{number:.4g}" for number in numbers)))
-    heads = [name.replace("_", " ") for name in told["gaussian_sigma"] if name != "unit"]
-    first = {kind: i for i, (kind, _) in reversed(list(fleet.errors.items()))}
-    errors = [
-        (kind, str(n), fleet.paths[first[kind]], fleet.errors[first[kind]][1].partition("\n")[0])
-        for kind, n in told["error_classes"].items()
-    ]
-    title = (
-        f"Outliers: beyond {_limit(fleet):.2g} robust deviations from the median, or a failed check"
-    )
-    if (further := told["outliers_in_all"] - _MOST_ROWS) > 0:
+    limit = f"{_limit(fleet):.2g} robust deviations from the median, or a failed check"
+    title = f"Outliers: beyond {limit}"
+    reasons = outliers(fleet)
+    further = len(reasons) - _MOST_ROWS
+    if further > 0:
         title += f" ({further} further ones are in the tables)"
+    rows = _outlier_rows(fleet, reasons)
     return [
-        Table("Sensors", ("", "number", "share"), shares),
-        Table("Distributions", ("", *heads), values),
-        Table("Failed checks", ("check", "sensors", "share"), checks),
-        Table("Not calibrated", ("error", "scans", "the first of them", "its error"), errors),
-        Table(title, ("scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), _rows(fleet)),
+        Table("Sensors", ("", "number", "share"), _shares(fleet, counts(fleet))),
+        _distributions(fleet),
+        Table("Failed checks", ("check", "sensors", "share"), _shares(fleet, failures(fleet))),
+        _errors_table(fleet),
+        Table(title, ("scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), rows),
     ]
 
 
-def _rows(fleet: FleetResults) -> list[tuple[str, ...]]:
+def _shares(fleet: FleetResults, numbers: dict[str, int]) -> list[tuple[str, str, str]]:
+    """Return numbers of sensors, each with its share of all."""
+    total = len(fleet.paths)
+    return [(name.replace("_", " "), str(n), f"{n / total:.2%}") for name, n in numbers.items()]
+
+
+def _distributions(fleet: FleetResults) -> Table:
+    rows: list[tuple[str, ...]] = []
+    heads: list[str] = []
+    for name, symbol in _VALUES.items():
+        distribution = _distribution(fleet, name)
+        unit, *numbers = distribution.values()
+        heads = [key.replace("_", " ") for key in distribution if key != "unit"]
+        if numbers[0] is not None:
+            rows.append((f"{symbol} ({unit})", *(f"{number:.4g}" for number in numbers)))
+    return Table("Distributions", ("", *heads), rows)
+
+
+def _errors_table(fleet: FleetResults) -> Table:
+    first = {kind: i for i, (kind, _) in reversed(list(fleet.errors.items()))}
+    rows: list[tuple[str, ...]] = []
+    for kind, number in error_classes(fleet).items():
+        text = fleet.errors[first[kind]][1].partition("\n")[0]
+        rows.append((kind, str(number), fleet.paths[first[kind]], text))
+    return Table("Not calibrated", ("error", "scans", "the first of them", "its error"), rows)
+
+
+def _outlier_rows(fleet: FleetResults, reasons: dict[int, str]) -> list[tuple[str, ...]]:
     rows = []
-    for i, reason in list(outliers(fleet).items())[:_MOST_ROWS]:
-        pairs = ((getattr(fleet, name)[i], getattr(fleet, f"{name}_errors")[i]) for name in _VALUES)
-        rows.append((fleet.paths[i], *(format_measured(*pair) for pair in pairs), reason))
+    for i, reason in list(reasons.items())[:_MOST_ROWS]:
+        a = format_measured(fleet.conversion_constant[i], fleet.conversion_constant_errors[i])
+        sigma = format_measured(fleet.gaussian_sigma[i], fleet.gaussian_sigma_errors[i])
+        rows.append((fleet.paths[i], a, sigma, reason))
     return rows
 
 
 def mapping(fleet: FleetResults) -> dict[str, Any]:
     """Return counts, distributions, failed checks, errors, and the farthest outliers."""
-    reasons = outliers(fleet)
-    told: dict[str, Any] = {**counts(fleet), "checks": failures(fleet)}
-    for name, unit in zip(_VALUES, (fleet.unit, "mm"), strict=True):
-        known = np.isfinite(getattr(fleet, name))
-        values = getattr(fleet, name)[known]
-        errors = getattr(fleet, f"{name}_errors")[known]
-        low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)) if values.size else [np.nan] * 3
-        numbers = {
-            "median": middle,
-            "robust_deviation": robust_spread(values),
-            "quantile_05": low,
-            "quantile_95": high,
-            "median_standard_uncertainty": np.median(errors) if errors.size else np.nan,
-        }
-        told[name] = {"unit": unit} | {key: finite(value) for key, value in numbers.items()}
-    told["warnings"] = texts_of(fleet.messages)
-    listed = [{"path": fleet.paths[i], "reason": text} for i, text in reasons.items()]
-    told |= {"error_classes": error_classes(fleet), "outliers": listed[:_MOST_ROWS]}
-    return told | {"outliers_in_all": len(listed)}
+    listed = [{"path": fleet.paths[i], "reason": text} for i, text in outliers(fleet).items()]
+    return {
+        **counts(fleet),
+        "checks": failures(fleet),
+        **{name: _distribution(fleet, name) for name in _VALUES},
+        "warnings": texts_of(fleet.messages),
+        "error_classes": error_classes(fleet),
+        "outliers": listed[:_MOST_ROWS],
+        "outliers_in_all": len(listed),
+    }
+
+
+def _distribution(fleet: FleetResults, name: str) -> dict[str, Any]:
+    """Return median, spread and quantiles of a parameter over the sensors, in its unit."""
+    known = np.isfinite(getattr(fleet, name))
+    values = getattr(fleet, name)[known]
+    errors = getattr(fleet, f"{name}_errors")[known]
+    low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)) if values.size else [np.nan] * 3
+    return {
+        "unit": fleet.unit if name == "conversion_constant" else "mm",
+        "median": finite(middle),
+        "robust_deviation": finite(robust_spread(values)),
+        "quantile_05": finite(low),
+        "quantile_95": finite(high),
+        "median_standard_uncertainty": finite(np.median(errors) if errors.size else np.nan),
+    }
