@@ -120,7 +120,7 @@ def _errors_table(fleet: FleetResults) -> Table:
 
 
 def _outlier_rows(fleet: FleetResults, reasons: dict[int, str]) -> list[tuple[str, ...]]:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for i, reason in list(reasons.items())[:_MOST_ROWS]:
         a = format_measured(fleet.conversion_constant[i], fleet.conversion_constant_errors[i])
         sigma = format_measured(fleet.gaussian_sigma[i], fleet.gaussian_sigma_errors[i])
