@@ -4,7 +4,6 @@ The source folder is the top of the repository, so that links between the files 
 and where the files are read without a build.
 """
 
-import logging
 import re
 from pathlib import Path
 from typing import Any
@@ -34,10 +33,6 @@ root_doc = "docs/index"
 include_patterns = ["docs/**.md", "docs/api/*.rst", "notebooks/*.ipynb", "*.md"]
 include_patterns += ["calibration_data/README.md"]
 exclude_patterns = ["docs/templates"]
-# Pages that a later change brings find their place; this warning has no type to suppress it by.
-logging.getLogger("sphinx.sphinx.directives.other").addFilter(
-    lambda record: "glob pattern" not in str(record.msg)
-)
 # Absolute, for autosummary looks for it from the source folder, and Sphinx from this one.
 templates_path = [str(Path(__file__).with_name("templates"))]
 
@@ -58,12 +53,15 @@ numpydoc_xref_aliases = {word: word for word in DEFAULT_LINKS} | {
     name: f"memscal.{name}" for name in memscal.__all__ if name[0].isupper()
 }
 
+smartquotes = False  # what is copied from a page is what was written
+
 html_theme = "pydata_sphinx_theme"
 html_title = f"memscal {release}"
 html_math_renderer = "mathml"  # browsers draw it themselves: no script, and nothing from outside
 html_static_path = ["static"]
 html_css_files = ["pages.css"]
 html_js_files = [("pages.js", {"defer": "defer"})]
+html_sidebars = {"**": ["all-pages"], "docs/index": []}  # the start page lists them itself
 html_extra_path = ["static/index.html"]  # the top of the site leads to docs/index.html
 html_copy_source = html_show_sourcelink = False
 html_show_sphinx = False
@@ -71,7 +69,7 @@ html_context = {"default_mode": "auto"}
 html_theme_options = {
     "logo": {"text": "memscal"},
     "navbar_align": "left",
-    "header_links_before_dropdown": 6,
+    "navbar_center": [],
     "footer_start": ["copyright"],
     "footer_end": [],
     "show_toc_level": 2,
@@ -83,23 +81,20 @@ html_theme_options = {
 }
 copybutton_exclude = ".linenos, .gp, .go"
 
-RESULTS = Path(__file__).with_name("results.md").read_text(encoding="utf-8")
-EXAMPLES = {
-    name: example
-    for names, example in re.findall(
-        r"^### ([^\n]*)\n\n```python\n(.*?)^```$", RESULTS, flags=re.MULTILINE | re.DOTALL
-    )
-    for name in names.split(", ")
-}
-"""Examples of the classes that functions return, which are too long for docstrings."""
 
-SHOWN_THERE = "The names that come before are those of :doc:`/docs/results`."
-
-
-def add_example(_: Sphinx, __: str, name: str, ___: Any, ____: Any, lines: list[str]) -> None:
-    """Give a class of docs/results.md its example there."""
-    if example := EXAMPLES.get(name.removeprefix("memscal.")):
-        lines += ["", "Examples", "--------", SHOWN_THERE, "", *example.splitlines()]
+def show_as_typed(_: Sphinx, __: Any, lines: list[str]) -> None:
+    """Show what the help of a command indents, its examples, as a block that can be copied."""
+    shown: list[str] = []
+    for number, line in enumerate(lines):
+        if not line.startswith("|   "):
+            shown.append(line)
+            continue
+        if not lines[number - 1].startswith("|   "):
+            heading = shown.pop().removeprefix("| ")
+            shown += [heading, "", ".. code-block:: text", ""]
+        goes_on = lines[number + 1].startswith("|       ")
+        shown.append(f"   {line[4:]} \\" if goes_on else f"   {line[4:]}")
+    lines[:] = shown
 
 
 def add_titles(app: Sphinx, doctree: document, _: str) -> None:
@@ -132,6 +127,6 @@ def block_math(self: HTML5Translator, node: math_block) -> None:
 
 def setup(app: Sphinx) -> None:
     """Connect what stands above."""
-    app.connect("autodoc-process-docstring", add_example, priority=400)  # before numpydoc
+    app.connect("sphinx-click-process-epilog", show_as_typed)
     app.connect("doctree-resolved", add_titles)
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))

@@ -146,7 +146,7 @@ table(incompressible)
 #
 # The paper gives three numbers for each of three loads: the depth without friction, the depth with
 # $\mu = \infty$, and the "contact diameter" without friction. A film of Poisson's ratio 0.495 is
-# calculated too; `docs/mechanics.md` has its whole table.
+# calculated too; `docs/sphere.md` has its whole table.
 
 # %%
 compressible = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.495, thickness=2e-3)

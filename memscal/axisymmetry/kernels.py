@@ -55,7 +55,15 @@ def blurred_disc(r: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatA
 
 @runtime_checkable
 class RadialKernel(Protocol):
-    """A radial apparatus function of unit integral, with its transform."""
+    """A radial apparatus function of unit integral, with its transform.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> kernel: memscal.RadialKernel = memscal.SmoothedDisc(radius=0.8e-3, sigma=0.1e-3)
+    >>> memscal.simulate(kernel=kernel, seed=3).synthetic["kernel"]
+    'uniform disc of unit integral, blurred by a Gaussian'
+    """
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""

@@ -49,6 +49,15 @@ class Calibration(Result):
         What one standard uncertainty of each stated input does.
     correlations : mapping of (str, str) to float
         Correlation coefficients of the inputs' errors.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
+    >>> calibration.passed, calibration.apparatus.process.configuration["method"]
+    (True, 'white-noise')
+    >>> sorted(calibration.to_dict()["conversion_constant"])  # print(calibration): the tables
+    ['standard_uncertainty', 'unit', 'value']
     """
 
     apparatus: ApparatusFunction

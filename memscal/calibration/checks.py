@@ -372,7 +372,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
         f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
         f"noise: {cure}."
     )
-    # 2.5 by simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
+    # 2.5 by simulation, docs/checks.md: beyond sound results, in which G may be a disc or a ring.
     return [
         check("shape_width", widest, 2.5, spike),
         check("shape_negative", negative, 0.4, ripples),

@@ -3,7 +3,7 @@ r"""First-order propagation of noise, regularisation and uncertain inputs to A, 
 A division is linear in the voltages: :math:`A\,G(r)` is the inverse transform of the window times
 the smoothed voltages' transform over the reference's.  Method ``bayesian`` is a linear function of
 the posterior of the profile's parameters: what scatters from scan to scan is ``noise``, the rest
-of the expected squared error ``regularisation``.  All sources are described in docs/method.md.
+of the expected squared error ``regularisation``.  All sources are in docs/uncertainty.md.
 
 Inputs add one column each, the change of all results by one standard uncertainty.  An input that
 is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
@@ -71,7 +71,16 @@ NOT_RANDOM = ("regularisation", "window", "misfit")
 
 @dataclass(frozen=True, eq=False)
 class InputEffect:
-    """What one standard uncertainty of an input does."""
+    """What one standard uncertainty of an input does.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
+    >>> effect = calibration.effects["thickness"]  # of its standard uncertainty
+    >>> effect.voltage.shape  # V, at each point of the scan
+    (65,)
+    """
 
     voltage: FloatArray  # (n,): change of the voltages that it would be mistaken for, in V
     scaling: float = 0.0  # relative change of A beside that

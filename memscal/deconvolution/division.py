@@ -64,6 +64,17 @@ class DivisionProblem:
         # u = sum(g * spread) * cell area, with image / peak and spread / total.
         return image / peak, spread / total, peak / (total * self.grid.cell_area)
 
+    def restored(self, image: FloatArray) -> Division:
+        """Quotient of the fields, from a restored image, with its effective window."""
+        field = self.grid.from_image(image)
+        modulus = np.abs(self.reference_spectrum)
+        voltage = np.abs(self.voltage_spectrum)
+        predicted = np.abs(self.grid.transfer(field)) * modulus
+        # Where the reference has vanished, so has the voltage: their rounding has no window.
+        relevant = modulus > _CLOSED * modulus.max()
+        window = np.divide(predicted, voltage, out=np.zeros_like(predicted), where=relevant)
+        return Division(field, np.clip(window, 0.0, 1.0))
+
 
 @dataclass(frozen=True, eq=False)
 class Division:
@@ -108,19 +119,6 @@ def filtered_division(problem: DivisionProblem, window: FloatArray) -> Division:
     quotient = np.zeros_like(problem.voltage_spectrum)
     np.divide(problem.voltage_spectrum, problem.reference_spectrum, out=quotient, where=window > 0)
     return Division(problem.grid.inverse(quotient * window), window)
-
-
-def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
-    """Wrap an image that an image-restoration routine made, with its effective window."""
-    grid = problem.grid
-    field = grid.from_image(image)
-    modulus = np.abs(problem.reference_spectrum)
-    voltage = np.abs(problem.voltage_spectrum)
-    predicted = np.abs(grid.transfer(field)) * modulus
-    # Where the reference has vanished, so has the voltage: their rounding has no window.
-    relevant = modulus > _CLOSED * modulus.max()
-    window = np.divide(predicted, voltage, out=np.zeros_like(predicted), where=relevant)
-    return Division(field, np.clip(window, 0.0, 1.0))
 
 
 class _Own:
@@ -231,7 +229,7 @@ class Wiener(_Own):
         # Along one axis: the first component weaker than the weakest relevant one, or the last.
         index = int(np.argmax(spectrum[0] < weakest)) or spectrum.shape[1] - 1
         balance = (self.amplitude * NOISE_RATIO * weakest / penalty[0, index]) ** 2
-        return image_division(problem, wiener(blurred, spread, balance, clip=False) * scale)
+        return problem.restored(wiener(blurred, spread, balance, clip=False) * scale)
 
 
 ENTRY_POINT_GROUP = "memscal.regularisers"

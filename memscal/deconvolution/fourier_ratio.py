@@ -37,6 +37,16 @@ class Field:
         Where its values lie.
     values : ndarray
         Values in the layout of the grid, in the unit of what was lifted.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import memscal
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> narrow = memscal.lift(r, np.exp(-((r / 0.6e-3) ** 2)), 0.1e-3, 8e-3)
+    >>> wide = memscal.lift(r, np.exp(-((r / 1e-3) ** 2)), 0.1e-3, 8e-3)
+    >>> round(1e6 * float(wide.integral) / np.pi, 6), isinstance(wide.grid, memscal.FieldGrid)
+    (1.0, True)
     """
 
     grid: FieldGrid
@@ -99,6 +109,17 @@ class Quotient(Field):
     ----------
     window : ndarray
         What the regularisation leaves of each spectral component, from 0 to 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import memscal
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> narrow = memscal.lift(r, np.exp(-((r / 0.6e-3) ** 2)), 0.1e-3, 8e-3)
+    >>> wide = memscal.lift(r, np.exp(-((r / 1e-3) ** 2)), 0.1e-3, 8e-3)
+    >>> quotient = memscal.divide(wide, narrow, weakest=1e-4 * narrow.integral)
+    >>> float(quotient.window.max()) <= 1.0
+    True
     """
 
     window: FloatArray

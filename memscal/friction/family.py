@@ -162,8 +162,8 @@ def _scaled_changes(
     strength: FloatArray,
 ) -> dict[str, FloatArray]:
     """Return the changes by one stated standard uncertainty, by the scales of the contact."""
-    # docs/friction.md; the keywords are derivatives by the logarithms of load, wavenumber, length
-    # and strength of the interface (of asperities alone).
+    # docs/contact_families.md; the keywords are derivatives by the logarithms of load, wavenumber,
+    # length and strength of the interface (of asperities alone).
     stiffer = spectra - load
     thicker = 3 * stiffer + wavenumber - 2 * length - strength
     larger = -stiffer + length + strength

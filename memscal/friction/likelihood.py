@@ -1,7 +1,7 @@
 """The likelihood of calculated contacts: what a sensor reads of them, and chi-square.
 
-The voltages of one load are u = f(theta) + F beta + D(theta) xi + n, as docs/friction.md has it:
-flat nuisance parameters beta of its own (baseline, drift, centre), systematic ones xi of unit
+The voltages of one load are u = f(theta) + F beta + D(theta) xi + n (docs/friction_model.md): flat
+nuisance parameters beta of its own (baseline, drift, centre), systematic ones xi of unit
 variance that all loads share, and noise n of covariance N.  With the residual rho = u - f,
 chi-square is rho^T C^-1 rho, C = N + D D^T, the flat ones projected out.
 

@@ -2,7 +2,7 @@ r"""Evidence of laws of the interface: the likelihood averaged over what a law l
 
 The nuisances of a group of voltages (one load of one scan; the model and its symbols are those of
 :mod:`memscal.friction.likelihood`) enter linearly, and are integrated in closed form (equation in
-docs/friction.md).  With :math:`Q = N^{-1} - N^{-1}F(F^TN^{-1}F)^{-1}F^TN^{-1}`,
+docs/friction_model.md).  With :math:`Q = N^{-1} - N^{-1}F(F^TN^{-1}F)^{-1}F^TN^{-1}`,
 :math:`g = D^TQ\rho` and :math:`M = 1 + D^TQD`,
 
 .. math:: \chi^2 = \rho^T Q\rho - g^T M^{-1} g, \qquad

@@ -159,6 +159,18 @@ class LoadComparison:
     twice the loss of its log likelihood from the best coefficient to each; ``bracketed`` the
     share of points between no friction and full stick within 1.96 standard uncertainties.
     ``by_maximum`` and ``by_profile`` are the two readings of the effective friction coefficient.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.1, 0.3), loading="total"
+    ... )
+    >>> first = comparison.loads["total"][0]
+    >>> 0.8 < first.ratio < 1.4  # measured maximum over the frictionless one
+    True
     """
 
     profile: MeasuredProfile
@@ -198,6 +210,18 @@ class DryAgainstLubricated:
     ``load`` is the dry scan's nominal one, in N; ``difference`` (n,) is dry minus lubricated S_zz
     at distances ``r`` (m) from the centre, ``maximum`` that of the stresses on the axis, in Pa,
     ``relative`` that over the lubricated one; chi-square is that of the difference against none.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.1, 0.3), loading="total"
+    ... )
+    >>> [difference] = comparison.dry_against_lubricated
+    >>> abs(difference.relative) < 0.5
+    True
     """
 
     load: float
@@ -230,6 +254,17 @@ class FrictionComparison(Result, Checked):
     apparatus function of a tangential channel, was given; all else is by the normal stress.
     Of a tangential channel alone ``loads`` is empty; ``by_shear`` holds the coefficient of each
     load by the loading in its place.  Printed, it is the tables of ``memscal compare``.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.1, 0.3), loading="total"
+    ... )
+    >>> sorted(comparison.joint)  # print(comparison) shows the tables
+    ['dry', 'lubricated']
     """
 
     measured: MeasuredStress
@@ -263,6 +298,18 @@ class InterfaceLaw:
     :math:`\ln \int p(u | \theta)\,\pi(\theta)\,d\theta`, and ``log_likelihood``, the largest
     :math:`\ln p(u | \theta)`, share a constant of the scans; ``numerical_error`` is the standard
     uncertainty of the integral.  ``least``, ``degrees`` and ``p_value`` are of chi-square at best.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
+    ... )
+    >>> amontons = comparison.interface.tangential.laws[0]
+    >>> 0 <= amontons.best[0] < 0.3
+    True
     """
 
     name: str
@@ -283,6 +330,18 @@ class ImpliedFriction:
     sensor, as lower end, best value and upper end of the slip length; ``inf`` where full stick is
     not more than that.  ``pressures`` (l,): :math:`\bar p = P/\pi a^2` in Pa.  ``stiffnesses``
     (l, 3): :math:`\mu\bar p/\ell` in Pa/m for the three; ``inf`` of a rigid interface.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
+    ... )
+    >>> implied = comparison.interface.tangential.implied
+    >>> implied.friction.shape  # loads; lower end, best value, upper end
+    (1, 3)
     """
 
     loads: FloatArray
@@ -297,6 +356,17 @@ class LawComparison:
 
     The last of ``laws`` yields over ``length``; ``factors`` weigh it against each of the others.
     ``implied`` says what a slip length means at each load; it is ``None`` of a normal law.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
+    ... )
+    >>> [law.name for law in comparison.interface.tangential.laws]
+    ['effective Amontons, one coefficient', 'elasto-plastic at 0.1, slip length']
     """
 
     lubrication: str
@@ -327,6 +397,18 @@ class InterfaceComparison(Result):
     ``tangential``, of dry scans: one effective coefficient, one for each load, and the
     elasto-plastic law with a slip length; ``normal``, of lubricated scans: a rigid frictionless
     interface, and one that yields normally; ``None`` without such scans.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> comparison = memscal.compare(
+    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
+    ... )
+    >>> laws = comparison.interface
+    >>> laws.normal is None  # no lubricated scan was given
+    True
     """
 
     macroscopic: tuple[float, float | None]

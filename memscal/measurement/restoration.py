@@ -40,7 +40,20 @@ _OF_RESTORED = "Measured, not calculated: restored with an apparatus function."
 
 @dataclass(frozen=True, eq=False)
 class StressComparison:
-    """How a calculated stress agrees with a scan and with the stress restored from it."""
+    """How a calculated stress agrees with a scan and with the stress restored from it.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> film = memscal.ElasticFilm(
+    ...     young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="linear"
+    ... )
+    >>> scan = memscal.simulate(film=film, seed=2)
+    >>> expected = memscal.indent(film, scan.indenter, load=1.0)
+    >>> restored = memscal.restore(scan, memscal.calibrate(scan).apparatus, expected=expected)
+    >>> 0 <= restored.comparison.p_value <= 1
+    True
+    """
 
     stress: StressProfile | Contact
     sigma_zz: FloatArray  # (n,): calculated, at the restoration's radii, in Pa
@@ -149,6 +162,17 @@ class Restoration(Result, Checked):
         Quality checks.
     messages : tuple of Message
         What a user should know.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> film = memscal.ElasticFilm(
+    ...     young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="linear"
+    ... )
+    >>> scan = memscal.simulate(film=film, seed=2)
+    >>> restored = memscal.restore(scan, memscal.calibrate(scan).apparatus)
+    >>> bool(restored.sigma_zz[0] > 1e5)  # Pa
+    True
     """
 
     scan: Scan

@@ -133,7 +133,16 @@ HalfSpaceIntegrals = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 class InterfaceTraction(Protocol):
-    """Axisymmetric pressure and radial shear on the surface; zero beyond ``radius``."""
+    """Axisymmetric pressure and radial shear on the surface; zero beyond ``radius``.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> contact = memscal.indent(film, memscal.Sphere(radius=0.1), load=0.5, friction=0.1)
+    >>> float(contact.traction.pressure(2 * contact.traction.radius))  # outside of the contact, Pa
+    0.0
+    """
 
     @property
     def radius(self) -> float:

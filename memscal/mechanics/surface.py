@@ -64,7 +64,16 @@ class SurfaceCompliance:
 
 
 class FilmField(Protocol):
-    """The field in a film under given tractions at its two faces; radii in m, of any shape."""
+    """The field in a film under given tractions at its two faces; radii in m, of any shape.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> contact = memscal.indent(film, memscal.Sphere(radius=0.1), load=0.5, friction=0.1)
+    >>> float(contact.inside.base_normal(0.0)) == float(contact.base_stress(0.0))
+    True
+    """
 
     def base_normal(self, r: FloatArray) -> FloatArray:
         """Return the normal stress at the base in Pa, compression positive."""

@@ -26,6 +26,14 @@ class ApparatusField(FrozenArrays):
 
     ``x`` (n,) and ``y`` (m,) in m; ``g`` and ``g_errors`` (m, n) in 1/m^2.  ``g_scatter`` (m, n)
     is the part of ``g_errors`` that scatters from scan to scan, ``None`` where it is not known.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> field = apparatus.field
+    >>> field.g.shape == (field.y.size, field.x.size)
+    True
     """
 
     x: FloatArray
@@ -53,6 +61,14 @@ class ApparatusRadial(FrozenArrays):
     ``r`` (n,) in m; ``g``, ``g_errors`` (k = 1) and ``g_gaussian`` (n,) in 1/m^2;
     ``g_covariance`` (n, n) in 1/m^4; ``conversion_correlation`` (n,): correlation of the errors
     of G and of the conversion constant, ``None`` where it is not known.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> profile = apparatus.radial_profile
+    >>> bool(profile.g[0] > profile.g_errors[0])  # G on the axis, 1/m^2
+    True
     """
 
     r: FloatArray
@@ -70,6 +86,14 @@ class TransferFunction(FrozenArrays):
     ``k`` (n,) in rad/m; ``modulus``, ``modulus_errors`` and ``window`` (the
     regularisation's, from 0 to 1) are dimensionless.  Up to ``resolved_wavenumber`` (rad/m) the
     scan determines the modulus, beyond it the regularisation does.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> transfer = apparatus.transfer
+    >>> round(float(transfer.modulus[0]), 3), transfer.resolved_wavenumber > 2e3  # rad/m
+    (1.0, True)
     """
 
     k: FloatArray
@@ -88,6 +112,14 @@ class Reconvolution(FrozenArrays):
     minus predicted.  ``offset_x`` and ``offset_y`` (m) of a raster are the positions from the
     sensor's centre; of rasters and of several loads or scans, ``load`` (N) and ``background``
     (baseline and drift, V) are those of each point, else ``None``.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> reconvolution = apparatus.reconvolution
+    >>> bool(abs(reconvolution.residual).max() < 0.02 * reconvolution.u_zz.max())
+    True
     """
 
     x: FloatArray
@@ -170,6 +202,14 @@ class OtherEstimate:
     """A and G of the same scan by the route that was not chosen: a division, or ``bayesian``.
 
     ``parameters``: the conversion constant and the widths of G; ``radial_profile``: G(r).
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> other = apparatus.other
+    >>> other.method, other.parameters.names[0]
+    ('bayesian', 'conversion_constant')
     """
 
     method: str

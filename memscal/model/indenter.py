@@ -16,7 +16,14 @@ from memscal.model.arrays import FloatArray
 
 
 class Indenter:
-    """A rigid axisymmetric indenter; its face is a height over the radius."""
+    """A rigid axisymmetric indenter; its face is a height over the radius.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> isinstance(memscal.Sphere(radius=0.1), memscal.Indenter)
+    True
+    """
 
     shape: ClassVar[str]
     """Name of the shape as it stands in files."""
@@ -40,6 +47,14 @@ class RoundIndenter(Indenter):
     radius, radius_uncertainty : float
         Radius of the rod or of the sphere's curvature, and its standard uncertainty (k = 1), in m;
         ``None`` means "not stated".
+
+    Examples
+    --------
+    >>> import memscal
+    >>> isinstance(memscal.Sphere(radius=0.1), memscal.RoundIndenter)
+    True
+    >>> isinstance(memscal.Cone(inclination=0.1), memscal.RoundIndenter)
+    False
     """
 
     radius: float

@@ -47,6 +47,16 @@ class MeasuredScan:
     ``width``: its largest extent, in m; ``position_scale_uncertainty``: relative, of the stage;
     ``synthetic``: whether it was simulated; ``source``: the file it was read from; ``unit``: SI
     unit of its readings where they are no voltages.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> measured = memscal.measure_stress(made.dry, sensor)
+    >>> known = measured.profiles[0].scan
+    >>> known.lubrication, known.synthetic
+    ('dry', True)
     """
 
     film: ElasticFilm
@@ -79,6 +89,16 @@ class MeasuredPoints(ByContent):
     scan, in m; ``u``: voltage, ``noise``: its electronic noise, stated or estimated, in V,
     ``None`` where a tangential channel states none; ``weight``: of outliers, one of ordinary
     points; ``load``, ``load_errors`` in N; ``correlation`` (n, n) of the noise, if stated.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> measured = memscal.measure_stress(made.dry, sensor)
+    >>> points = measured.profiles[0].points["zz"]
+    >>> points.u.shape == points.x.shape  # V, m
+    True
     """
 
     x: FloatArray
@@ -136,6 +156,16 @@ class MeasuredProfile(ByContent):
     points : mapping of str to MeasuredPoints
         The measured points by channel (``"zz"``, ``"xz"``, ``"yz"``); none if it was read from a
         file of version 1.0.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> measured = memscal.measure_stress(made.dry, sensor)
+    >>> [profile] = measured.profiles
+    >>> abs(profile.force - profile.load) < 5 * profile.force_uncertainty  # N
+    True
     """
 
     scan: MeasuredScan
@@ -239,6 +269,15 @@ class MeasuredStress(Result, Checked, ByContent):
     artifact, artifact_digest : SourceFile, str, optional
         File of the apparatus function, where it was read from one, and its content digest, empty
         in files of version 1.0.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
+    >>> measured = memscal.measure_stress(made.dry, sensor)
+    >>> [profile.load for profile in measured.profiles]  # N; print(measured) shows the tables
+    [0.69]
     """
 
     profiles: tuple[MeasuredProfile, ...]

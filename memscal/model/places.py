@@ -10,7 +10,16 @@ IntArray = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of the points of one scan."""
+    """Places of the points of one scan.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
+    >>> [places] = calibration.solution.estimate.points.places
+    >>> places.count, round(places.steps[0] * 1e3, 3)  # mm
+    (65, 0.25)
+    """
 
     index: IntArray  # (n,): the place of each point
     row: IntArray  # (n,): its row along y, 0 on a line

@@ -16,6 +16,16 @@ class SourceFile:
     """A file that was read: its base name (a folder may be private) and SHA-256 of its bytes.
 
     ``altered`` says how it differs from what was written, where that was accepted.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     memscal.write_scan(memscal.simulate(seed=1), f"{folder}/scan.h5")
+    ...     source = memscal.calibrate(f"{folder}/scan.h5").apparatus.process.input_scan
+    >>> source.file_name, len(source.sha256)
+    ('scan.h5', 64)
     """
 
     file_name: str
@@ -44,6 +54,14 @@ class Process:
         Notes and warnings that were shown.
     input_scan, input_reference : SourceFile, optional
         The files that were read.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> process = apparatus.process
+    >>> process.program, process.configuration["method"]
+    ('memscal', 'white-noise')
     """
 
     program: str

@@ -1,4 +1,4 @@
-"""Sizes up to which memscal works, checked before any work; docs/files.md states them."""
+"""Sizes up to which memscal works, checked before any work; docs/sizes.md states them."""
 
 from memscal.errors import InputError
 

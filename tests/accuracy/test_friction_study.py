@@ -3,7 +3,7 @@
 Each experiment is a rod scan and the scans of a sphere, dry and lubricated, with noise, scatter of
 loads and positions, and film, radii and loads drawn from their uncertainties.  Its contacts are
 solved with rings that are refined load by load, those of the analysis with 56.  Set
-MEMSCAL_FULL_STUDY for the 400 seeds and four coefficients of docs/friction.md in place of 50 and
+MEMSCAL_FULL_STUDY for the 400 seeds and four coefficients of docs/accuracy.md in place of 50 and
 two, by which a coverage of 85 % is found in two runs of three.
 """
 

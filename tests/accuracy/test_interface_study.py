@@ -123,7 +123,7 @@ def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth() -> None:
 @pytest.mark.full_study
 def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
     # Stated: 10 %.  The spread over experiments is 13.5 %, as the contacts are linearised about the
-    # stated film: docs/friction.md.
+    # stated film: docs/interface.md.
     found = experiments(MACROSCOPIC, SLIP_LENGTH)
     ratios = np.array([one.length.best for one in found]) / SLIP_LENGTH
     assert np.sum(np.abs(ratios - 1) <= 0.20) >= enough(0.75)

@@ -2,7 +2,7 @@
 
 The sensor is an ellipse with a tail to one side, at 0.5 % noise that is not stated; its scans are
 direct convolutions (helpers.rasters).  Set MEMSCAL_FULL_STUDY for 20 rasters in place of 2.  With
---log-cli-level=INFO the study tells the figures of docs/estimation.md.
+--log-cli-level=INFO the study tells the figures of docs/accuracy.md.
 """
 
 import logging

@@ -12,7 +12,6 @@ from memscal.deconvolution.division import (
     Tikhonov,
     WhiteNoise,
     filtered_division,
-    image_division,
 )
 from memscal.model.arrays import FloatArray
 
@@ -96,6 +95,6 @@ def test_the_window_of_an_image_is_what_is_left_of_each_component(seed: int) -> 
     problem, kernel = random_problem(seed, grid)
     window = np.exp(-grid.wavenumber / 5)
     image = grid.to_image(grid.inverse(window * grid.transfer(kernel)))
-    division = image_division(problem, image)
+    division = problem.restored(image)
     np.testing.assert_array_equal(division.field, image)
     np.testing.assert_allclose(division.window, window, atol=1e-6)

@@ -4,6 +4,9 @@
 """
 
 import os
+import re
+import shlex
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -63,3 +66,18 @@ def test_the_top_leads_to_the_start_page_and_the_search_finds_a_check(site, brow
     page.wait_for_url("**/docs/index.html")
     page.goto((site / "search.html").as_uri() + "?q=held_out_repeat")
     page.wait_for_selector("#search-results a[href*='quality']")
+
+
+def test_commands_are_shown_as_they_are_typed(site: Path) -> None:
+    typed = []
+    for path in site.rglob("*.html"):
+        page = path.read_text(encoding="utf-8")
+        for block in re.findall(r"<pre>(.*?)</pre>", page, re.DOTALL):
+            text = unescape(re.sub("<[^>]+>", "", block)).replace("\\\n", "")
+            typed += re.findall(r"^(?:memscal|pip|python3) .*", text, re.MULTILINE)
+    assert len(typed) > 100
+    assert [line for line in typed if re.search("[\N{EN DASH}\N{EM DASH}‘’“”]", line)] == []
+    assert all(shlex.split(line, comments=True) for line in typed)
+    commands = (site / "docs" / "commands.html").read_text(encoding="utf-8")
+    assert 'class="pre">--young-modulus-uncertainty<' in commands
+    assert "\n    --load 1 --radius 0.25" in unescape(re.sub("<[^>]+>", "", commands))

@@ -47,6 +47,13 @@ class FleetCalibration(Result):
         Notes and warnings.
     error : MemscalError or None
         Why there is no result.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> [result] = memscal.calibrate_many([memscal.simulate(seed=1)])
+    >>> result.passed, result.parameters.names[0]
+    (True, 'conversion_constant')
     """
 
     index: int

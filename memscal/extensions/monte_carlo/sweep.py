@@ -29,6 +29,14 @@ class Sweep(Result):
         Reconvolution residual over the largest signal.
     seed_conversion_constant, seed_gaussian_sigma, seed_relative_rms : ndarray, shape (n, seeds)
         The same for single draws; NaN for a draw whose quotient has no positive integral.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
+    >>> sweep = calibration.sweep(amplitudes=3, draws=1)  # of the noise that is added
+    >>> sweep.conversion_constant.shape == sweep.amplitude.shape
+    True
     """
 
     amplitude: FloatArray

@@ -201,6 +201,13 @@ class Design(Result, FrozenArrays):
         ``resolved_wavenumber``.
     want : mapping of str to float
         What the plan was varied to reach.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> planned = memscal.design(noise=0.01, repeats=2)
+    >>> planned.largest_source("gaussian_sigma")
+    'thickness'
     """
 
     plan: Plan

@@ -78,6 +78,13 @@ class Experiment:
 
     ``rod`` calibrates the sensor; ``dry`` and ``lubricated`` are scans of a sphere's contacts at
     several loads.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> made.rod.indenter.shape, made.dry.indenter.shape, made.lubricated.lubrication
+    ('rod', 'sphere', 'lubricated')
     """
 
     rod: Scan
