@@ -377,7 +377,7 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     basis = departure_basis(model, fit, reduced, angular)
     count = (estimate.outlier_weight * ~plateau)[chosen].sum()
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
-    weighed = weigh_departures(reduced, basis, count, least_noise=least)
+    weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()
     overshoot = -(share @ weighed.residual)

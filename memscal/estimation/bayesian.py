@@ -19,7 +19,7 @@ the Gaussian itself; its uncertainty is the mean squared error with priors that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import compress, product
@@ -74,35 +74,29 @@ class _Sensors:
     rest: FloatArray  # (f, n): what the flat columns leave over
 
     @classmethod
-    def of(cls, bases: Sequence[DepartureBasis], columns: FloatArray, data: FloatArray) -> _Sensors:
+    def of(cls, basis: DepartureBasis, columns: FloatArray, data: FloatArray) -> _Sensors:
         """Project the weighted flat columns out of the weighted data, less a family's sensor."""
-        # ``columns`` (b, n, p) and ``data`` (b, n) of b fits, whose bases have the same columns.
-        basis = bases[0]
-        fits = len(bases)
+        families = basis.blocks[len(basis.rings) :]
         flat = basis.flat
-        first = np.array([block.start for block in basis.blocks[len(basis.rings) :]], np.intp)
-        family = np.arange(1, 1 + first.size)
-        sensors = 1 + first.size
-        start = np.zeros((fits, sensors, columns.shape[2]))
-        start[:, family, first] = 1.0
+        start = np.zeros((1 + len(families), columns.shape[1]))
         # The flat columns among all: the first two are ln A and ln(width), of each family its own.
-        choice = np.zeros((fits, sensors, columns.shape[2], flat))
-        choice[..., range(flat), range(flat)] = 1.0
-        for i, each in enumerate(bases):
-            choice[i, :, 0, 0] = each.conversion_constant
-            choice[i, :, 1, 1] = each.sigma
-        choice[:, family, 1, 1] = 0.0
-        choice[:, family, first, 0] = 1.0
-        choice[:, family, first + 1, 1] = 1.0
-        data = (data[:, None] - start @ columns.swapaxes(1, 2)).reshape(fits * sensors, -1)
-        values = (columns[:, None] @ choice).reshape(fits * sensors, -1, flat)
+        choice = np.zeros((*start.shape, flat))
+        choice[:, :flat] = np.eye(flat)
+        choice[:, 0, 0] = basis.conversion_constant
+        choice[:, 1, 1] = basis.sigma
+        for i, block in enumerate(families, start=1):
+            start[i, block.start] = 1.0
+            choice[i, 1, 1] = 0.0
+            choice[i, block.start, 0] = 1.0
+            choice[i, block.start + 1, 1] = 1.0
+        values = columns @ choice
+        data = data - start @ columns.T
         scale = np.linalg.norm(values, axis=1, keepdims=True)
         q, r = np.linalg.qr(values / scale)
         diagonal = np.abs(np.diagonal(r, axis1=1, axis2=2))
         log_determinant = np.log(diagonal * scale[:, 0]).sum(axis=1)
         rest = data - _times(q, _times(q, data, transposed=True))
-        root = (choice.reshape(fits * sensors, -1, flat) / scale) @ np.linalg.inv(r)
-        return cls(start.reshape(fits * sensors, -1), root, q, log_determinant, data, rest)
+        return cls(start, (choice / scale) @ np.linalg.inv(r), q, log_determinant, data, rest)
 
 
 def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = False) -> FloatArray:
@@ -133,7 +127,6 @@ class _Conditionals:
     """
 
     sensors: _Sensors
-    fit: IndexArray  # (h,): which of several it is about
     number: IndexArray  # (h,): places among HYPOTHESES
     family: IndexArray  # (h,): of the sensor
     prior: FloatArray  # (h,): variance of the amplitudes
@@ -151,29 +144,25 @@ class _Conditionals:
     def of(
         cls, sensors: _Sensors, columns: FloatArray, choice: _Choice, noise: _Noise
     ) -> _Conditionals:
-        """Decompose what each hypothesis about each of b fits chooses of its columns, (b, n, p)."""
-        count = len(columns)
-        number = np.tile(choice.number, count)
-        fit = np.repeat(np.arange(count), len(choice.number))
-        family = np.tile(choice.family, count) + fit * (len(sensors.start) // count)
-        places = np.tile(choice.places, (count, 1))
-        factors = np.tile(choice.factors, (count, 1))
-        prior = np.tile(choice.strength, count) ** 2
-        q = sensors.q[family]
-        chosen = columns[fit[:, None], :, places].swapaxes(1, 2) * factors[:, None, :]
+        """Decompose what each hypothesis chooses of the columns, (n, p)."""
+        q = sensors.q[choice.family]
+        chosen = columns.T[choice.places].swapaxes(1, 2) * choice.factors[:, None, :]
         explained = q.swapaxes(1, 2) @ chosen
-        by_amplitude = -(sensors.root[family] @ explained)
-        by_amplitude[np.arange(len(places))[:, None], places, np.arange(places.shape[1])] += factors
+        by_amplitude = -(sensors.root[choice.family] @ explained)
+        hypothesis = np.arange(len(choice.places))[:, None]
+        amplitude = np.arange(choice.places.shape[1])
+        by_amplitude[hypothesis, choice.places, amplitude] += choice.factors
         left, singular, right = np.linalg.svd(chosen - q @ explained, full_matrices=False)
-        data = _times(left, sensors.rest[family], transposed=True)
+        data = _times(left, sensors.rest[choice.family], transposed=True)
         power = data**2
         if noise.added:
             # Of a vector that meets the flat columns, only the rest of it carries noise.
             power += noise.added * (1 - np.sum((q.swapaxes(1, 2) @ left) ** 2, axis=1))
+        prior = choice.strength**2
         signal = prior[:, None] * singular**2
-        likelihoods = _likelihoods(sensors, family, signal, power, noise)
+        likelihoods = _likelihoods(sensors, choice.family, signal, power, noise)
         decomposed = (by_amplitude, left, singular, right, data)
-        return cls(sensors, fit, number, family, prior, *decomposed, *likelihoods)
+        return cls(sensors, choice.number, choice.family, prior, *decomposed, *likelihoods)
 
     def __getitem__(self, rows: BoolArray) -> _Conditionals:
         """Some of the hypotheses."""
@@ -349,37 +338,24 @@ def weigh_departures(
     effective_count: float,
     expected_noise: float = 0.0,
     least_noise: float = 0.0,
-) -> WeighedFit:
-    """Average departures from a Gaussian fit over the hypotheses."""
+) -> Weighing:
+    """Weigh the hypotheses about departures from a fit."""
     # ``effective_count``: readings in the data, of which a point may be a mean, by their weight.
     # Of a point of weight one, ``expected_noise`` is that of voltages that have none (of a plan),
     # ``least_noise`` the least that there is, as stated.
-    [weighing] = weighings([(reduced, basis)], effective_count, expected_noise, least_noise)
-    return weighing.average()
-
-
-def weighings(
-    pairs: Sequence[tuple[ReducedScan, DepartureBasis]],
-    effective_count: float,
-    expected_noise: float = 0.0,
-    least_noise: float = 0.0,
-) -> list[Weighing]:
-    """Weigh the hypotheses about several fits to the same points, with equal numbers of columns."""
-    bases = [basis for _, basis in pairs]
-    basis = bases[0]
-    columns = np.stack([basis.columns(reduced) for reduced, basis in pairs])
-    data = np.stack([reduced.data for reduced, _ in pairs])
+    columns = basis.columns(reduced)
+    data = reduced.data
     size = basis.angular.count if basis.angular else 0
     if size:
         # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
-        prior = least_noise * np.eye(size, columns.shape[2], basis.flat - size)
-        columns = np.hstack([columns, np.broadcast_to(prior, (len(pairs), *prior.shape))])
-        data = np.pad(data, ((0, 0), (0, size)))
+        prior = least_noise * np.eye(size, columns.shape[1], basis.flat - size)
+        columns = np.vstack([columns, prior])
+        data = np.append(data, np.zeros(size))
     noise = _Noise(effective_count + size - basis.flat, expected_noise**2, least_noise**2)
     sizes = tuple(ring.radius.size for ring in basis.rings)
     choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))
-    given = _Conditionals.of(_Sensors.of(bases, columns, data), columns, choice, noise)
-    return [Weighing(*pair, given[given.fit == i], noise.added) for i, pair in enumerate(pairs)]
+    given = _Conditionals.of(_Sensors.of(basis, columns, data), columns, choice, noise)
+    return Weighing(reduced, basis, given, noise.added)
 
 
 @dataclass(frozen=True, eq=False)

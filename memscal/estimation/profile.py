@@ -293,7 +293,8 @@ def _weighed(
         columns = (reduced.data, reduced.flat, radial, reduced.rings)
         departures = angular_departures(rings, fit, columns, noise)
     basis = departure_basis(model, fit, reduced, departures)
-    return basis, bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
+    weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
+    return basis, weighing.average()
 
 
 def log_marginal_likelihood(
@@ -319,7 +320,7 @@ def log_marginal_likelihood(
     basis = departure_basis(model, fit, reduced, angular)
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = estimate.outlier_weight.sum()
-    [weighing] = bayesian.weighings([(reduced, basis)], count, least_noise=least)
+    weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
     return np.asarray(weighing.log_marginal_likelihoods) - volume / 2
 
 

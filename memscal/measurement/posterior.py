@@ -36,7 +36,7 @@ from scipy.special import hyp0f1
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import WeighedFit, Weighing, weighings
+from memscal.estimation.bayesian import WeighedFit, Weighing, weigh_departures
 from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.points import ScanPoints
@@ -190,13 +190,15 @@ class ShapeFit:
 def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
     """Fit the shapes, and weigh departures from each fit."""
     model = start.model
-    pairs = []
+    count = float(start.outlier_weight.sum())
+    weighed = []
     for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
         about = departure_basis(model, fit)
         rings = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in about.rings)
         basis = _Basis(fit.conversion_constant, fit.sigma, about.flat, rings, (), None, shape)
-        pairs.append((ReducedScan.of(model, fit, start.weights), basis))
-    return weighings(pairs, float(start.outlier_weight.sum()))
+        reduced = ReducedScan.of(model, fit, start.weights)
+        weighed.append(weigh_departures(reduced, basis, count))
+    return weighed
 
 
 #: Steps of the fits; largest relative change of a width in one; what is left where it has settled.

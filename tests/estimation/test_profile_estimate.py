@@ -102,7 +102,8 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     change[30] = 1e-3 * estimate.weighed.noise
     model = replace(estimate.model, points=replace(estimate.points, u=estimate.points.u + change))
     reduced = ReducedScan.of(model, estimate.gaussian, estimate.weights)
-    again = weigh_departures(reduced, estimate.basis, float(estimate.outlier_weight.sum()))
+    count = float(estimate.outlier_weight.sum())
+    again = weigh_departures(reduced, estimate.basis, count).average()
     profile = estimate.basis.radial(np.linspace(0.0, 3e-3, 31))
     expected = profile @ (estimate.weighed.gain @ change)
     found = profile @ (again.mean - estimate.weighed.mean)

@@ -10,7 +10,6 @@ from scipy.optimize import least_squares
 from scipy.special import jv
 
 from memscal.axisymmetry.hankel import gauss_between
-from memscal.estimation.bayesian import weigh_departures
 from memscal.estimation.points import measured_points
 from memscal.measurement.posterior import PressureShape, pressure_shapes, weighed_shapes
 from memscal.measurement.restore import gaussian_pressure
@@ -93,19 +92,6 @@ def test_fits_and_likelihoods_of_shapes_are_those_of_least_squares(seed: int) ->
         loss = freedom * (np.log(2 * best.cost / freedom) + 1)
         loss += np.linalg.slogdet(best.jac.T @ best.jac)[1] + 3 * np.log(1e6)
         assert weighed.log_marginals[0] == pytest.approx(-loss / 2, abs=0.01)
-
-
-def test_fits_that_are_weighed_together_are_as_each_by_itself() -> None:
-    scan = made.sphere_scan(made.pressed(), seed=1)
-    start, _ = gaussian_pressure(scan, made.known_apparatus(), measured_points(scan))
-    for weighed in weighed_shapes(pressure_shapes(EXACT_FILM)[:4], start):
-        count = float(start.outlier_weight.sum())
-        one = weigh_departures(weighed.reduced, weighed.basis, count)
-        together = weighed.average()
-        for name in ("mean", "covariance", "probability"):
-            left = getattr(one, name)
-            right = getattr(together, name)
-            np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12 * np.abs(left).max())
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.02, 0.05])

@@ -170,7 +170,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     reduced = ReducedScan.of(model, fit, weights)
     basis = departure_basis(model, fit, reduced)
     count = float(plan.repeats * weights.size)
-    weighed = weigh_departures(reduced, basis, count, expected_noise=1.0)
+    weighed = weigh_departures(reduced, basis, count, expected_noise=1.0).average()
     ones = np.ones_like(weights)
     estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, ones, basis)
     require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")
