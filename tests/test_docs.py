@@ -1,5 +1,6 @@
 """What the documentation says is so: numbers, messages, examples; notebooks are their scripts."""
 
+import csv
 import inspect
 import os
 import re
@@ -71,6 +72,37 @@ def test_the_comparison_with_the_paper_s_sphere_is_by_the_same_script(sphere_tab
             [printed] = [row for row in sphere_table(ratio) if row[:2] == [load, friction]]
             found = pair(printed[column])[: len(pair(value))]
             assert pair(value) == pytest.approx(found, abs=0.06 if column == 2 else 0.006)
+
+
+@pytest.fixture(scope="module")
+def kinds() -> dict[str, list[dict[str, str]]]:
+    """The cases of the study of the Bayesian estimate, by the kind of sensor."""
+    kinds: dict[str, list[dict[str, str]]] = {}
+    with (DOCS / "estimation_study.csv").open(encoding="utf-8", newline="") as file:
+        for case in csv.DictReader(file):
+            kind = re.match(r"[a-zA-Z ]+", case["G (lengths in mm)"])[0].strip()
+            kinds.setdefault(kind, []).append(case)
+    return kinds
+
+
+@pytest.mark.parametrize(
+    ("page", "columns"),
+    [
+        ("estimation.md", {3: ("error of G", 3), 5: ("bias of A (u)", 2)}),
+        ("accuracy.md", {2: ("G (%)", 1), 5: ("A (%)", 1), 6: ("z of A", 2)}),
+    ],
+)
+def test_a_page_sums_up_the_study_of_the_bayesian_estimate(page, columns, kinds) -> None:
+    text = (DOCS / page).read_text(encoding="utf-8")
+    rows = [cells_of(line) for line in text.splitlines() if line.startswith("| ")]
+    found = {row[0].split(",")[0]: row for row in rows if row[0].split(",")[0] in kinds}
+    for kind, cases in kinds.items():
+        assert found[kind][1] == str(len(cases))
+        for column, (name, digits) in columns.items():
+            values = [float(case[name]) for case in cases]
+            stated = [float(number) for number in found[kind][column].split(" to ")]
+            ends = {round(min(values), digits), round(max(values), digits)}
+            assert sorted(set(stated)) == sorted(ends), (kind, name)
 
 
 def cells(path: Path) -> list[tuple[str, str]]:
