@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from memscal.formats.tables.scan import ImportedScan
 
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "solver")
-_OF_TABLES = ("r",)
-_OF_MESHES = ("vertical", "base", "centre")
-_REFERENCE_NAMES = (*_OF_TABLES, *_SHARED, *_OF_MESHES)
+_TABLE_ONLY = ("r",)
+_MESH_ONLY = ("vertical", "base", "centre")
+_REFERENCE_NAMES = (*_TABLE_ONLY, *_SHARED, *_MESH_ONLY)
 """The options that only a reference has."""
 
 _READING = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
@@ -39,10 +39,10 @@ def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> Imported
     if not mesh:
         from memscal.formats.tables.reference import read_reference_table
 
-        setting |= _stated(options, _OF_TABLES)
+        setting |= _stated(options, _TABLE_ONLY)
         return read_reference_table(path, reading=_stated(options, _READING), **setting)
 
-    setting |= _stated(options, _OF_MESHES)
+    setting |= _stated(options, _MESH_ONLY)
     if "base" in setting:
         setting["base"] = si(setting["base"], -3)
     if "centre" in setting:
@@ -97,7 +97,7 @@ _ONLY = {
     "reference": _REFERENCE_NAMES,
 }
 _NEEDED = {"scan": ("x", "u"), "reference": ("sigma", "load")}
-_NEEDED_OF_MESHES = ("r_unit", "sigma_unit")
+_NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 
 
 @click.command("import", epilog=EXAMPLES)
@@ -264,7 +264,7 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
     needed = list(_NEEDED[kind])
     if kind == "reference":
-        needed += _NEEDED_OF_MESHES if mesh else _OF_TABLES
+        needed += _NEEDED_WITH_MESH if mesh else _TABLE_ONLY
     elif options["y"] is not None:
         needed.remove("x")
     missing = [name for name in needed if options[name] is None]
@@ -274,20 +274,22 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
             "`memscal import --help`."
         )
     other = "reference" if kind == "scan" else "scan"
-    if misplaced := _stated(options, _ONLY[other]):
+    misplaced = _stated(options, _ONLY[other])
+    if misplaced:
         raise click.UsageError(f"{common.named(misplaced)} belong to --format {other}.")
     if options["rod_friction"] is not None and options["indenter"] == "sphere":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
-    for name, of in {"figures": "holds", "shear_sign": "" if mesh else "shear"}.items():
-        if of and options[name] is not None and options[of] is None:
-            raise click.UsageError(f"{common.named([name.rstrip('s')])} belongs to --{of}.")
-    unused = _stated(options, (*_OF_TABLES, *_READING) if mesh else _OF_MESHES)
+    if options["figures"] is not None and options["holds"] is None:
+        raise click.UsageError("--figure belongs to --holds.")
+    if not mesh and options["shear_sign"] is not None and options["shear"] is None:
+        raise click.UsageError("--shear-sign belongs to --shear.")
+    unused = _stated(options, (*_TABLE_ONLY, *_READING) if mesh else _MESH_ONLY)
     if unused and kind == "reference":
         problem = f"A {'mesh' if mesh else 'table'} has no use for {common.named(unused)}."
         raise click.UsageError(problem)
 
 
-def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+def _stated(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
     """Return the options that were given, so that the library's own defaults hold."""
     return {name: values[name] for name in names if values[name] is not None}
 
@@ -306,11 +308,13 @@ def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
     from memscal.model.instrument import LoadCell, StressSensor
 
+    sensor = {field: options[option] for field, option in _SENSOR_NAMES.items()}
+    load_cell = {field: options[option] for field, option in _CELL_NAMES.items()}
     conditions = ScanConditions(
         **_stated(options, ("load", *_CONDITIONS)),
         **_set_up(options),
-        sensor=StressSensor(**_renamed(options, _SENSOR_NAMES)),
-        load_cell=LoadCell(**_renamed(options, _CELL_NAMES)),
+        sensor=StressSensor(**_stated(sensor, _SENSOR_NAMES)),
+        load_cell=LoadCell(**_stated(load_cell, _CELL_NAMES)),
     )
     uncertainties = ScanUncertainties(
         **_stated(options, _UNCERTAINTIES),
@@ -324,10 +328,3 @@ def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
         conditions=conditions,
         uncertainties=uncertainties,
     )
-
-
-def _renamed(options: dict[str, Any], names: dict[str, str]) -> dict[str, Any]:
-    """Return the options that were given by the names of a record's fields."""
-    return {
-        field: options[option] for field, option in names.items() if options[option] is not None
-    }

@@ -98,7 +98,8 @@ def clear_contact_tables(folder: str | os.PathLike[str]) -> int:
 
 
 def _path(folder: str | os.PathLike[str], key: str) -> Path:
-    if not _ENTRY.fullmatch(name := f"{key}.h5"):
+    name = f"{key}.h5"
+    if not _ENTRY.fullmatch(name):
         raise FormatError(f"{key!r} is not the key of a contact table.")
     return Path(folder) / name
 

@@ -16,9 +16,14 @@ from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
-from memscal.formats.values import altered, has_no_digest, require_schema, units_of
+from memscal.formats.values import (
+    altered,
+    has_no_digest,
+    optional_text,
+    require_schema,
+    units_of,
+)
 from memscal.model import records
-from memscal.model.checks import QualityCheck
 from memscal.model.quantities import Record, record
 
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
@@ -92,22 +97,37 @@ def describe(path: str | os.PathLike[str], *, accept_altered: bool = False) -> d
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
-        paths = [item for at, layout in _layout(file, schema) for item in listed(layout, file, at)]
-        numbers = [(at, q) for at, q in paths if not q.axes and not q.origin]
-        return {
-            "file": file.name,
-            "sha256": file.source.sha256,
-            **({"altered": file.source.altered} if file.source.altered else {}),
-            "schema": schema,
-            "schema_version": version,
-            "title": file.text("/entry/title") if file.has("/entry/title") else "",
-            "quantities": [
-                _quantity_row(file, at, q.key) for at, q in numbers if not q.key.endswith("_errors")
-            ],
-            "arrays": [_array_row(file, at) for at, q in paths if q.axes],
-            "checks": [_check_row(check) for check in read_quality(file, "/entry/quality")],
-            "provenance": origins(file, [(at, q) for at, q in paths if q.origin]),
-        }
+        content: dict[str, Any] = {"file": file.name, "sha256": file.source.sha256}
+        if file.source.altered:
+            content["altered"] = file.source.altered
+        content["schema"] = schema
+        content["schema_version"] = version
+        content["title"] = optional_text(file, "/entry/title")
+        quantities = []
+        arrays = []
+        provenance = []
+        for at, layout in _layout(file, schema):
+            for path_of_quantity, quantity in listed(layout, file, at):
+                if quantity.origin:
+                    provenance.append((path_of_quantity, quantity))
+                elif quantity.axes:
+                    arrays.append(_array_row(file, path_of_quantity))
+                elif not quantity.key.endswith("_errors"):
+                    quantities.append(_quantity_row(file, path_of_quantity, quantity.key))
+        content["quantities"] = quantities
+        content["arrays"] = arrays
+        content["checks"] = [
+            {
+                "name": check.name,
+                "value": _plain(check.value),
+                "limit": _plain(check.limit),
+                "passed": check.passed,
+                "meaning": check.meaning,
+            }
+            for check in read_quality(file, "/entry/quality")
+        ]
+        content["provenance"] = origins(file, provenance)
+        return content
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -137,7 +157,8 @@ def _digest(file: SafeFile, schema: str) -> Finding:
     """Results must have a digest: scans and references may come from other programs."""
     if has_no_digest(file, schema):
         return Finding("digest", True, "None, as other programs write them: no change would show.")
-    if problem := altered(file):
+    problem = altered(file)
+    if problem:
         return Finding("digest", False, f"The file was changed after it was written: {problem}.")
     return Finding("digest", True, "The content is what was written.")
 
@@ -163,14 +184,15 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
-    if text := file.is_text(path):
-        value: Any = file.text(path)
+    row: dict[str, Any] = {"path": path, "name": name}
+    if file.is_text(path):
+        row["value"] = file.text(path)
     else:
         number = _single(file, path)
-        value = "inf" if number == np.inf else _plain(number)
-    unit = None if text else units_of(file, path) or "1"
-    row = {"path": path, "name": name, "value": value}
-    return row | {"standard_uncertainty": _uncertainty(file, path), "unit": unit}
+        row["value"] = "inf" if number == np.inf else _plain(number)
+    row["standard_uncertainty"] = _uncertainty(file, path)
+    row["unit"] = None if file.is_text(path) else units_of(file, path) or "1"
+    return row
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:
@@ -189,7 +211,8 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
 
 
 def _single(file: SafeFile, path: str) -> float | int:
-    if (numbers := file.array(path)).size != 1:
+    numbers = file.array(path)
+    if numbers.size != 1:
         problem = f"{file.where(path)} has {numbers.size} values, but one number is expected."
         raise FormatError(problem)
     number: float | int = numbers.item()
@@ -207,11 +230,6 @@ def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
         "maximum": _plain(finite.max()) if finite.size else None,
         "missing": int(np.isnan(values).sum()),
     }
-
-
-def _check_row(check: QualityCheck) -> dict[str, Any]:
-    numbers = {"value": _plain(check.value), "limit": _plain(check.limit)}
-    return {"name": check.name, **numbers, "passed": check.passed, "meaning": check.meaning}
 
 
 def _plain(value: Any) -> float | int | None:

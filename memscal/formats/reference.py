@@ -70,7 +70,8 @@ def read_reference(
     ...     read_reference(f"{folder}/rod.h5").sigma_zz
     array([200000., 100000.])
     """
-    if (ideal := ideal_reference(path)) is not None:
+    ideal = ideal_reference(path)
+    if ideal is not None:
         return ideal.profile()
     if os.fspath(path).lower().endswith(_PIXELS):
         return _read_pixels(path, pixel_size).profile()
@@ -83,8 +84,8 @@ def read_reference(
 
 def ideal_reference(text: str | os.PathLike[str]) -> IdealReference | None:
     """Return the ideal reference that a text names; nothing of a file that exists."""
-    match = None if os.path.exists(text) else _NAMED.fullmatch(os.fspath(text).strip())
-    if match is None:
+    match = _NAMED.fullmatch(os.fspath(text).strip())
+    if match is None or os.path.exists(text):
         return None
     shape, size = match.groups()
     if shape == "point" and size is None:
@@ -132,7 +133,8 @@ def _image(data: bytes) -> NDArray[Any]:
     from PIL import Image
 
     with Image.open(BytesIO(data), formats=("PNG", "TIFF")) as image:
-        if (side := max(image.size)) > MOST_PIXELS:
+        side = max(image.size)
+        if side > MOST_PIXELS:
             cure = "Cut out the field, or average neighbouring pixels."
             raise too_large("The image", side, MOST_PIXELS, "pixels along a side", cure=cure)
         return np.asarray(image.convert("RGB") if image.mode == "P" else image)

@@ -78,9 +78,11 @@ def read_scan(path: str | os.PathLike[str], *, accept_altered: bool = False) -> 
 def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     """Read the scan of an open memscal-scan file; one of more than ``most`` points is refused."""
     values.require_schema(file, writer.SCAN_SCHEMA)
-    if most is not None and (size := file.claimed_number(f"{_DATA}/u_zz")) > most:
-        cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(file.name, size, most, "points", cure=cure)
+    if most is not None:
+        size = file.claimed_number(f"{_DATA}/u_zz")
+        if size > most:
+            cure = "Average neighbouring readings, thin the raster, or leave out repeats."
+            raise too_large(file.name, size, most, "points", cure=cure)
     values.require_unaltered(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})
     with placed(file.where("/entry/indenter/friction_coefficient")):
@@ -88,11 +90,12 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     film, indenter = groups.read_stated(file)
     reading = reading_of(units_of(file, f"{_DATA}/u_zz") or "V", file.where(f"{_DATA}/u_zz"))
     axes = _check_axes(file)
-    only_y = axes == _POINTS and not file.has(f"{_DATA}/x")
+    points = axes == _POINTS
+    only_y = points and not file.has(f"{_DATA}/x")
     along = "y" if only_y or axes in _ALONG_Y.values() else "x"
     arrays = _read_arrays(file, along, reading)
     # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
-    numbered = axes == _POINTS and file.has(f"{_DATA}/repeat")
+    repeat = file.array(f"{_DATA}/repeat") if points and file.has(f"{_DATA}/repeat") else None
     if "branch" in arrays:
         arrays["branch"] = branch_numbers(file.where(f"{_DATA}/branch"), arrays["branch"])
     reference = None
@@ -104,7 +107,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         x=arrays.pop(along),
         y=arrays.pop("y", None),
         x_errors=arrays.pop(f"{along}_errors", None),
-        repeat=file.array(f"{_DATA}/repeat") if numbered else None,
+        repeat=repeat,
         direction=along,
         channels={name: arrays.pop(name) for name in _CHANNELS if name in arrays},
         **arrays,
@@ -125,9 +128,10 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
 
 def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
-    unused = {"repeat", *(("y_errors",) if along == "x" else ("x", "x_errors"))}
+    unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
     arrays: dict[str, Any] = {}
-    if file.has(scale := f"{_DATA}/position_scale_errors"):
+    scale = f"{_DATA}/position_scale_errors"
+    if file.has(scale):
         arrays["position_scale_uncertainty"] = values.require_scalar(file, scale, "dimensionless")
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
@@ -169,11 +173,11 @@ def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = Fa
 def _entry(scan: Scan) -> Group:
     notes: dict[str, Node] = {"notes": writer.note(scan.notes)} if scan.notes else {}
     children: dict[str, Node] = {"title": scan.title} if scan.title else {}
-    of_load = scan.load, scan.load_uncertainty, scan.rod_friction
+    loading = scan.load, scan.load_uncertainty, scan.rod_friction
     children |= {
         **groups.circumstances(scan),
         "data": _data_group(scan),
-        "indenter": groups.indenter_group(scan.indenter, *of_load),
+        "indenter": groups.indenter_group(scan.indenter, *loading),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
         "instrument": groups.instrument_group(scan.sensor, scan.load_cell, scan.stage),
         **notes,

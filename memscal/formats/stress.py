@@ -1,6 +1,7 @@
 """memscal-stress: the stress that a calibrated sensor measured, load by load, as HDF5."""
 
 import os
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -35,7 +36,8 @@ def _read_points(file: SafeFile, name: str, of: Reading) -> dict[str, MeasuredPo
     """Read the points of each channel of a profile; none of a file of version 1.0."""
     points: dict[str, MeasuredPoints] = {}
     for channel in _CHANNELS:
-        if file.has(group := f"/entry/points_{channel}/{name}"):
+        group = f"/entry/points_{channel}/{name}"
+        if file.has(group):
             stored = read_record(points_record(channel).read_in(of), file, group)
             points[channel] = MeasuredPoints(**{"noise": None} | stored)
     return points
@@ -186,7 +188,7 @@ def _entry(measured: MeasuredStress) -> Group:
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", list(profiles)),
         **profiles,
-        **_beside(measured.profiles),
+        **_parts_of_profiles(measured.profiles),
         "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **of_artifact),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
@@ -226,22 +228,21 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     return replace(arrays, children=children)
 
 
-def _beside(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
+def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
     """Return roots of covariances, budgets, fitted curves and points of all profiles."""
     # Apart from the profiles: programs that read NeXus take a NXdata within another for its signal.
-    groups_of: dict[str, dict[str, Node]] = {}
+    parts: dict[str, dict[str, Node]] = defaultdict(dict)
     for i, profile in enumerate(profiles, 1):
-        of = profile.scan.reading
         name = f"profile_{i}"
         budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
-        groups_of.setdefault("roots", {})[name] = _roots_group(profile)
-        groups_of.setdefault("budgets", {})[name] = groups.budget_group(budget, _BUDGET)
+        parts["roots"][name] = _roots_group(profile)
+        parts["budgets"][name] = groups.budget_group(budget, _BUDGET)
         if profile.curve_r.size:
-            groups_of.setdefault("curves", {})[name] = write_record(records.STRESS_CURVE, profile)
+            parts["curves"][name] = write_record(records.STRESS_CURVE, profile)
         for channel, points in profile.points.items():
-            group = write_record(points_record(channel).read_in(of), points)
-            groups_of.setdefault(f"points_{channel}", {})[name] = group
-    return {name: Group("NXcollection", of_profiles) for name, of_profiles in groups_of.items()}
+            record = points_record(channel).read_in(profile.scan.reading)
+            parts[f"points_{channel}"][name] = write_record(record, points)
+    return {part: Group("NXcollection", by_profile) for part, by_profile in parts.items()}
 
 
 def _roots_group(profile: MeasuredProfile) -> Group:
@@ -266,9 +267,10 @@ def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
     return numbers
 
 
-def _beside_or_in(file: SafeFile, group: str, name: str, within: str) -> str:
+def _part_of_profile(file: SafeFile, group: str, name: str, within: str) -> str:
     """Return where a part of a profile stands: version 1.0 held it within the profile."""
-    return beside if file.has(beside := f"/entry/{group}/{name}") else within
+    path = f"/entry/{group}/{name}"
+    return path if file.has(path) else within
 
 
 def _root_of(covariance: FloatArray, where: str) -> FloatArray:
@@ -292,17 +294,19 @@ def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, Float
     where = f"/entry/roots/{name}"
     prefix = "root_"
     dimension = "stress"
-    if before := not file.has(where):
-        where = _beside_or_in(file, "covariances", name, path)
+    as_matrices = not file.has(where)
+    if as_matrices:
+        where = _part_of_profile(file, "covariances", name, path)
         prefix = "covariance_"
         dimension = "stress squared"
     roots: dict[str, FloatArray] = {}
     for source in text_list(file, f"{where}/sources"):
-        stored = values.require_array(file, place := f"{where}/{prefix}{source}", dimension)
-        shape = (n, n) if before else (n, *stored.shape[1:2])
+        place = f"{where}/{prefix}{source}"
+        stored = values.require_array(file, place, dimension)
+        shape = (n, n) if as_matrices else (n, *stored.shape[1:2])
         if stored.shape != shape or not stored.size or not np.isfinite(stored).all():
             raise FormatError(f"{file.where(place)} should hold finite numbers in {n} rows.")
-        roots[source] = _root_of(stored, file.where(place)) if before else stored
+        roots[source] = _root_of(stored, file.where(place)) if as_matrices else stored
     return roots
 
 
@@ -311,13 +315,15 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     n = arrays["r"].size
     name = path.rpartition("/")[2]
     roots = _read_roots(file, name, path, n)
-    budget = groups.read_budget(file, _beside_or_in(file, "budgets", name, f"{path}/budget"))
+    budget_path = _part_of_profile(file, "budgets", name, f"{path}/budget")
+    budget = groups.read_budget(file, budget_path)
     if not roots or not budget.keys() >= _BUDGET.keys():
         problem = f"{file.where(path)} states no covariance of its stress, or no budget."
         raise FormatError(problem, why="Measured stress without uncertainty means little.")
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
     profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
-    if file.has(curve := _beside_or_in(file, "curves", name, f"{path}/curve")):
+    curve = _part_of_profile(file, "curves", name, f"{path}/curve")
+    if file.has(curve):
         profile |= read_record(records.STRESS_CURVE, file, curve)
     for end in ("", "_uncertainty"):
         across = profile.get(f"centre_y{end}", 0.0)

@@ -91,10 +91,12 @@ def _power(unit: str, dimension: str) -> int | None:
 
 def reading_of(unit: str, where: str) -> Reading:
     """Return the unit of readings in any unit: one that has a name, base units, or 1."""
-    if canonical := _CANONICAL.get(unit.strip()):
-        return Reading.fitting(DIMENSIONS[canonical[0]].si, 10.0 ** canonical[1])
+    if unit.strip() in _CANONICAL:
+        dimension, power = _CANONICAL[unit.strip()]
+        return Reading.fitting(DIMENSIONS[dimension].si, 10.0**power)
     quantity = _pint_quantity(unit, "reading", where)
-    if not (base := quantity.to_base_units()).dimensionality:
+    base = quantity.to_base_units()
+    if not base.dimensionality:
         return Reading.fitting("1")
     named = (name for name in NAMED_UNITS if quantity.is_compatible_with(name))
     si = next(named, f"{base.units:~C}".replace("**", "^"))
@@ -129,10 +131,11 @@ def same_unit(first: str, second: str) -> bool:
 
 def dimension_of(unit: str, where: str) -> str:
     """Return the dimension of a unit whose quantity is not known beforehand."""
-    if canonical := _CANONICAL.get(unit.strip()):
-        return canonical[0]
-    if entered := next((d for d, units in DIMENSIONS.items() if units.stored == unit), ""):
-        return entered
+    if unit.strip() in _CANONICAL:
+        return _CANONICAL[unit.strip()][0]
+    for dimension, units in DIMENSIONS.items():
+        if units.stored == unit:
+            return dimension
     for dimension in SI_UNITS:
         try:
             _pint_factor(unit, dimension, where)

@@ -93,12 +93,15 @@ def optional_text(file: SafeFile, path: str) -> str:
 
 def _finite(text: str) -> float:
     """Return a number of JSON, which has no others."""
-    if not math.isfinite(number := float(text)):
+    number = float(text)
+    if not math.isfinite(number):
         raise ValueError(f"{text} is no finite number")
     return number
 
 
-def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
+def json_value(
+    file: SafeFile, path: str, kind: type[list[Any] | dict[str, Any]], default: Any
+) -> Any:
     """Return JSON of a given type (``list`` or ``dict``), or the default where there is none."""
     if not file.has(path):
         return default
@@ -109,7 +112,7 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
         raise InputError(problem, cure="Write the file again.") from error
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
-    if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:
+    if len(value) > _MAX_ITEMS:
         raise FormatError(f"{file.where(path)} lists {len(value):,} items.")
     return value
 
@@ -122,18 +125,18 @@ def text_list(file: SafeFile, path: str) -> list[str]:
 _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 
-#: What other programs write, too, without a digest.
-_OF_OTHERS = (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA)
-
-
 def has_no_digest(file: SafeFile, schema: str | None) -> bool:
     """Return whether a file has no digest and needs none: other programs write such, too."""
-    return schema in (*_OF_OTHERS, None) and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None
+    needs_none = schema in (writer.SCAN_SCHEMA, writer.REFERENCE_SCHEMA, None)
+    return needs_none and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None
 
 
 def require_unaltered(file: SafeFile, schema: str | None) -> None:
     """Refuse a file whose content is not what was written; or record it, where that is accepted."""
-    if not file.verified and not has_no_digest(file, schema) and (problem := altered(file)):
+    if file.verified or has_no_digest(file, schema):
+        return
+    problem = altered(file)
+    if problem:
         file.refuse_altered(problem)
 
 

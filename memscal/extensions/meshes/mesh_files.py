@@ -269,7 +269,8 @@ def _checked(
         raise _unusable(sources[0], "no cells")
     heavy = sources[1:]
     notes = [f"Its numbers are those of {file.file_name} (sha256 {file.sha256})." for file in heavy]
-    if words := printable(header["printed"], _MAX_NOTES):
+    words = printable(header["printed"], _MAX_NOTES)
+    if words:
         notes.append(f"meshio says: {words}")
     if not header["limited"]:
         notes.append("It was read without a limit of memory, which this system does not offer.")

@@ -58,7 +58,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     if len(varying) < 2:
         cure = "Give a section of the film from the axis outward, or the film in 3-D."
         raise InputError(f"{name} holds a mesh that is a line or a point.", cure=cure)
-    up = varying[-1] if vertical is None else [*AXES, vertical].index(vertical)
+    up = varying[-1] if vertical is None else AXES.find(vertical)
     if up not in varying:
         raise InputError(
             f"The vertical axis is {vertical!r}, but the mesh in {name} extends along "
@@ -100,10 +100,11 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
         # An indenter or a substrate may be in the mesh too, on the other side of the base.
         film = touching.any(axis=1) & (outward * (middle - position) < 0)
         nodes.append(block.nodes[film][touching[film]])
-        of_side = np.flatnonzero(film & (touching.sum(axis=1) > len(frame.radial)))
-        weight = touching[of_side][..., None]
-        corners = frame.points[block.nodes[of_side]]
-        sides.append((block, of_side, (weight * corners).sum(axis=1) / weight.sum(axis=1)))
+        with_side = np.flatnonzero(film & (touching.sum(axis=1) > len(frame.radial)))
+        on_side = touching[with_side][..., None]
+        corners = frame.points[block.nodes[with_side]]
+        middles = (on_side * corners).sum(axis=1) / on_side.sum(axis=1)
+        sides.append((block, with_side, middles))
     base_nodes = np.unique(np.concatenate(nodes))
     level_text = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
     if base_nodes.size < _FEWEST:
@@ -194,24 +195,22 @@ def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
         raise _no_such_field(mesh, field, at_points, in_cells)
     if counts[field] == _SCALAR:
         return Component(field, field in at_points, 0, "the value")
-    column, meaning = _of_tensor(mesh, frame, field, counts[field], (axis, frame.vertical))
+    column, meaning = _tensor_component(mesh, frame, field, counts[field], axis)
     return Component(field, field in at_points, column, meaning, tensor=True)
 
 
-def _of_tensor(
-    mesh: Mesh, frame: Frame, field: str, count: int, pair: tuple[int, int]
+def _tensor_component(
+    mesh: Mesh, frame: Frame, field: str, count: int, axis: int
 ) -> tuple[int, str]:
-    """Return the column of a tensor's component, and what it is called."""
-    axes = "".join(AXES[i] for i in sorted(pair))
+    """Return the column of a tensor's component along an axis, and what it is called."""
+    axes = "".join(sorted(AXES[axis] + AXES[frame.vertical]))
     if count == _NINE:
-        return 3 * pair[0] + pair[1], f"the component {axes}"
+        return 3 * axis + frame.vertical, f"the component {axes}"
     if count == _SIX and mesh.tensor_order:
         return _SYMMETRIC.index(axes), f"the component {axes} (of {', '.join(_SYMMETRIC)})"
     if count == _AXISYMMETRIC and len(frame.radial) == 1 and not _is_plane(mesh, field):
-        normal = pair[0] == pair[1]
-        return (1 if normal else 3), (
-            f"component {2 if normal else 4} of 4 (radial, vertical, hoop, shear)"
-        )
+        number = 2 if axis == frame.vertical else 4
+        return number - 1, f"component {number} of 4 (radial, vertical, hoop, shear)"
     raise InputError(
         f"The field {field!r} in {mesh.source.file_name} has {count} components, and which of "
         "them is meant is not plain.",
@@ -233,14 +232,15 @@ def _is_plane(mesh: Mesh, field: str) -> bool:
 def _no_such_field(
     mesh: Mesh, field: str, points: dict[str, int], cells: dict[str, int]
 ) -> InputError:
-    def listed(fields: dict[str, int], where: str) -> str:
-        names = [f"{name} ({count})" for name, count in list(fields.items())[:_MOST_LISTED]]
-        more = len(fields) - len(names)
-        return f"{where}: " + ", ".join(names) + (f" and {more} more" if more else "")
-
-    places = {"at the nodes": points, "in the cells": cells}
-    lists = "; ".join(listed(fields, where) for where, fields in places.items() if fields)
-    has = f"has, with their numbers of components, {lists}" if lists else "has no fields at all"
+    lists = []
+    for where, fields in (("at the nodes", points), ("in the cells", cells)):
+        names = [f"{name} ({count})" for name, count in fields.items()]
+        more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+        if names:
+            lists.append(f"{where}: {', '.join(names[:_MOST_LISTED])}{more}")
+    has = "has no fields at all"
+    if lists:
+        has = f"has, with their numbers of components, {'; '.join(lists)}"
     problem = f"{mesh.source.file_name} has no field {printable(field, 80)!r}."
     cure = "Give the name of the stress among them, or save the mesh with its stress."
     return InputError(problem, why=f"It {has}.", cure=cure)

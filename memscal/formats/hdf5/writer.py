@@ -208,7 +208,8 @@ def tree_to_bytes(root: Group) -> bytes:
     data = memory.getvalue()
     numbers = (node.values for _, node in walk(root) if isinstance(node, Number))
     held = max(len(data), sum(8 * np.size(values) for values in numbers))
-    if held > (most := most_held(len(data))):
+    most = most_held(len(data))
+    if held > most:
         why = "The file could not be read again."
         cure = "Write fewer scans, loads or points into one file."
         raise too_large("What is to be written", held, most, "bytes", why=why, cure=cure)
@@ -224,12 +225,12 @@ def _with_contents(root: Group, text: str) -> Group:
 
 
 def _write_group(group: Any, node: Group) -> None:
-    if wrong := [name for name in node.children if not _NAME.fullmatch(name)]:
-        problem = f"{wrong[0]!r} cannot be written into {group.name}"
-        cure = "Use the letters a to z, digits and underscores."
-        raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
     _write_attributes(group, node)
     for name, child in node.children.items():
+        if not _NAME.fullmatch(name):
+            problem = f"{name!r} cannot be written into {group.name}"
+            cure = "Use the letters a to z, digits and underscores."
+            raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
         if isinstance(child, Group):
             _write_group(group.create_group(name), child)
         else:

@@ -139,15 +139,6 @@ def import_table(
     >>> scan
     <ImportedScan: line, 5 points, x from -8 to 8 mm, load 1 N>
     """
-    named = {
-        "u_zz": u,
-        "u_xz": u_xz,
-        "u_yz": u_yz,
-        "u_zz_errors": u_errors,
-        "normal_load": load_column,
-        "x": x,
-        "y": y,
-    }
     layout, conditions, uncertainties = with_old_keywords(
         "import_table",
         old,
@@ -156,39 +147,20 @@ def import_table(
         conditions=conditions or ScanConditions(),
         uncertainties=uncertainties or ScanUncertainties(),
     )
+    named = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz, "u_zz_errors": u_errors}
+    named |= {"normal_load": load_column, "x": x, "y": y, "branch": branch}
+    numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
+    named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
     require_sign("sign of the voltage", layout.u_sign)
     _require_use(named, layout, conditions, uncertainties)
-    table = open_table(
-        source,
-        sheet=layout.sheet,
-        skip_rows=layout.skip_rows,
-        missing=tuple(layout.missing),
-        delimiter=layout.delimiter,
-        decimal=layout.decimal,
-    )
+    reading_options = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
+    table = open_table(source, **{name: getattr(layout, name) for name in reading_options})
     u_unit = table.unit_of(u, layout.u_unit, _U_UNIT)
     reading = reading_of(u_unit, table.where(u))
     wanted = _wanted(table, named, layout, u_unit, dimension_in("voltage", reading))
-    numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
-    words = {f"repeat {i}": column for i, column in enumerate(numbering)}
-    if branch is not None:
-        words["branch"] = branch
-    in_words = {name: Wanted(column, words=BRANCHES) for name, column in words.items()}
-    columns: Columns = table.columns(wanted | in_words)
-    units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items())
-    notes = [*table.notes, f"Units: {units}."]
-    if layout.u_sign < 0:
-        columns["u_zz"] *= -1
-        notes.append("The sign of u_zz was changed.")
-    if uncertainties.noise is not None:
-        noise = to_si(uncertainties.noise, u_unit, wanted["u_zz"].dimension, "noise")
-        columns["u_zz_errors"] = np.full(columns["u_zz"].shape, float(noise))
+    columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
-    if branch is not None:
-        columns["branch"] = branch_numbers(table.where(branch), np.nan_to_num(columns["branch"]))
-    if x is None:
-        columns["x"] = np.zeros(columns["y"].size)
     holds = find_holds(columns, table.all_lines(), reading) if layout.holds else None
     if holds is not None:
         notes += holds.notes
@@ -257,24 +229,52 @@ def _wanted(
     named: Mapping[str, Column | None],
     layout: TableLayout,
     u_unit: str,
-    of_u: str,
+    dimension_of_u: str,
 ) -> dict[str, Wanted]:
-    """Return the columns that are named with their units; ``of_u`` is the dimension of readings."""
-    reading = (of_u, layout.u_unit, _U_UNIT, u_unit)
+    """Return the columns that are named, with their units."""
+    reading = (dimension_of_u, layout.u_unit, _U_UNIT, u_unit)
     length = ("length", layout.x_unit, "x_unit (--x-unit)", None)
     forms: dict[str, tuple[str, str | None, str, str | None]] = {
-        "u_zz_errors": (of_u, None, "", u_unit),
+        "u_zz": reading,
+        "u_xz": reading,
+        "u_yz": reading,
+        "u_zz_errors": (dimension_of_u, None, "", u_unit),
         "normal_load": ("force", layout.load_unit, "load_unit (--load-unit)", "N"),
         "x": length,
         "y": length,
     }
     wanted = {}
     for name, column in named.items():
-        if column is not None:
-            dimension, unit, option, default = forms.get(name, reading)
+        if column is None:
+            continue
+        wanted[name] = Wanted(column, words=BRANCHES)
+        if name in forms:
+            dimension, unit, option, default = forms[name]
             unit = table.unit_of(column, unit, option, default)
             wanted[name] = Wanted(column, unit, dimension)
     return wanted
+
+
+def _read_columns(
+    table: NamedColumns, wanted: Mapping[str, Wanted], u_sign: int, noise: float | None
+) -> tuple[Columns, list[str]]:
+    """Read columns, with the sign and the noise that are stated; return them with notes."""
+    columns: Columns = table.columns(wanted)
+    units = ", ".join(f"{name} in {item.unit}" for name, item in wanted.items() if item.unit)
+    notes = [*table.notes, f"Units: {units}."]
+    u = wanted["u_zz"]
+    if u_sign < 0:
+        columns["u_zz"] *= -1
+        notes.append("The sign of u_zz was changed.")
+    if noise is not None:
+        in_si = float(to_si(noise, u.unit, u.dimension, "noise"))
+        columns["u_zz_errors"] = np.full(columns["u_zz"].shape, in_si)
+    if "branch" in columns:
+        where = table.where(wanted["branch"].column)
+        columns["branch"] = branch_numbers(where, np.nan_to_num(columns["branch"]))
+    if "x" not in columns:
+        columns["x"] = np.zeros(columns["y"].size)
+    return columns, notes
 
 
 def _scan_of(
@@ -299,7 +299,10 @@ def _scan_of(
     stated["direction"] = conditions.direction or along
     notes += _counted(columns)
     notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
-    notes.append(f"Standard uncertainty of each reading: {_noise_in_words(columns, reading)}.")
+    noise = "not stated"
+    if "u_zz_errors" in columns:
+        noise = f"{reading.text(float(np.nanmedian(columns['u_zz_errors'])))} (median)"
+    notes.append(f"Standard uncertainty of each reading: {noise}.")
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
@@ -320,13 +323,6 @@ def _scan_of(
         messages=tuple(messages),
         holds=holds,
     )
-
-
-def _noise_in_words(columns: Columns, reading: Reading) -> str:
-    errors = columns.get("u_zz_errors")
-    if errors is None:
-        return "not stated"
-    return f"{reading.text(float(np.nanmedian(errors)))} (median)"
 
 
 def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
@@ -423,7 +419,8 @@ def _placed(columns: Columns, notes: list[str], of_rows: Callable[[Any], str]) -
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
     for name, values in columns.items():
-        if (rows := np.flatnonzero(finite & np.isnan(values))).size:
+        rows = np.flatnonzero(finite & np.isnan(values))
+        if rows.size:
             notes.append(f"{name} is missing (NaN) in {of_rows(rows)}.")
     if not finite.all():
         rows = np.flatnonzero(~finite)

@@ -49,7 +49,8 @@ def open_table(source: Any, **reading: Any) -> NamedColumns:
     path = isinstance(source, str) or hasattr(source, "__fspath__")
     ending = PurePath(source).suffix.lower() if path else ""
     kind = _KINDS.get(ending, "text") if path else "table in memory"
-    if useless := [name for name in reading if kind not in _USES.get(name, (kind,))]:
+    useless = [name for name in reading if kind not in _USES.get(name, (kind,))]
+    if useless:
         named = ", ".join(f"{name} (--{name.replace('_', '-')})" for name in useless)
         raise InputError(f"{named} has no effect on a {kind}.", cure="Leave it out.")
     if ending in _OTHERS:
@@ -175,10 +176,10 @@ class FrameTable(NamedColumns):
         self._column = column
 
     def _room(self, columns: int) -> tuple[int, int]:
-        if self._rows > (most := self._most(columns)):
-            of = f"rows of {columns} columns"
+        most = self._most(columns)
+        if self._rows > most:
             cure = "Average neighbouring readings."
-            raise too_large(self._name, self._rows, most, of, cure=cure)
+            raise too_large(self._name, self._rows, most, f"rows of {columns} columns", cure=cure)
         return self._rows, self._rows
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
