@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from memscal.friction.family import ProfileFamily
+from memscal.friction.family import ProfileFamily, bounded, unbounded
 from memscal.friction.interval import friction_reason, profile_estimate
 from memscal.friction.likelihood import Channel, Likelihood, likelihood, points_at, predict
 from memscal.friction.results import BoundedEstimate, LoadComparison
@@ -68,15 +68,15 @@ class FrictionFit:
             along.coordinates,
             along.deviance,
             along.chi_square,
-            family.value_at,
+            family.scale,
             reason=lambda interval: friction_reason(interval, last),
         )
         budget = {}
         if estimate.value is not None:
             # The coordinate's derivative by the coefficient, turned over.
-            stretch = family.scale / (1 - family.coordinate(estimate.value)) ** 2
+            stretch = family.scale / (1 - bounded(estimate.value, family.scale)) ** 2
             shares = at(estimate.value).budget()
-            budget = {source: stretch * share for source, share in shares.items()}
+            budget = {source: float(stretch * share) for source, share in shares.items()}
         degrees = max(sum(load.degrees for load in along.loads) - 1, 0)
         least = max(estimate.least, 0.0)
         p_value = float(chdtrc(max(degrees, 1), least))
@@ -97,7 +97,7 @@ def fine_values(family: ProfileFamily) -> FloatArray:
     even = np.linspace(nodes[0], nodes[-1], _FINE)
     apart = np.abs(np.subtract.outer(even, nodes)).min(axis=1) > 0.2 * (even[1] - even[0])
     # The family's own values are kept as they are, not as their coordinates give them back.
-    return np.sort(np.concatenate([family.values, family.values_at(even[apart])]))
+    return np.sort(np.concatenate([family.values, unbounded(even[apart], family.scale)]))
 
 
 def random_uncertainty(budget: Mapping[str, float]) -> float:

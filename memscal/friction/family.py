@@ -9,8 +9,7 @@ friction at which the contact sticks wholly nothing changes, and an interpolant 
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -40,10 +39,17 @@ _ROUNDING = 1e-9
 
 
 def bounded(values: ArrayLike, scale: float) -> FloatArray:
-    """Return the bounded coordinate of values: 1 where they are infinite."""
+    """Return the bounded coordinate t of values: 1 where they are infinite."""
     theta = np.asarray(values, dtype=np.float64)
     finite = np.where(np.isfinite(theta), theta, 0.0)
     return np.where(np.isfinite(theta), finite / (finite + scale), 1.0)
+
+
+def unbounded(coordinates: ArrayLike, scale: float) -> FloatArray:
+    """Return the values at bounded coordinates: the inverse of :func:`bounded`."""
+    t = np.asarray(coordinates, dtype=np.float64)
+    with np.errstate(divide="ignore"):
+        return scale * t / (1 - t)
 
 
 #: Arrays of a family that hold one number for each value and load.
@@ -78,62 +84,52 @@ class ProfileFamily(FrozenArrays):
     @cached_property
     def by_coordinate(self) -> FloatArray:
         """Derivatives of the spectra by the bounded coordinate, shape (M, L, K), in N."""
-        return self._interpolated(self.coordinates, 1)[:, 0] if self.slopes is None else self.slopes
-
-    def coordinate(self, value: float) -> float:
-        """Return the bounded coordinate of a value; refuse what no family has."""
-        if math.isnan(value) or value < 0:
-            raise InputError(f"A {self.name} family has no value {value:g}: it is not negative.")
-        return float(bounded(value, self.scale))
-
-    def value_at(self, coordinate: float) -> float:
-        """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`."""
-        return math.inf if coordinate == 1 else self.scale * coordinate / (1 - coordinate)
-
-    def values_at(self, coordinates: Iterable[float]) -> FloatArray:
-        """Return the values at several bounded coordinates."""
-        return np.array([self.value_at(float(t)) for t in coordinates])
+        if self.slopes is not None:
+            return self.slopes
+        return np.asarray(self._interpolant(self.coordinates, 1)[:, 0])
 
     def at(self, values: ArrayLike) -> ProfileFamily:
         """Return the members at one or several values, in any order; none is extrapolated."""
         chosen = np.atleast_1d(np.asarray(values, dtype=np.float64))
         nodes = self.coordinates
-        t = np.array([self.coordinate(float(value)) for value in chosen])
-        outside = (t < nodes[0] - _ROUNDING) | (t > nodes[-1] + _ROUNDING)
-        if outside.any():
+        t = bounded(chosen, self.scale)
+        inside = (t >= nodes[0] - _ROUNDING) & (t <= nodes[-1] + _ROUNDING) & ~np.isnan(chosen)
+        if not inside.all():
             raise InputError(
                 f"A {self.name} family from {self.values[0]:g} to {self.values[-1]:g} does not "
-                f"reach {chosen[outside][0]:g}.",
+                f"reach {chosen[~inside][0]:g}.",
                 why="It is interpolated, not extrapolated.",
                 cure="Calculate it with a value beyond.",
             )
         t = np.clip(t, nodes[0], nodes[-1])
-        arrays = self._interpolated(t)
-
-        def linear(table: FloatArray) -> FloatArray:
-            return np.stack([np.interp(t, nodes, column) for column in table.T], axis=1)
-
-        numbers: dict[str, Any] = {name: linear(getattr(self, name)) for name in _NUMBERS}
+        arrays = self._interpolant(t)
+        changes = {source: arrays[:, 2 + i] for i, source in enumerate(self.changes)}
+        numbers: dict[str, Any] = {}
+        for name in _NUMBERS:
+            columns = getattr(self, name).T
+            numbers[name] = np.stack([np.interp(t, nodes, column) for column in columns], axis=1)
         return replace(
             self,
             values=chosen,
             spectra=arrays[:, 0],
             by_load=arrays[:, 1],
-            changes={source: arrays[:, 2 + i] for i, source in enumerate(self.changes)},
-            slopes=self._interpolated(t, 1)[:, 0],
+            changes=changes,
+            slopes=self._interpolant(t, 1)[:, 0],
             **numbers,
         )
 
     def only(self, loads_index: int | Sequence[int]) -> ProfileFamily:
         """Return the family at one or several of its loads, by index, in the order given."""
         chosen = np.atleast_1d(np.asarray(loads_index, dtype=np.intp))
-        names = ["spectra", "by_load", *_NUMBERS, *(() if self.slopes is None else ("slopes",))]
+        names = ["spectra", "by_load", *_NUMBERS]
+        if self.slopes is not None:
+            names.append("slopes")
         arrays: dict[str, Any] = {name: getattr(self, name)[:, chosen] for name in names}
         changes = {name: change[:, chosen] for name, change in self.changes.items()}
         return replace(self, loads=self.loads[chosen], changes=changes, **arrays)
 
     @cached_property
-    def _pieces(self) -> Any:
+    def _interpolant(self) -> Any:
         """Interpolant of spectra, derivatives and changes, shape (2 + sources, L, K)."""
         from scipy.interpolate import PchipInterpolator, PPoly
 
@@ -141,10 +137,6 @@ class ProfileFamily(FrozenArrays):
         if self.values.size == 1:  # a constant
             return PPoly(stack[None], [0.0, 1.0])
         return PchipInterpolator(self.coordinates, stack, axis=0)
-
-    def _interpolated(self, t: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return spectra, derivatives and changes at coordinates (V,): (V, 2 + sources, L, K)."""
-        return np.asarray(self._pieces(t, derivative))
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
@@ -156,27 +148,26 @@ def _scaled_changes(
     indenter: Sphere,
     spectra: FloatArray,
     *,
-    load: FloatArray,
-    wavenumber: FloatArray,
-    length: FloatArray,
-    strength: FloatArray,
+    by_load: FloatArray,
+    by_wavenumber: FloatArray,
+    by_length: FloatArray,
 ) -> dict[str, FloatArray]:
     """Return the changes by one stated standard uncertainty, by the scales of the contact."""
-    # docs/contact_families.md; the keywords are derivatives by the logarithms of load, wavenumber,
-    # length and strength of the interface (of asperities alone).
-    stiffer = spectra - load
-    thicker = 3 * stiffer + wavenumber - 2 * length - strength
-    larger = -stiffer + length + strength
+    # docs/contact_families.md; given are derivatives by the logarithms of load, wavenumber and
+    # length of the interface.
+    stiffer = spectra - by_load
+    thicker = 3 * stiffer + by_wavenumber - 2 * by_length
+    larger = by_length - stiffer
     stated = {
         "young_modulus": (stiffer, film.young_modulus, film.young_modulus_uncertainty),
         "thickness": (thicker, film.thickness, film.thickness_uncertainty),
         "indenter_radius": (larger, indenter.radius, indenter.radius_uncertainty),
     }
-    return {
-        source: np.asarray(derivative * (uncertainty / value))
-        for source, (derivative, value, uncertainty) in stated.items()
-        if uncertainty is not None
-    }
+    changes = {}
+    for source, (derivative, value, uncertainty) in stated.items():
+        if uncertainty is not None:
+            changes[source] = np.asarray(derivative * (uncertainty / value))
+    return changes
 
 
 #: Neighbours of each load on the path, relative to it: their difference is its derivative.
@@ -211,40 +202,43 @@ def solve_paths(
     paths: Sequence[LoadingPath], k: FloatArray, *, workers: int
 ) -> list[dict[str, FloatArray]]:
     """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes."""
+    processes = min(workers, len(paths))
+    total = sum(len(path.loads) for path in paths)
     with ExitStack() as stack:
         solve: Any = map
-        if (several := min(workers, len(paths))) > 1:
-            solve = stack.enter_context(worker_pool(several)).map
+        if processes > 1:
+            solve = stack.enter_context(worker_pool(processes)).map
         solved = solve(_solve, paths, [k] * len(paths))
-        total = sum(len(p.loads) for p in paths)
         return list(counted(solved, "contacts", total, lambda arrays: arrays["depths"].size))
 
 
 def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
     """Return spectra (L, K) in N, derivatives by logarithms (zero where not needed), numbers."""
-    count = len(path.loads)
-    factors = np.array([1.0, *_NEIGHBOURS] if path.derivatives else [1.0])
-    visited = np.multiply.outer(factors, np.array(path.loads))
-    order = np.argsort(visited, axis=None, kind="stable")
-    solved = _contacts(path, visited.ravel()[order])
-    contacts = [solved[place] for place in np.argsort(order)]
-    nominal = contacts[:count]
-
-    def seen(some: Sequence[Contact], k: FloatArray) -> FloatArray:
-        return np.array(
-            [c.base_shear_spectrum(k) if path.order else c.base_spectrum(k) for c in some]
-        )
-
-    spectra = seen(nominal, k)
-    by_load = by_wavenumber = np.zeros_like(spectra)
+    loads = np.array(path.loads)
+    visited = [loads]
     if path.derivatives:
-        lower = seen(contacts[count:][:count], k)
-        upper = seen(contacts[2 * count :], k)
+        visited += [factor * loads for factor in _NEIGHBOURS]
+    order = np.argsort(visited, axis=None, kind="stable")
+    solved = _contacts(path, np.ravel(visited)[order])
+    contacts = [solved[place] for place in np.argsort(order)]
+
+    def spectra_of(group: int, k: FloatArray) -> FloatArray:
+        """Spectra at the loads, or at a group of their neighbours."""
+        some = contacts[group * loads.size : (group + 1) * loads.size]
+        if path.order:
+            return np.array([contact.base_shear_spectrum(k) for contact in some])
+        return np.array([contact.base_spectrum(k) for contact in some])
+
+    spectra = spectra_of(0, k)
+    by_load = np.zeros_like(spectra)
+    by_wavenumber = np.zeros_like(spectra)
+    if path.derivatives:
         # By P d/dP and not by the logarithm's own step: the force is then met exactly.
-        by_load = (upper - lower) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
-        above = seen(nominal, k * (1 + _STRETCH))
-        below = seen(nominal, k * (1 - _STRETCH))
+        by_load = (spectra_of(2, k) - spectra_of(1, k)) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
+        above = spectra_of(0, k * (1 + _STRETCH))
+        below = spectra_of(0, k * (1 - _STRETCH))
         by_wavenumber = (above - below) / (2 * _STRETCH)
+    nominal = contacts[: loads.size]
     return {
         "spectra": spectra,
         "by_load": by_load,
@@ -298,8 +292,6 @@ def _family_key(
     return table_key({"version": __version__, "revision": _REVISION, "k": digest, **numbers})
 
 
-#: Factor by which the law of an interface is made stronger to see what that changes.
-STRONGER = 1.2
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
 #: How the arrays of changes are named in a kept file.
@@ -347,17 +339,18 @@ class FamilySetup:
         loading: str,
         values: FloatArray,
         a_length: bool = False,
-        stronger: Sequence[LoadingPath] | None = None,  # interface stronger by STRONGER
         notes: tuple[str, ...] = (),
     ) -> ProfileFamily:
         """Return the family of some paths, as it was kept or calculated now."""
         k = self.wavenumbers.k
-        # Lengths scale as the film's displacements: twice the sphere's rise over its thickness.
-        scale = self.film.thickness**2 / self.indenter.radius if a_length else FRICTION_SCALE
+        scale = FRICTION_SCALE
+        if a_length:
+            # Lengths scale as the film's displacements: twice the sphere's rise over its thickness.
+            scale = self.film.thickness**2 / self.indenter.radius
         key = _family_key(paths, values, scale, k)
         arrays = find_contact_table(self.cache, key)
         if arrays is None:
-            arrays = self._calculated(paths, stronger, (values, scale) if a_length else None)
+            arrays = self._calculated(paths, (values, scale) if a_length else None)
             axes = {"value": values, "load": self.loads, "k": k}
             keep_contact_table(self.cache, key, axes | arrays)
         changes = [name for name in arrays if name.startswith(_CHANGE)]
@@ -375,49 +368,41 @@ class FamilySetup:
         )
 
     def _calculated(
-        self,
-        paths: Sequence[LoadingPath],
-        stronger: Sequence[LoadingPath] | None,
-        lengths: tuple[FloatArray, float] | None,
+        self, paths: Sequence[LoadingPath], lengths: tuple[FloatArray, float] | None
     ) -> dict[str, FloatArray]:
         """Solve the paths and derive what follows from them: the arrays that are kept."""
         film = self.film
-        sphere = self.indenter
-        ratios = None
-        if u := film.poisson_ratio_uncertainty:
-            step = max(u, _SMALLEST_STEP)
-            nu = film.poisson_ratio
-            ratios = min(nu + step, 0.5), max(nu - step, 0.0)  # one-sided if incompressible
-        # The strength of an interface counts beside a length of film or sphere alone.
-        uncertain = film.thickness_uncertainty or sphere.radius_uncertainty
-        nominal, strong, *sides = self._solved(paths, (uncertain and stronger) or paths, ratios)
+        nu = film.poisson_ratio
+        ratios = []
+        if film.poisson_ratio_uncertainty:
+            step = max(film.poisson_ratio_uncertainty, _SMALLEST_STEP)
+            ratios = [min(nu + step, 0.5), max(nu - step, 0.0)]  # one-sided if incompressible
+        nominal, *sides = self._solved(paths, ratios)
         spectra = nominal["spectra"]
+        by_length = np.zeros_like(spectra)
+        if lengths is not None:
+            by_length = _by_log_value(spectra, *lengths)
         changes = _scaled_changes(
             film,
-            sphere,
+            self.indenter,
             spectra,
-            load=nominal["by_load"],
-            wavenumber=nominal.pop("by_wavenumber"),
-            length=np.zeros_like(spectra) if lengths is None else _by_log_value(spectra, *lengths),
-            strength=(strong["spectra"] - spectra) / math.log(STRONGER),
+            by_load=nominal["by_load"],
+            by_wavenumber=nominal.pop("by_wavenumber"),
+            by_length=by_length,
         )
-        if ratios is not None:
+        if sides:
             slope = (sides[0]["spectra"] - sides[1]["spectra"]) / (ratios[0] - ratios[1])
             expected = film.expected
             changes["poisson_ratio"] = slope * (expected.poisson_ratio_uncertainty or 0.0)
-            nominal["spectra"] = spectra + slope * (expected.poisson_ratio - film.poisson_ratio)
+            nominal["spectra"] = spectra + slope * (expected.poisson_ratio - nu)
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 
     def _solved(
-        self,
-        paths: Sequence[LoadingPath],
-        stronger: Sequence[LoadingPath],
-        ratios: tuple[float, float] | None,
+        self, paths: Sequence[LoadingPath], ratios: Sequence[float]
     ) -> list[dict[str, FloatArray]]:
-        """Solve the paths, the stronger ones and those of other Poisson's ratios, each once."""
+        """Solve the paths, and those of other Poisson's ratios, each path once."""
         groups = [list(paths)]
-        groups.append([p if p in paths else replace(p, derivatives=False) for p in stronger])
-        for nu in ratios or ():
+        for nu in ratios:
             film = replace(self.film, poisson_ratio=nu)
             nominal = nu == self.film.poisson_ratio
             groups.append([replace(path, film=film, derivatives=nominal) for path in paths])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtri
 
+from memscal.friction.family import unbounded
 from memscal.friction.results import BoundedEstimate, Interval
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_bound
@@ -19,14 +20,14 @@ def profile_estimate(
     coordinates: FloatArray,
     deviance: FloatArray,
     chi_square: FloatArray,
-    value_at: Callable[[float], float],
+    scale: float,
     *,
     reason: Callable[[Interval], str],
     two_sided: bool = False,
     level: float = 0.95,
     unit: str = "",
 ) -> BoundedEstimate:
-    """Return best value and interval of -2 ln p (m,) along an increasing bounded coordinate."""
+    """Return best value and interval of -2 ln p (m,) along the bounded coordinate of a scale."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(coordinates, deviance)
@@ -43,15 +44,15 @@ def profile_estimate(
         inside = np.append(coordinates[deviance <= top], best)
         low = _crossing(spline, coordinates, float(inside.min()), -1, top)
         high = _crossing(spline, coordinates, float(inside.max()), 1, top)
-        lower = 0.0 if low is None else value_at(low)
-        return Interval(lower, None if high is None else value_at(high), level)
+        lower = 0.0 if low is None else float(unbounded(low, scale))
+        return Interval(lower, None if high is None else float(unbounded(high, scale)), level)
 
     interval = interval_of(level)
     value = None
     spread = None
     # Without an upper end there is no value, with ``two_sided`` without both; ``reason`` says why.
     if interval.two_sided or (interval.high is not None and not two_sided):
-        value = value_at(best)
+        value = float(unbounded(best, scale))
         narrow = interval_of(_ONE_SIGMA)
         if narrow.high and narrow.low > 0:
             spread = (narrow.high - narrow.low) / 2

@@ -19,6 +19,7 @@ from scipy.stats import binom
 
 import memscal
 from memscal import ElasticFilm, Interface, LawComparison
+from memscal.extensions.interface_laws.families import SLIP_LENGTHS, elasto_plastic_family
 from memscal.extensions.interface_laws.model_comparison import compare_interface
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
@@ -65,8 +66,8 @@ def rigid(film: ElasticFilm) -> ProfileFamily:
 @lru_cache
 def slipping(film: ElasticFilm) -> ProfileFamily:
     # Short lengths take the longest, and the truth of the reduced form is none.
-    lengths = calculated.SLIP_LENGTHS if FULL else (0.0, 4e-6, 1e-5, 3e-5, 1e-4, math.inf)
-    return calculated.elasto_plastic_family(
+    lengths = SLIP_LENGTHS if FULL else (0.0, 4e-6, 1e-5, 3e-5, 1e-4, math.inf)
+    return elasto_plastic_family(
         film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
     )
 

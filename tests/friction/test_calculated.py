@@ -12,13 +12,12 @@ from helpers.paper import FILM, SPHERE
 
 from memscal import ElasticFilm, ExponentialCompliance, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
-from memscal.friction.calculated import (
-    FRICTIONS,
+from memscal.extensions.interface_laws.families import (
     SLIP_LENGTHS,
-    amontons_family,
     elasto_plastic_family,
     normal_compliance_family,
 )
+from memscal.friction.calculated import FRICTIONS, amontons_family
 from memscal.friction.family import ProfileFamily
 from memscal.model.arrays import FloatArray
 
@@ -39,9 +38,9 @@ def elasto_plastic(friction: float) -> Build:
     )
 
 
-def normal(law: str) -> Build:
+def normal() -> Build:
     return lambda film, sphere, loads, values: normal_compliance_family(
-        film, sphere, loads, lengths=values, law=law, reach=REACH
+        film, sphere, loads, lengths=values, reach=REACH
     )
 
 
@@ -51,10 +50,9 @@ def normal(law: str) -> Build:
         (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
         (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
         (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
-        (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-        (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+        (normal(), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
     ],
-    ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
+    ids=["incremental", "total", "elasto-plastic", "exponential"],
 )
 def test_interpolated_profiles_are_those_of_contacts_solved_between(build, grid, between) -> None:
     family = build(FILM, SPHERE, list(LOADS), list(grid))
@@ -80,8 +78,7 @@ CASES = {
     "incremental": (amontons(), [0.2], 0.2),
     "total": (amontons("total"), [0.4], 0.4),
     "elasto-plastic": (elasto_plastic(1.6), list(SLIP_LENGTHS), 2.5e-6),
-    "exponential": (normal("exponential"), list(LENGTHS), 3.64e-6),
-    "greenwood-tripp": (normal("greenwood-tripp"), list(LENGTHS), 3.64e-6),
+    "exponential": (normal(), list(LENGTHS), 3.64e-6),
 }
 UNCERTAIN_FILM = replace(
     FILM,
@@ -237,5 +234,3 @@ def test_laws_without_meaning_are_refused() -> None:
             elasto_plastic_family(FILM, SPHERE, [0.34], friction=friction, reach=REACH)
     with pytest.raises(InputError, match="infinite"):
         normal_compliance_family(FILM, SPHERE, [0.34], lengths=[0, math.inf], reach=REACH)
-    with pytest.raises(InputError, match="law is"):
-        normal_compliance_family(FILM, SPHERE, [0.34], law="linear", reach=REACH)

@@ -20,7 +20,7 @@ def estimate(chi_square: FloatArray, last: float = np.inf) -> BoundedEstimate:
         COORDINATES,
         chi_square,
         chi_square,
-        value_at,
+        0.3,
         reason=lambda interval: friction_reason(interval, last),
     )
 

@@ -9,7 +9,7 @@ from helpers.paper import FILM, SPHERE
 from helpers.records import assert_same
 
 from memscal.friction import family as assembly
-from memscal.friction.calculated import amontons_family, normal_compliance_family
+from memscal.friction.calculated import amontons_family
 from memscal.friction.family import ProfileFamily
 from memscal.model.film import ElasticFilm
 
@@ -56,14 +56,6 @@ def test_another_request_but_not_another_name_is_calculated(tmp_path, solved, ch
     calculated(tmp_path)
     calculated(tmp_path, **changed)
     assert len(solved) == count
-
-
-def test_two_laws_of_one_length_are_two_requests(tmp_path: Path, solved: list[int]) -> None:
-    for law in ("exponential", "greenwood-tripp"):
-        normal_compliance_family(
-            FILM, SPHERE, [0.34], lengths=[2e-6], law=law, reach=REACH, cache=tmp_path
-        )
-    assert len(solved) == 2
 
 
 def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch) -> None:

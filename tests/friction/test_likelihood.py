@@ -7,6 +7,7 @@ import pytest
 from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
 from memscal.friction.effective import FrictionFit
+from memscal.friction.family import bounded, unbounded
 from memscal.friction.likelihood import Predicted, likelihood, predict
 
 CORRELATED = {"white": 0.0, "correlated": 0.6}
@@ -83,9 +84,9 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
         replace(points, u=laboratory.predicted(0.15, load).signal[0])
         for load, points in enumerate(laboratory.points)
     ]
-    at = laboratory.family.coordinate(0.15)
+    at = float(bounded(0.15, laboratory.family.scale))
     step = 2e-3
-    values = np.array([laboratory.family.value_at(at + shift) for shift in (-step, 0, step)])
+    values = unbounded([at - step, at, at + step], laboratory.family.scale)
     found = likelihood(laboratory.channel(points).at(values))
     curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
     assert found.chi_square[1] == pytest.approx(0.0, abs=1e-9)
@@ -157,7 +158,7 @@ def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> Non
     # By chi-square alone it is half a standard deviation too large: larger noise fits better.
     laboratory = Laboratory.of()
     errors = []
-    t = laboratory.family.coordinate(friction)
+    t = bounded(friction, laboratory.family.scale)
     for seed in range(100):
         along = laboratory.drawn(friction, seed).whole
         i = int(np.argmin(along.deviance))

@@ -9,6 +9,10 @@ import numpy as np
 from helpers.paper import LOADS, SPHERE
 
 from memscal import ElasticFilm
+from memscal.extensions.interface_laws.families import (
+    elasto_plastic_family,
+    normal_compliance_family,
+)
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import Channel, LoadPoints, Sensor
@@ -55,7 +59,7 @@ def amontons() -> ProfileFamily:
 def slipping() -> ProfileFamily:
     """Return contacts along the slip length; short ones, which take long, are few."""
     lengths = (0.0, 2e-6, 4e-6, 8e-6, 1.6e-5, 4e-5, 8e-5, 2e-4, math.inf)
-    return calculated.elasto_plastic_family(
+    return elasto_plastic_family(
         FILM, SPHERE, LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
     )
 
@@ -64,9 +68,7 @@ def slipping() -> ProfileFamily:
 def yielding() -> ProfileFamily:
     """Return contacts without friction along the length of a normal law."""
     lengths = (0.0, 1e-6, 2e-6, 4e-6)
-    return calculated.normal_compliance_family(
-        FILM, SPHERE, (0.69, 2.75), lengths=lengths, law="greenwood-tripp", reach=_REACH
-    )
+    return normal_compliance_family(FILM, SPHERE, (0.69, 2.75), lengths=lengths, reach=_REACH)
 
 
 def sensor(family: ProfileFamily, conversion: float = 0.012, width: float = 0.005) -> Sensor:

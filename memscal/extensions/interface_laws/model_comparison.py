@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +20,14 @@ from scipy.special import chdtrc, logsumexp
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
-from memscal.formats.cache import CacheFolder
-from memscal.friction.calculated import (
-    amontons_family,
-    contacts_of,
+from memscal.extensions.interface_laws.families import (
     family_at_loads,
     normal_compliance_family,
     slipping_family,
 )
-from memscal.friction.family import ProfileFamily
+from memscal.formats.cache import CacheFolder
+from memscal.friction.calculated import amontons_family
+from memscal.friction.family import ProfileFamily, bounded, unbounded
 from memscal.friction.interval import profile_estimate
 from memscal.friction.likelihood import Channel, likelihood, load_points, sensor_of
 from memscal.friction.marginal_likelihood import (
@@ -132,6 +132,8 @@ def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
     return tuple(factors)
 
 
+#: Stresses are calculated out to this multiple of the largest distance from the centre.
+_REACH = 1.1
 #: Chance of a misfit below which a law is not believed.
 _MISFIT = 1e-3
 
@@ -156,7 +158,14 @@ def compare_interface(
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)
     wet = [profile for profile in profiles if profile.lubrication == "lubricated"]
     dry = [profile for profile in profiles if profile.lubrication != "lubricated"]
-    contacts = contacts_of(profiles, cache, workers)
+    scan = profiles[0].scan
+    contacts: dict[str, Any] = {
+        "film": scan.film,
+        "indenter": scan.indenter,
+        "reach": _REACH * max(float(profile.r[-1]) for profile in profiles),
+        "cache": cache,
+        "workers": workers,
+    }
     tangential = normal = None
     if dry:
         if amontons is not None and tuple(amontons.values[[0, -1]]) != (0.0, math.inf):
@@ -246,23 +255,23 @@ def curve(channel: Channel, *, also: Iterable[float] = (), fine: int = _FINE) ->
     first = family.coordinates[0]
     last = family.coordinates[-1]
     # Nodes are even in the bounded coordinate, closer where it matters.
-    extra = [family.coordinate(value) for value in also]
+    extra = bounded(list(also), family.scale)
     coarse = np.unique([*np.linspace(first, last, _COARSE), *extra])
-    rough = likelihood(channel.at(family.values_at(coarse))).statistics
+    rough = likelihood(channel.at(unbounded(coarse, family.scale))).statistics
     fall = log_likelihood(rough)[0]
     near = np.flatnonzero(2 * (fall.max() - fall) < _EXCLUDED)
     low = coarse[max(near[0] - 1, 0)]
     high = coarse[min(near[-1] + 1, coarse.size - 1)]
     between = np.setdiff1d(np.linspace(low, high, fine), coarse)
-    close = likelihood(channel.at(family.values_at(between))).statistics
+    close = likelihood(channel.at(unbounded(between, family.scale))).statistics
     both = np.concatenate([coarse, between])
     order = np.argsort(both)
     pairs = zip(rough, close, strict=True)
     statistics = Statistics(*(np.concatenate(pair)[order] for pair in pairs))
     t = both[order]
     middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
-    values = family.values_at(t)
-    edges = family.values_at(middles)
+    values = unbounded(t, family.scale)
+    edges = unbounded(middles, family.scale)
     return LawCurve(values, t, edges, statistics, *log_likelihood(statistics))
 
 
@@ -344,7 +353,7 @@ def implied_friction(
     order = np.argsort(rigid.family.loads, kind="stable")
     lengths = np.array([length.interval.low, length.best, length.interval.upper])
     t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
-    values = rigid.family.values_at(t)
+    values = unbounded(t, rigid.family.scale)
     curves = _maxima(rigid, values)
     maxima = _maxima(slipping, lengths)
     implied = [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
@@ -383,7 +392,7 @@ def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> Bound
         along.coordinates,
         -2 * along.log_likelihood,
         along.chi_square,
-        family.value_at,
+        family.scale,
         reason=lambda interval: _length_reason(what, interval, float(family.values[-1])),
         two_sided=True,
         unit="m",

@@ -26,7 +26,7 @@ from memscal.extensions.interface_laws.model_comparison import (
     weigh_normal_compliance,
     weigh_slip_length,
 )
-from memscal.friction.family import ProfileFamily
+from memscal.friction.family import ProfileFamily, bounded
 from memscal.friction.likelihood import likelihood
 from memscal.friction.results import LawComparison
 
@@ -45,7 +45,7 @@ def relative_uncertainty(length: float, precision: Precision) -> float:
     family = slipping()
     points = read_without_error(family, length, precision)
     curve = likelihood(measured(points, family).at(length))
-    t = family.coordinate(length)
+    t = bounded(length, family.scale)
     return float(1 / np.sqrt(curve.information[0])) / (t * (1 - t))
 
 
@@ -122,7 +122,7 @@ def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() ->
     implied = found.implied
     length = found.length.value
     radii = [
-        float(np.interp(slipping().coordinate(length), slipping().coordinates, r))
+        float(np.interp(bounded(length, slipping().scale), slipping().coordinates, r))
         for r in slipping().contact_radii.T
     ]
     pressure = np.array(LOADS) / (np.pi * np.array(radii) ** 2)
