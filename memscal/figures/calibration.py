@@ -1,8 +1,9 @@
 """Figure of a calibration: the paper's Fig. 2, with residuals, transfer function and checks."""
 
+import math
 import textwrap
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,6 +21,7 @@ from memscal.figures.calibration_scan import (
     draw_scan_log,
     draw_scans,
     points_by_load,
+    some_points,
     standardised,
 )
 from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED, channel_indices, legend_above
@@ -28,11 +30,13 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import failed_check_messages
 from memscal.model.quantities import ESTIMATED, KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.readings.find_places import even_lattice
-from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
+from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_name
 
+_Line: TypeAlias = tuple[str, str, str]  # text, colour and weight
 _MOST_DRAWN = 5_000  # points of lines
 _FINE = 401  # points of the curves of G and its transform
 _LOG_DECADES = 4.0
+_BAND = "±2u (conservative)"
 
 
 def draw_radial(axes: Axes, data: ApparatusData) -> None:
@@ -40,11 +44,11 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     radial = data.radial_profile
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_profiles(axes, data, floor=-np.inf)
-    low, high = (radial.g + side * EXPANDED * radial.g_errors for side in (-1, 1))
+    band = EXPANDED * radial.g_errors
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     # The band may be much larger than G, which must stay legible in it.
-    top = min(_largest(high), 3 * peak)
-    bottom = -min(_largest(-low, floor=0.0), 1.5 * peak)
+    top = min(_largest(radial.g + band), 3 * peak)
+    bottom = -min(_largest(band - radial.g, floor=0.0), 1.5 * peak)
     axes.set_ylim((bottom - 0.06 * top) / PER_MM2, 1.06 * top / PER_MM2)
     legend_above(axes)
 
@@ -78,25 +82,23 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     transfer = data.transfer
     limit = transfer.resolved_wavenumber / PER_MM
     end = float(transfer.k[-1]) / PER_MM
-    end = min(end, 2.0 * limit if np.isfinite(limit) and limit > 0 else np.inf)
+    if 0 < limit < np.inf:
+        end = min(end, 2.0 * limit)
     k = np.linspace(0.0, end, _FINE)
-    samples = transfer.modulus, EXPANDED * transfer.modulus_errors, transfer.window
-    modulus, band, window = style.on_axis(transfer.k, np.stack(samples), k * PER_MM)
-    blue = COLOURS["deconvolved"]
-    low = np.maximum(modulus - band, 0.0)
-    high = modulus + band
-    axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
-    axes.plot(k, np.maximum(modulus, 0.0), "-", color=blue, label="modulus for G")
+    samples = np.stack([transfer.modulus, EXPANDED * transfer.modulus_errors, transfer.window])
+    modulus, band, window = style.on_axis(transfer.k, samples, k * PER_MM)
+    style.draw_band(axes, k, np.maximum(modulus - band, 0.0), modulus + band, _BAND)
+    axes.plot(k, np.maximum(modulus, 0.0), color=COLOURS["deconvolved"], label="modulus for G")
     gaussian = np.exp(-0.5 * (data.gaussian_sigma * k * PER_MM) ** 2)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
     axes.plot(k, window, ":", color=COLOURS["window"], label="window")
-    if np.isfinite(limit) and limit < end:
-        axes.axvspan(0.0, limit, color=COLOURS["reference"], alpha=0.10, lw=0, label="_resolved")
+    if limit < end:
+        axes.axvspan(0.0, limit, color=COLOURS["reference"], alpha=0.10, lw=0)
         hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
         hatched.set(zorder=0, label="extrapolated")
         axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
-    top = max(1.1, min(1.1 * _largest(modulus), 3.0))
-    axes.set(xlim=(0.0, end), ylim=(0.0, top))
+    axes.set_xlim(0.0, end)
+    axes.set_ylim(0.0, max(1.1, min(1.1 * _largest(modulus), 3.0)))
     axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)")
     legend_above(axes)
 
@@ -104,16 +106,13 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
 def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
     """Draw G with its band and the Gaussian, above a floor, to where they have died away."""
     radial = data.radial_profile
-    blue = COLOURS["deconvolved"]
     end = _shown_radius(radial)
     r = np.linspace(0.0, end, _FINE)
     g, band = style.on_axis(radial.r, np.stack([radial.g, EXPANDED * radial.g_errors]), r)
-    gaussian = unit_gaussian(r, data.gaussian_sigma)
-    low, high, g, gaussian = (
-        np.maximum(values, floor) / PER_MM2 for values in (g - band, g + band, g, gaussian)
-    )
-    axes.fill_between(r / MM, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
-    axes.plot(r / MM, g, "-", color=blue, label="deconvolved G")
+    profiles = np.stack([g - band, g + band, g, unit_gaussian(r, data.gaussian_sigma)])
+    low, high, g, gaussian = np.maximum(profiles, floor) / PER_MM2
+    style.draw_band(axes, r / MM, low, high, _BAND)
+    axes.plot(r / MM, g, color=COLOURS["deconvolved"], label="deconvolved G")
     axes.plot(r / MM, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian fit")
     axes.set_xlim(0.0, end / MM)
     axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
@@ -140,56 +139,63 @@ _RESIDUALS = (-3.5, 3.5)
 _DOTS = 5e3  # area of all points that lie on no lattice, in square points: half of a map's
 
 
-def draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: Loads) -> list[Axes]:
+def _draw_maps(figure: Figure, place: SubplotSpec, data: ApparatusData, loads: Loads) -> list[Axes]:
     """Draw voltage and residual of each load in a row, and G beside the first."""
-    shown = loads[:_MOST_MAPS]
-    indices = channel_indices(data)
-    unit = data.reading
-    grid = place.subgridspec(len(shown), 3)
-    panels = list[Axes]()
-    for row, (load, part) in enumerate(shown):
+    grid = place.subgridspec(len(loads), 3)
+    panels = []
+    voltage_label = f"$U_{{{channel_indices(data)}}}$ less baseline ({data.reading.unit})"
+    for row, (load, part) in enumerate(loads):
         scan = part.reconvolution
-        background = np.asarray(part.reconvolution.background)
-        # An outlier does not stretch the colours of the other voltages.
-        measured, predicted = (
-            (u - background) / unit.scale for u in (scan.u_zz, scan.u_zz_predicted)
-        )
+        background = np.asarray(scan.background)
+        voltage = (scan.u_zz - background) / data.reading.scale
+        predicted = (scan.u_zz_predicted - background) / data.reading.scale
         z, _, scale = standardised(scan)
-        for i, (values, span, colours, label) in enumerate(
-            (
-                (measured, predicted, "viridis", f"$U_{{{indices}}}$ less baseline ({unit.unit})"),
-                (z, _RESIDUALS, "RdBu_r", f"residual / {scale}"),
-            )
-        ):
-            axes = figure.add_subplot(grid[row, i], label=f"{('voltage', 'residual')[i]} map")
-            options = {"vmin": np.min(span), "vmax": np.max(span), "rasterized": True}
-            _finish(axes, _draw_points(axes, scan, values, cmap=colours, **options), label)
+        left = figure.add_subplot(grid[row, 0], label="voltage map")
+        # An outlier does not stretch the colours of the other voltages.
+        span = (predicted.min(), predicted.max())
+        _finish(left, _draw_points(left, scan, voltage, "viridis", span), voltage_label)
+        left.set_ylabel("$y$ from the centre (mm)", labelpad=8)
+        right = figure.add_subplot(grid[row, 1], label="residual map")
+        drawn = _draw_points(right, scan, z, "RdBu_r", _RESIDUALS)
+        _finish(right, drawn, f"residual / {scale}")
+        for axes in (left, right):
             axes.set_title(load, loc="left", fontsize=8.0, pad=4)
-            panels.append(axes)
-        panels[-2].set_ylabel("$y$ from the centre (mm)", labelpad=8)
-    kernel = figure.add_subplot(grid[0, 2], label="G map")
-    x, y = (np.abs(a) <= 5 * data.gaussian_sigma for a in (data.field.x, data.field.y))
-    plane = data.field.x[x] / MM, data.field.y[y] / MM, data.field.g[np.ix_(y, x)] / PER_MM2
-    drawn = kernel.pcolormesh(*plane, cmap="viridis", rasterized=True)
-    kernel.contour(*plane, [plane[2].max() / 2], colors=COLOURS["measured"], linewidths=1.0)
-    kernel.plot([], [], color=COLOURS["measured"], lw=1.0, label="half of the largest G")
-    legend_above(kernel)
-    _finish(kernel, drawn, f"$G_{{{indices}}}$ (1/mm$^2$)")
-    return [*panels[:2], kernel, *panels[2:]]
+        panels += [left, right]
+    panels.insert(2, _draw_g(figure.add_subplot(grid[0, 2], label="G map"), data))
+    return panels
 
 
-def _draw_points(axes: Axes, scan: Reconvolution, values: Any, **options: Any) -> ScalarMappable:
+def _draw_g(axes: Axes, data: ApparatusData) -> Axes:
+    field = data.field
+    reach = 5 * data.gaussian_sigma
+    x = np.abs(field.x) <= reach
+    y = np.abs(field.y) <= reach
+    g = field.g[np.ix_(y, x)] / PER_MM2
+    plane = (field.x[x] / MM, field.y[y] / MM, g)
+    drawn = axes.pcolormesh(*plane, cmap="viridis", rasterized=True)
+    axes.contour(*plane, [g.max() / 2], colors=COLOURS["measured"], linewidths=1.0)
+    axes.plot([], [], color=COLOURS["measured"], lw=1.0, label="half of the largest G")
+    legend_above(axes)
+    _finish(axes, drawn, f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
+    return axes
+
+
+def _draw_points(
+    axes: Axes, scan: Reconvolution, values: FloatArray, colours: str, span: tuple[float, float]
+) -> ScalarMappable:
     """Draw values at the points of a raster; on a lattice nodes that are missing are grey."""
+    look: dict[str, Any] = {"cmap": colours, "rasterized": True, "vmin": span[0], "vmax": span[1]}
     x = np.asarray(scan.offset_x)
     y = np.asarray(scan.offset_y)
     lattice = even_lattice(x, y, x.size)
     if lattice is None:
-        return axes.scatter(x / MM, y / MM, _DOTS / x.size, values, lw=0, **options)
+        return axes.scatter(x / MM, y / MM, _DOTS / x.size, values, lw=0, **look)
+    along, across = lattice
     nodes = [(a.start + a.step * np.arange(a.index.max() + 1)) / MM for a in lattice]
     cells = np.full((nodes[1].size, nodes[0].size), np.nan)
-    cells[lattice[1].index, lattice[0].index] = values
+    cells[across.index, along.index] = values
     axes.set_facecolor("0.75")
-    return axes.pcolormesh(*nodes, cells, **options)
+    return axes.pcolormesh(*nodes, cells, **look)
 
 
 def _finish(axes: Axes, drawn: ScalarMappable, label: str) -> None:
@@ -214,48 +220,66 @@ def calibration_figure(result: Calibrated) -> Figure:
     loads = points_by_load(data)
     lines = _text_lines(data, loads)
     count = data.reconvolution.x.size
-    if (every := -(-count // _MOST_DRAWN)) > 1 and data.reconvolution.offset_x is None:
+    every = math.ceil(count / _MOST_DRAWN)
+    raster = data.reconvolution.offset_x is not None
+    if every > 1 and not raster:
         lines.append((f"Of {count:,} points one in {every} is drawn.", COLOURS["muted"], "normal"))
-        columns: dict[str, Any] = {
-            n: None if v is None else v[::every] for n, v in vars(data.reconvolution).items()
-        }
-        data = replace(data, reconvolution=Reconvolution(**columns))
+        data = replace(
+            data, reconvolution=some_points(data.reconvolution, slice(None, None, every))
+        )
         loads = points_by_load(data)
+    mapped = loads[:_MOST_MAPS] if raster else []
     apart = min(len(loads), MOST_PANELS)
-    mapped = min(len(loads), _MOST_MAPS)
-    mapped *= data.reconvolution.offset_x is not None
+    heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(apart - 3, 0)]
+    if mapped:
+        heights.append(_MAP_HEIGHT * len(mapped))
     with style.house_style():
-        heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(apart - 3, 0)]
-        heights += [_MAP_HEIGHT * mapped] * bool(mapped)
         figure = style.new_figure(sum(heights))
         outer = figure.add_gridspec(len(heights), 2, height_ratios=heights)
         _write_lines(figure, lines)
         figure.add_subplot(outer[0, :]).set_axis_off()
-        scan_heights = [max(1.0, 3.0 / apart)] * apart
-        left = outer[1, 0].subgridspec(apart + 2, 1, height_ratios=[*scan_heights, 1.5, 3.0])
-        right = outer[1, 1].subgridspec(3, 1)
-        scan = figure.add_subplot(left[0], label="scan")
-        scans = [scan, *(figure.add_subplot(left[i], sharex=scan) for i in range(1, apart))]
-        residuals = figure.add_subplot(left[-2], sharex=scan, label="residuals")
-        scan_log = figure.add_subplot(left[-1], sharex=scan, label="scan_log")
-        radial = figure.add_subplot(right[0], label="radial")
-        radial_log = figure.add_subplot(right[1], sharex=radial, label="radial_log")
-        transfer = figure.add_subplot(right[2], label="transfer")
-        draw_scans(scans, loads)
-        draw_residuals(residuals, data, loads)
-        draw_scan_log(scan_log, data, loads)
-        draw_radial(radial, data)
-        draw_radial_log(radial_log, data)
-        draw_transfer(transfer, data)
-        for axes in (*scans, residuals, radial):
-            axes.tick_params(labelbottom=False)
-        maps = draw_maps(figure, outer[2, :], data, loads) if mapped else ()
-        style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer, *maps))
+        scan_panels = _draw_scan_panels(figure, outer[1, 0], data, loads)
+        panels = [*scan_panels, *_draw_g_panels(figure, outer[1, 1], data)]
+        if mapped:
+            panels += _draw_maps(figure, outer[2, :], data, mapped)
+        style.panel_letters(panels)
         # Passes of the layout (maps need three), then none: rendering twice gives the same picture.
         for _ in range(3 if mapped else 1):
             figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
+
+
+def _draw_scan_panels(
+    figure: Figure, place: SubplotSpec, data: ApparatusData, loads: Loads
+) -> list[Axes]:
+    """Draw scan, residuals and scan on a logarithmic axis; return a panel of each."""
+    apart = min(len(loads), MOST_PANELS)
+    heights = [max(1.0, 3.0 / apart)] * apart
+    grid = place.subgridspec(apart + 2, 1, height_ratios=[*heights, 1.5, 3.0])
+    scan = figure.add_subplot(grid[0], label="scan")
+    scans = [scan, *(figure.add_subplot(grid[i], sharex=scan) for i in range(1, apart))]
+    residuals = figure.add_subplot(grid[-2], sharex=scan, label="residuals")
+    scan_log = figure.add_subplot(grid[-1], sharex=scan, label="scan_log")
+    draw_scans(scans, loads)
+    draw_residuals(residuals, data, loads)
+    draw_scan_log(scan_log, data, loads)
+    for axes in (*scans, residuals):
+        axes.tick_params(labelbottom=False)
+    return [scan, residuals, scan_log]
+
+
+def _draw_g_panels(figure: Figure, place: SubplotSpec, data: ApparatusData) -> list[Axes]:
+    """Draw G, G on a logarithmic axis, and the transfer function."""
+    grid = place.subgridspec(3, 1)
+    radial = figure.add_subplot(grid[0], label="radial")
+    radial_log = figure.add_subplot(grid[1], sharex=radial, label="radial_log")
+    transfer = figure.add_subplot(grid[2], label="transfer")
+    draw_radial(radial, data)
+    radial.tick_params(labelbottom=False)
+    draw_radial_log(radial_log, data)
+    draw_transfer(transfer, data)
+    return [radial, radial_log, transfer]
 
 
 def values_text(data: ApparatusData) -> str:
@@ -270,44 +294,49 @@ def values_text(data: ApparatusData) -> str:
     return f"{',  '.join(values)};  ±, bars and bands: U = 2u (k = 2)"
 
 
-def _text_lines(data: ApparatusData, loads: Loads) -> list[tuple[str, str, str]]:
+def _text_lines(data: ApparatusData, loads: Loads) -> list[_Line]:
     """Return the lines above the panels, with the colour and the weight of each."""
     ink = COLOURS["measured"]
     # A long name is cut, not the channel behind it.
-    name, _, channel = sensor_title(data).rpartition(", channel ")
-    name = textwrap.shorten(name, 82, placeholder=" …")
-    title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
-    film = data.film
-    rod = data.indenter
-    load = f", {data.load:.3g} N; " if data.load else "; "
-    if len(loads) > 1:
-        load = f", {loads[0][0]} to {loads[-1][0]}; "
-    setting = f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}" if rod else ""
-    if film is not None:
-        setting += f"film {film.thickness / MM:.3g} mm, "
-        setting += f"E = {film.young_modulus / KPA / 1e3:.3g} MPa, ν = {film.poisson_ratio:.3g}"
-        setting += f", {film.law_text}" if film.law else ""
-    setting = setting.removesuffix("; ")
-    rows = [(title, ink, "bold"), (setting, COLOURS["muted"], "normal")]
-    rows.append((values_text(data), ink, "normal"))
+    name = textwrap.shorten(f"Apparatus function of {sensor_name(data)}", 82, placeholder=" …")
+    title = textwrap.shorten(f"{name}, channel {data.sensor.channel}", 95, placeholder=" …")
+    lines = _wrapped(title, ink, "bold")
+    lines += _wrapped(_setting(data, loads), COLOURS["muted"])
+    lines += _wrapped(values_text(data), ink)
     if data.checks and data.passed:
-        rows.append((f"All {len(data.checks)} quality checks passed.", ink, "normal"))
-    failed = [
-        (line, COLOURS["failed"], "normal")
-        for message in failed_check_messages(data.checks)
-        for line in _wrapped(message.text)
-    ]
+        lines += _wrapped(f"All {len(data.checks)} quality checks passed.", ink)
+    failed: list[_Line] = []
+    for message in failed_check_messages(data.checks):
+        failed += _wrapped(message.text, COLOURS["failed"])
     if len(failed) > _MAX_FAILED_LINES:
         ending = "… and more failed checks, which the artifact names."
-        failed = [*failed[: _MAX_FAILED_LINES - 1], (ending, COLOURS["failed"], "normal")]
-    return [(line, ink, weight) for row, ink, weight in rows for line in _wrapped(row)] + failed
+        failed[_MAX_FAILED_LINES - 1 :] = _wrapped(ending, COLOURS["failed"])
+    return lines + failed
 
 
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, _LINE_WIDTH) or [""]
+def _setting(data: ApparatusData, loads: Loads) -> str:
+    """Return in one line what pressed on what film."""
+    film = data.film
+    rod = data.indenter
+    parts = []
+    if rod is not None:
+        load = f", {data.load:.3g} N" if data.load else ""
+        if len(loads) > 1:
+            load = f", {loads[0][0]} to {loads[-1][0]}"
+        parts.append(f"{rod.shape} of radius {rod.radius / MM:.3g} mm{load}")
+    if film is not None:
+        modulus = f"E = {film.young_modulus / KPA / 1e3:.3g} MPa"
+        law = f", {film.law_text}" if film.law else ""
+        elasticity = f"{modulus}, ν = {film.poisson_ratio:.3g}{law}"
+        parts.append(f"film {film.thickness / MM:.3g} mm, {elasticity}")
+    return "; ".join(parts)
 
 
-def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
+def _wrapped(text: str, colour: str, weight: str = "normal") -> list[_Line]:
+    return [(line, colour, weight) for line in textwrap.wrap(text, _LINE_WIDTH) or [""]]
+
+
+def _write_lines(figure: Figure, lines: list[_Line]) -> None:
     height = figure.get_figheight()
     for i, (line, colour, weight) in enumerate(lines):
         y = 1.0 - (0.08 + _LINE_HEIGHT * i) / height

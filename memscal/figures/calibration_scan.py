@@ -1,9 +1,9 @@
 """Panels of a calibration's scan: voltages with both reconvolutions, and residuals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle, pairwise
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,104 +25,121 @@ MOST_PANELS = 6
 """Loads that are drawn in panels of their own and named."""
 
 
-def draw_scan(axes: Axes, data: ApparatusData, look: _Look) -> None:
-    """Draw the scan on a linear axis; the right-hand axis reads U/A in kPa."""
+def _draw_scan(axes: Axes, data: ApparatusData, look: _Look) -> Any:
+    """Draw the scan, and on the right-hand axis U/A in kPa; return the drawn points."""
     scan = data.reconvolution
-    _draw_measured(axes, data, scan.u_zz, look, "scan, ±2u")
+    label = "scan" if scan.x.size > style.SCATTER_THRESHOLD else "scan, ±2u"
+    points = _draw_measured(axes, data, scan.u_zz, look, label)
     _draw_predictions(axes, data)
     _draw_reference(axes, data)
     _draw_indenter(axes, data)
-    limit_to_scan(axes, scan.x)
+    _limit_to_scan(axes, scan.x)
     word = "voltage" if data.reading.si == "V" else "reading"
     axes.set_ylabel(f"{word} $U_{{{channel_indices(data)}}}$ ({data.reading.unit})")
     _stress_axis(axes, data, baseline=_baseline(data))
+    return points
 
 
 def draw_scans(panels: Sequence[Axes], loads: Loads) -> None:
     """Draw the scan; of several loads each in a panel of its own, with one label in the middle."""
     looks = _looks(loads, COLOURS["measured"])
-    for i, (axes, (load, part), look) in enumerate(zip(panels, loads, looks, strict=False)):
-        if i == MOST_PANELS - 1 < len(loads) - 1:
+    drawn = []
+    for axes, (load, part), look in zip(panels, loads, looks, strict=False):
+        drawn.append(_draw_scan(axes, part, look))
+        if len(drawn) == MOST_PANELS < len(loads):
             load += f"\nand {len(loads) - MOST_PANELS} more loads"
-        draw_scan(axes, part, look)
         words = axes.text(0.98, 0.92, load, ha="right", va="top", transform=axes.transAxes)
         words.set_color(look[0])
-        for labelled in (axes, *axes.child_axes) if len(panels) > 1 else ():
+    if len(panels) > 1:
+        _share_labels(panels)
+    legend_above(panels[0], points=loads[0][1].reconvolution.x.size, first=drawn[0])
+
+
+def _share_labels(panels: Sequence[Axes]) -> None:
+    """Show the labels of the vertical axes once, in the middle of the panels."""
+    middle = len(panels) // 2
+    for i, axes in enumerate(panels):
+        for labelled in (axes, *axes.child_axes):
             label = labelled.yaxis.label
-            label.set(visible=i == len(panels) // 2, y=0.5 if len(panels) % 2 else 1.0)
+            label.set(visible=i == middle, y=0.5 if len(panels) % 2 else 1.0)
             labelled.set_in_layout(labelled is axes)
             labelled.yaxis.labelpad = 10  # clear of the longer numbers of other panels
-    legend_above(panels[0], points=loads[0][1].reconvolution.x.size)
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     """Draw the scan less its baseline, logarithmic, each load in its colour."""
     axes.set_yscale("log")
-    looks = _looks(loads, COLOURS["measured"])
-    ranges = [
-        _draw_net(axes, part, look, "_" * (i >= MOST_PANELS or not load) + load)
-        for i, ((load, part), look) in enumerate(zip(loads, looks, strict=True))
-    ]
-    low = np.nanmin([r[0] for r in ranges])
-    high = np.nanmax([r[1] for r in ranges])
-    if np.isfinite([low, high]).all():
-        axes.set_ylim(0.5 * low / data.reading.scale, 2.0 * high / data.reading.scale)
+    named = []
+    limits = []
+    heights = []
+    for (load, part), look in zip(loads, _looks(loads, COLOURS["measured"]), strict=True):
+        signal, limit = _signal_and_limit(part)
+        heights += [signal, limit]
+        points = _draw_measured(axes, part, signal, look, load or "_points")
+        if load and len(named) < MOST_PANELS:
+            named.append(points)
+        if np.any(np.isfinite(limit)):
+            limits.append(_draw_limits(axes, part, limit))
+        _draw_predictions(axes, part, net=True)
+        heights.append(_draw_reference(axes, part, net=True))
+    shown = np.concatenate(heights)
+    shown = shown[np.isfinite(shown)] / data.reading.scale
+    if shown.size:
+        axes.set_ylim(0.5 * shown.min(), 2.0 * shown.max())
     _draw_indenter(axes, data)
-    limit_to_scan(axes, data.reconvolution.x)
+    _limit_to_scan(axes, data.reconvolution.x)
+    _label_log(axes, data)
+    _stress_axis(axes, data, baseline=0.0)
+    handles = [*limits[:1], *named]  # the lines are those of the panel above
+    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1), borderpad=0.2, ncols=2)
+
+
+def _label_log(axes: Axes, data: ApparatusData) -> None:
     along = "y" if data.process.configuration.get("direction") == "y" else "x"
     aligned = ", repeats moved to one centre" if _aligned(data) else ""
     axes.set_xlabel(ALONG_RADIUS if _by_distance(data) else f"position ${along}$ (mm){aligned}")
     bar = "|" if _tangential(data) else ""
     unit = data.reading.unit
     axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} ({unit})")
-    _stress_axis(axes, data, baseline=0.0)
-    named = [_LIMIT, *(load for load, _ in loads)]  # the lines are those of the panel above
-    entries = zip(*axes.get_legend_handles_labels(), strict=True)
-    handles = [handle for handle, name in entries if name in named]
-    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1), borderpad=0.2, ncols=2)
 
 
-_LIMIT = "less than 2u: upper limit, U + 2u"
-
-
-def _draw_net(axes: Axes, data: ApparatusData, look: _Look, label: str) -> tuple[float, float]:
-    """Draw points less baseline, of those below 2u the upper limit; return what is to be shown."""
+def _signal_and_limit(data: ApparatusData) -> tuple[FloatArray, FloatArray]:
+    """Return voltages less baseline, and of those below 2u the upper limit; else NaN, each."""
     scan = data.reconvolution
     signal = _turned(data, scan.x) * (scan.u_zz - _background(data, scan.x))
     errors = EXPANDED * _finite_errors(scan.u_zz_errors)
+    limit = np.maximum(signal, 0.0) + errors
     clear = (signal > errors) & (signal > 0)
-    limit = np.where(clear, np.nan, np.maximum(signal, 0.0) + errors)
-    limit[~(limit > 0)] = np.nan
-    _draw_measured(axes, data, np.where(clear, signal, np.nan), look, label)
-    if np.any(np.isfinite(limit)):
-        (limits,) = axes.plot(scan.x / MM, limit / data.reading.scale, "v", mfc="none", mew=0.7)
-        limits.set(color=COLOURS["muted"], markersize=0.8 * style.marker_size(scan.x.size))
-        drawn = axes.get_legend_handles_labels()[1]
-        limits.set_label("_" * (_LIMIT in drawn) + _LIMIT)
-        limits.set_rasterized(scan.x.size > style.SCATTER_THRESHOLD)
-    _draw_predictions(axes, data, net=True)
-    peak = _draw_reference(axes, data, net=True)
-    heights = np.concatenate([signal[clear], limit[np.isfinite(limit)], [np.nan]])
-    return np.fmin.reduce(heights), max(np.fmax.reduce(heights), peak)
+    limited = ~clear & (limit > 0)
+    return np.where(clear, signal, np.nan), np.where(limited, limit, np.nan)
 
 
-def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, label: str) -> None:
-    """Draw voltages (V) at the scan's points, with their expanded uncertainties."""
+def _draw_limits(axes: Axes, data: ApparatusData, limit: FloatArray) -> Any:
+    """Draw the upper limits of voltages that are less than 2u; return what is drawn."""
     x = data.reconvolution.x
-    scale = data.reading.scale
-    (colour, marker) = look
-    size = style.marker_size(x.size)
+    (limits,) = axes.plot(x / MM, limit / data.reading.scale, "v", mfc="none", mew=0.7)
+    limits.set(color=COLOURS["muted"], markersize=0.8 * style.marker_size(x.size))
+    limits.set_label("less than 2u: upper limit, U + 2u")
+    limits.set_rasterized(x.size > style.SCATTER_THRESHOLD)
+    return limits
+
+
+def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, label: str) -> Any:
+    """Draw voltages (V) at the scan's points, with their expanded uncertainties; return them."""
+    scan = data.reconvolution
+    x = scan.x / MM
+    u = u / data.reading.scale
+    colour, marker = look
     if x.size > style.SCATTER_THRESHOLD:
-        (points,) = axes.plot(x / MM, u / scale, ".", color=colour, ms=1.5, mew=0)
-        points.set(rasterized=True, label=label.removesuffix(", ±2u"))
-        return
-    errors = EXPANDED * _finite_errors(data.reconvolution.u_zz_errors)
-    axes.errorbar(
-        x / MM,
-        u / scale,
-        errors / scale,
+        (points,) = axes.plot(x, u, ".", color=colour, ms=1.5, mew=0, label=label)
+        points.set_rasterized(True)
+        return points
+    return axes.errorbar(
+        x,
+        u,
+        EXPANDED * _finite_errors(scan.u_zz_errors) / data.reading.scale,
         fmt=marker,
-        ms=size,
+        ms=style.marker_size(x.size),
         mfc="white",
         mew=0.7,
         color=colour,
@@ -143,34 +160,31 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
     """Draw both reconvolutions; ``net``: less baseline and drift, and only where positive."""
     scan = data.reconvolution
     background = _background(data, scan.x) if net else np.zeros(scan.x.shape)
-    for u, name, label, dashes in (
-        (scan.u_zz_predicted, "deconvolved", "reconvolved, G", "-"),
-        (scan.u_zz_gaussian, "gaussian", "reconvolved, Gaussian", "--"),
+    gaps = np.diff(np.unique(scan.x))
+    # Moved to one centre, repeats stand beside each other; a single pass does not.
+    interleaved = _aligned(data) and np.min(gaps) < 0.3 * np.median(gaps)
+    mixed = scan.offset_x is not None or _joint(data) or interleaved
+    for u, colour, label, dashes, marker in (
+        (scan.u_zz_predicted, "deconvolved", "reconvolved, G", "-", "o"),
+        (scan.u_zz_gaussian, "gaussian", "reconvolved, Gaussian", "--", "x"),
     ):
         x, curve = _as_curve(scan.x, u - background)
         if net:
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
-        single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
-        gaps = np.diff(np.sort(x))
-        # Moved to one centre, repeats stand beside each other; a single pass does not.
-        mixed = _joint(data) or (_aligned(data) and np.min(gaps) < 0.3 * np.median(gaps))
-        line_like = single_valued and scan.offset_x is None and not mixed
         (line,) = axes.plot(x / MM, curve / data.reading.scale, dashes, label=label, zorder=3)
-        line.set_color(COLOURS[name])
-        if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
-            line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
-            line.set(markersize=1.2 if x.size > style.SCATTER_THRESHOLD else 2.5, rasterized=True)
+        line.set_color(COLOURS[colour])
+        if mixed or np.any(np.diff(x) <= 0):  # many voltages near one x, which no line joins
+            line.set(linestyle="none", marker=marker, rasterized=True)
+            line.set_markersize(1.2 if x.size > style.SCATTER_THRESHOLD else 2.5)
 
 
 def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return positions in order with one value for each, where repeats agree; else as given."""
     places, inverse = np.unique(x, return_inverse=True)
-    if places.size == x.size:
-        order = np.argsort(x, kind="stable")
-        return x[order], u[order]
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)
-    return (places, mean) if np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u) else (x, u)
+    agree = np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
+    return (places, mean) if agree else (x, u)
 
 
 def _joint(data: ApparatusData) -> bool:
@@ -183,18 +197,18 @@ def _aligned(data: ApparatusData) -> bool:
     return any(message.kind == REPEAT_CENTRES for message in data.process.messages)
 
 
-def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> float:
+def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> FloatArray:
     """Draw baseline + A sigma_zz about the centre (``net``: only the latter); return its peak."""
     reference = data.reference
     constant = data.conversion_constant
     stress = _seen_stress(data)
-    if not (np.isfinite(constant) and constant > 0) or stress is None:
-        return 0.0
     curved = data.film is not None and data.film.law not in ("", LINEAR)
-    if curved and data.load and loads_differ((data.load, reference.load)):
-        return 0.0  # the stress at another load has another shape
+    # Of a curved law the stress at another load has another shape.
+    other = curved and data.load and loads_differ((data.load, reference.load))
+    if stress is None or other or not 0 < constant < np.inf:
+        return np.array([])
     voltage = constant * stress
-    peak = float(np.max(voltage))
+    peak = voltage.max(keepdims=True)
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
@@ -202,9 +216,9 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> fl
     if not net:
         curve = _turned(data, x) * curve + _background(data, x)
     (line,) = axes.plot(x / MM, curve / data.reading.scale, "-.", lw=1.0, zorder=1.5)
-    line.set(color=COLOURS["reference"])
+    line.set_color(COLOURS["reference"])
     line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
-    return peak
+    return np.asarray(peak)
 
 
 def _tangential(data: ApparatusData) -> bool:
@@ -229,9 +243,11 @@ def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     """Draw the rod's diameter (or the sphere's contact) as the paper's black patch."""
-    rod = isinstance(data.indenter, Rod)
+    form = "contact"
     radius = data.reference.contact_radius
-    form, radius = ("rod", data.indenter.radius) if rod and data.indenter else ("contact", radius)
+    if isinstance(data.indenter, Rod):
+        form = "rod"
+        radius = data.indenter.radius
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
@@ -242,26 +258,26 @@ def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
 
 def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
     """Add the right-hand axis (U - baseline)/A in kPa; without a positive A there is none."""
-    if not (np.isfinite(constant := data.conversion_constant) and constant > 0):
+    constant = data.conversion_constant
+    if not 0 < constant < np.inf:
         return
     unit = data.reading
-    shown = {"Pa": "kPa"}.get(data.reading.per, data.reading.per)
-    per_mv = unit.scale / constant / (KPA if shown == "kPa" else 1.0)
+    pascals = unit.per == "Pa"
+    per_unit = unit.scale / constant / (KPA if pascals else 1.0)
     offset = baseline / unit.scale
-    both_ways = (lambda u: (u - offset) * per_mv, lambda stress: stress / per_mv + offset)
+    both_ways = (lambda u: (u - offset) * per_unit, lambda stress: stress / per_unit + offset)
     right = axes.secondary_yaxis("right", functions=both_ways)
-    if unit.per == "Pa":
-        blurred, stress = (f"${s}_{{{channel_indices(data)}}}$" for s in ("S", r"\sigma"))
-        right.set_ylabel(f"blurred stress {blurred}, {stress} ({shown})")
-    else:
-        right.set_ylabel(f"$U/A$ ({shown})")
+    indices = channel_indices(data)
+    label = rf"blurred stress $S_{{{indices}}}$, $\sigma_{{{indices}}}$ (kPa)"
+    right.set_ylabel(label if pascals else f"$U/A$ ({unit.per})")
 
 
 def _centre(data: ApparatusData) -> float:
     """Return where the indenter's axis stands on the axis that is drawn, in m."""
     if _by_distance(data):
         return 0.0
-    return next((data.parameters[n] for n in ("centre", "centre_y") if n in data.parameters), 0.0)
+    named = [name for name in ("centre", "centre_y") if name in data.parameters]
+    return data.parameters[named[0]] if named else 0.0
 
 
 def _by_distance(data: ApparatusData) -> bool:
@@ -297,46 +313,47 @@ def _finite_errors(errors: FloatArray) -> FloatArray:
     return np.where(np.isfinite(errors), errors, 0.0)
 
 
-def limit_to_scan(axes: Axes, x: FloatArray) -> None:
+def _limit_to_scan(axes: Axes, x: FloatArray) -> None:
     """Show the positions (m) of the scan, whatever the reference reaches."""
-    low = float(np.min(x))
-    high = float(np.max(x))
-    margin = 0.03 * (high - low) or MM
-    axes.set_xlim((low - margin) / MM, (high + margin) / MM)
+    margin = 0.03 * float(np.ptp(x)) or MM
+    axes.set_xlim((np.min(x) - margin) / MM, (np.max(x) + margin) / MM)
 
 
 def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     """Draw residuals over each point's standard uncertainty; those beyond the axis at its edge."""
     scan = data.reconvolution
     with_g, with_gaussian, scale = standardised(scan)
-    series = [("Gaussian", scan.x, with_gaussian, COLOURS["gaussian"], "s", "none")]
-    looks = _looks(loads, COLOURS["deconvolved"])
-    for i, ((load, part), (colour, marker)) in enumerate(zip(loads, looks, strict=True)):
-        name = "_" * (i >= MOST_PANELS) + (load or "G")
-        place = part.reconvolution.x
-        z = standardised(part.reconvolution)[0]
-        series.append((name, place, z, colour, marker, colour))
     # One outlier cannot stretch the axis.
     sizes = np.abs([with_g, with_gaussian])
     limit = float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
-    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0, label="_±2")
-    axes.axhline(0.0, color="0.4", lw=0.6)
+    style.draw_residual_band(axes)
     many = scan.x.size > style.SCATTER_THRESHOLD
-    size = 1.2 if many else style.marker_size(scan.x.size)
-    for name, x, z, colour, marker, face in series:
-        (points,) = axes.plot(x / MM, z, ls="none", marker=marker, ms=size)
-        rms = np.sqrt(np.mean(z**2))
-        points.set(color=colour, markerfacecolor=face, label=f"{name}: rms {rms:.2f}")
-        points.set(rasterized=many, markeredgewidth=0.3 if many else 0.7)
-        for side, mark in ((1, "^"), (-1, "v")):
-            beyond = side * z > limit
-            if np.any(beyond):
-                edge = np.full(int(np.sum(beyond)), 0.93 * side * limit)
-                axes.plot(x[beyond] / MM, edge, mark, color=colour, ms=4, label="_beyond the axis")
+    common = {"ls": "none", "ms": 1.2 if many else style.marker_size(scan.x.size)}
+    common |= {"mew": 0.3 if many else 0.7, "rasterized": many}
+    gaussian = common | {"color": COLOURS["gaussian"], "marker": "s", "mfc": "none"}
+    _draw_residual_points(axes, scan.x, with_gaussian, "Gaussian", limit, gaussian)
+    looks = _looks(loads, COLOURS["deconvolved"])
+    for i, ((load, part), (colour, marker)) in enumerate(zip(loads, looks, strict=True)):
+        name = "_" * (i >= MOST_PANELS) + (load or "G")
+        z, *_ = standardised(part.reconvolution)
+        look = common | {"color": colour, "marker": marker, "mfc": colour}
+        _draw_residual_points(axes, part.reconvolution.x, z, name, limit, look)
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
-    limit_to_scan(axes, scan.x)
+    _limit_to_scan(axes, scan.x)
     legend_above(axes, points=scan.x.size)
+
+
+def _draw_residual_points(
+    axes: Axes, x: FloatArray, z: FloatArray, name: str, limit: float, look: Mapping[str, Any]
+) -> None:
+    rms = np.sqrt(np.mean(z**2))
+    axes.plot(x / MM, z, label=f"{name}: rms {rms:.2f}", **look)
+    for side, edge_marker in ((1, "^"), (-1, "v")):
+        beyond = x[side * z > limit] / MM
+        if beyond.size:
+            edge = np.full(beyond.size, 0.93 * side * limit)
+            axes.plot(beyond, edge, edge_marker, color=look["color"], ms=4)
 
 
 def standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
@@ -354,7 +371,6 @@ def standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
 def points_by_load(data: ApparatusData) -> Loads:
     """Return the points of each load apart, from the smallest up; of a single one without text."""
     scan = data.reconvolution
-    parts = []
     if scan.load is None:
         return [("", data)]
     loads, inverse = np.unique(scan.load, return_inverse=True)
@@ -363,9 +379,15 @@ def points_by_load(data: ApparatusData) -> Loads:
     counts = np.bincount(group)
     if counts.size == 1 or counts.min() < MINIMUM_POSITIONS:
         return [("", data)]
-    for inside in group == np.arange(counts.size)[:, None]:
-        columns = {name: v[inside] for name, v in vars(scan).items() if v is not None}
-        load = float(scan.load[inside].mean())
-        part = replace(data, load=load, reconvolution=Reconvolution(**columns))
-        parts.append((f"{load:.3g} N", part))
+    parts = []
+    for i in range(counts.size):
+        points = some_points(scan, group == i)
+        load = float(scan.load[group == i].mean())
+        parts.append((f"{load:.3g} N", replace(data, load=load, reconvolution=points)))
     return parts
+
+
+def some_points(scan: Reconvolution, chosen: Any) -> Reconvolution:
+    """Return some points of a scan, by a mask or a slice."""
+    columns = {name: values[chosen] for name, values in vars(scan).items() if values is not None}
+    return replace(scan, **columns)

@@ -10,6 +10,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -121,14 +122,13 @@ def panel_letters(panels: Iterable[Axes]) -> None:
         label.set(fontweight="bold", fontsize=10, horizontalalignment="right")
 
 
-def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
-    """Put the legend above the frame, where it cannot lie over data; the scan comes first."""
-    entries = sorted(
-        zip(*axes.get_legend_handles_labels(), strict=True),
-        key=lambda entry: not entry[1].startswith("scan"),
-    )
+def legend_above(
+    axes: Axes, *, columns: int = 2, points: int = 0, first: Artist | None = None
+) -> None:
+    """Put the legend above the frame, where it cannot lie over data, in order after ``first``."""
+    handles, _ = axes.get_legend_handles_labels()
     axes.legend(
-        *zip(*entries, strict=True),
+        handles=sorted(handles, key=lambda handle: handle is not first),
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
         ncols=columns,
@@ -153,13 +153,11 @@ def load_looks(loads: Iterable[float]) -> dict[float, tuple[str, str]]:
             groups[-1].append(load)
         else:
             groups.append([load])
-    colours = shades(len(groups), 0.2)
-    names = [f"{np.mean(group):.3g} N" for group in groups]
-    return {
-        load: (colour, name)
-        for group, colour, name in zip(groups, colours, names, strict=True)
-        for load in group
-    }
+    looks = {}
+    for group, colour in zip(groups, shades(len(groups), 0.2), strict=True):
+        name = f"{np.mean(group):.3g} N"
+        looks |= dict.fromkeys(group, (colour, name))
+    return looks
 
 
 def mark(lubrication: str, colour: str) -> dict[str, Any]:
@@ -179,6 +177,29 @@ def draw_measured(
     if many:
         look |= {"marker": ".", "mfc": look["color"], "ms": 1.5, "mew": 0, "zorder": 1}
     axes.plot(x, y, rasterized=many, **look)
+
+
+def draw_band(
+    axes: Axes,
+    x: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    label: str | None = None,
+    colour: str = COLOURS["deconvolved"],
+) -> None:
+    """Draw the band of a curve's expanded uncertainty."""
+    axes.fill_between(x, low, high, color=colour, alpha=0.25, lw=0, label=label)
+
+
+def draw_residual_band(axes: Axes) -> None:
+    """Draw where residuals over their standard uncertainty are expected."""
+    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
+    axes.axhline(0.0, color="0.4", lw=0.6)
+
+
+def draw_zero(axes: Axes) -> None:
+    """Draw the line of no stress, behind all data."""
+    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
 
 
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:

@@ -194,9 +194,13 @@ def _parameter_rows(parameters: ParameterSet) -> list[tuple[str, str, str]]:
 
 def sensor_title(apparatus: ApparatusData) -> str:
     """Return the title of everything that shows an apparatus function."""
+    return f"Apparatus function of {sensor_name(apparatus)}, channel {apparatus.sensor.channel}"
+
+
+def sensor_name(apparatus: ApparatusData) -> str:
+    """Return what a sensor is called: its name and model."""
     sensor = apparatus.sensor
-    name = " ".join(word for word in (sensor.name, sensor.model) if word) or "the sensor"
-    return f"Apparatus function of {name}, channel {sensor.channel}"
+    return " ".join(word for word in (sensor.name, sensor.model) if word) or "the sensor"
 
 
 def apparatus_of(result: Calibrated) -> ApparatusData:
