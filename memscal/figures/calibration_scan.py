@@ -69,7 +69,7 @@ def _share_labels(panels: Sequence[Axes]) -> None:
 def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     """Draw the scan less its baseline, logarithmic, each load in its colour."""
     axes.set_yscale("log")
-    named = []
+    named: list[Any] = []
     limits = []
     heights = []
     for (load, part), look in zip(loads, _looks(loads, COLOURS["measured"]), strict=True):

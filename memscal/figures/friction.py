@@ -11,14 +11,22 @@ from matplotlib.figure import Figure
 
 from memscal.errors import InputError
 from memscal.figures import friction_profiles as profiles
-from memscal.figures.friction_profiles import friction_name, friction_position, lubricated_words
+from memscal.figures.friction_profiles import (
+    comparison_looks,
+    friction_axis,
+    friction_colour,
+    friction_name,
+    friction_position,
+    joint_estimate,
+    lubricated_words,
+)
 from memscal.figures.style import (
     ALONG_RADIUS,
     COLOURS,
     COVERAGE_NOTE,
     EXPANDED,
+    draw_band,
     legend_above,
-    load_looks,
     mark,
     panels_of,
 )
@@ -46,10 +54,12 @@ _BOTH_NOTE = f"{COVERAGE_NOTE} Intervals of friction coefficients: {_INTERVALS}.
 
 def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
     """Draw laws of the interface, of a comparison with friction or of the laws alone."""
-    laws = comparison if isinstance(comparison, InterfaceComparison) else comparison.interface
-    loads: Sequence[LoadComparison] = ()
     if isinstance(comparison, FrictionComparison):
+        laws = comparison.interface
         loads = comparison.loads[comparison.loadings[0]]
+    else:
+        laws = comparison
+        loads = ()
     if laws is None:
         cure = "Compare with interface=True and a macroscopic friction coefficient."
         raise InputError("There is no law of the interface to draw.", cure=cure)
@@ -70,7 +80,7 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
         place = bounded(compared.length.values, _MIDDLE)
         label = f"{direction}, {lubricated_words(compared.lubrication)}"
         axes.plot(place, _rise(compared.length), color=COLOURS[_COLOURS[direction]], label=label)
-    draw_levels(axes)
+    _draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(list(bounded(np.array(_TICKS) * _UM, _MIDDLE)), names)
     axes.set(xlim=(-0.02, 1.02), xlabel="length (µm)", ylabel=_RISE)
@@ -86,7 +96,7 @@ def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison
         for law in compared.laws:
             below = law.log_evidence - best
             axes.plot([below, 0.0], [height, height], color="0.8", lw=0.8, zorder=1)
-            axes.plot([below], [height], "o", color=COLOURS[_COLOURS[direction]], ms=5)
+            axes.plot(below, height, "o", color=COLOURS[_COLOURS[direction]], ms=5)
             names.append(textwrap.fill(law.name, 22))
             height += 1
     axes.yaxis.set_ticks(list(range(height)), names)
@@ -97,17 +107,16 @@ def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison
 
 def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:
     low, best, high = friction_position(np.sort(implied.friction, axis=1)).T
-    blue = COLOURS["deconvolved"]
-    axes.fill_between(implied.loads, low, high, color=blue, alpha=0.25, lw=0)
-    axes.plot(implied.loads, best, color=blue, label="what the slip length means")
+    draw_band(axes, implied.loads, low, high)
+    axes.plot(implied.loads, best, color=COLOURS["deconvolved"], label="what the slip length means")
+    black = COLOURS["measured"]
     for i, at_load in enumerate(measured):
         reading = at_load.by_profile
-        black = COLOURS["measured"]
         label = "found at each load" if i == 0 else "_found"
         axes.plot([at_load.load] * 2, _ends(reading), color=black, lw=1.0, label=label)
         if reading.value is not None:
-            axes.plot([at_load.load], friction_position([reading.value]), "o", color=black, ms=4)
-    profiles.friction_axis(axes, "y")
+            axes.plot(at_load.load, friction_position(reading.value), "o", color=black, ms=4)
+    friction_axis(axes, "y")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
     legend_above(axes, columns=1)
@@ -131,28 +140,29 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
 
 
 def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> None:
-    by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
+    compared = comparison.loads[loading]
+    by_load = {at_load.load: at_load.p_max / at_load.p0_max for at_load in compared}
     loads = sorted(by_load)
     curves = np.array([by_load[load] for load in loads])
+    shown = np.isin(comparison.friction, _SHOWN)
+    shown[[0, -1]] = True
     drawn = {}
-    ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
-    for mu in sorted({float(mu) for mu in comparison.friction if mu in _SHOWN}.union(ends_of_all)):
-        curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
-        (line,) = axes.plot(loads, curve, color=profiles.friction_colours(mu)[0], lw=0.9)
+    for i in np.flatnonzero(shown):
+        mu = float(comparison.friction[i])
+        drawn[mu] = curves[:, i]
+        (line,) = axes.plot(loads, drawn[mu], color=friction_colour(mu), lw=0.9)
         line.set_gid(f"mu={mu:g}")
-        drawn[mu] = curve
-    for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
-        measured = [p for p in comparison.loads[loading] if p.lubrication == lubrication]
-        values = [(p.load, p.ratio, EXPANDED * p.ratio_uncertainty) for p in measured]
-        x, ratio, bars = zip(*values, strict=True)
+    for lubrication in dict.fromkeys(at_load.lubrication for at_load in compared):
+        measured = [at_load for at_load in compared if at_load.lubrication == lubrication]
+        x = [at_load.load for at_load in measured]
+        ratio = [at_load.ratio for at_load in measured]
+        bars = [EXPANDED * at_load.ratio_uncertainty for at_load in measured]
         look = mark(lubrication, COLOURS["measured"])
         look |= {"ms": 4, "mew": 0.8, "ls": "none", "elinewidth": 0.8, "capsize": 2}
         axes.errorbar(x, ratio, bars, zorder=3, label=lubricated_words(lubrication), **look)
     _name_curves(axes, loads, drawn)
-    axes.set(
-        xlabel="load (N)",
-        ylabel="largest blurred stress\nover frictionless, $S_{max}/p^0_{max}$ (1)",
-    )
+    axes.set_xlabel("load (N)")
+    axes.set_ylabel("largest blurred stress\nover frictionless, $S_{max}/p^0_{max}$ (1)")
     words = f"{loading} loading" if loading else "as given"
     axes.annotate(words, (0.03, 0.96), xycoords="axes fraction", va="top", fontsize=7)
     legend_above(axes, columns=3)
@@ -163,30 +173,32 @@ def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArr
     end = max((-1, 0), key=lambda end: len(_apart(axes, curves, end)))
     groups = _apart(axes, curves, end)
     x = loads[end]
-    side = 1 if end else -1
     # Room for the names; a load is never negative.
     room = _ROOM * max(loads[-1] - loads[0], 0.2 * loads[-1])
+    look: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 6.5}
     if end:
         axes.set_xlim(0.0, x + room)
+        look |= {"xytext": (7, 0), "ha": "left"}
     else:
-        axes.set_xlim(x - room, loads[-1] + 0.3 * room)
-        axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= loads[-1] + 0.3 * room])
+        last = loads[-1] + 0.3 * room
+        axes.set_xlim(x - room, last)
+        axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= last])
+        look |= {"xytext": (-7, 0), "ha": "right"}
     for group in groups:
         height = float(np.mean(group[:, 0]))
-        (low, high) = (group[:, 1].min(), group[:, 1].max())
-        text = friction_name(low)
-        if low < high:
-            text = f"≥ {text}" if np.isinf(high) else f"{text}–{high:.3g}"
-        axes.annotate(
-            text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
-            (x, height),
-            (7 * side, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=6.5,
-            ha="left" if end else "right",
-            color=profiles.friction_colours(high)[0],
-        )
+        low = group[:, 1].min()
+        high = group[:, 1].max()
+        name = _name_of_range(low, high)
+        if group is groups[-1]:
+            sign = "" if low < high == np.inf else "= "
+            name = rf"$\mu$ {sign}{name}"
+        axes.annotate(name, (x, height), color=friction_colour(high), **look)
+
+
+def _name_of_range(low: float, high: float) -> str:
+    if low == high:
+        return friction_name(low)
+    return f"≥ {low:.3g}" if np.isinf(high) else f"{low:.3g}–{high:.3g}"
 
 
 def _apart(axes: Axes, curves: Mapping[float, FloatArray], end: int) -> list[FloatArray]:
@@ -220,12 +232,12 @@ def comparison_figure(
     with panels_of(5.6, 2, 2, note=_BOTH_NOTE) as (figure, panels):
         profiles.draw_profiles(panels[0, 0], comparison, loads)
         _draw_maxima(panels[0, 1], comparison, loads[0].loading)
-        best, _ = profiles.fitted_friction(comparison, loads)
-        profiles.draw_residuals(panels[1, 0], comparison, loads, best)
-        profiles.share_limits([panels[1, 0]])
+        best = joint_estimate(comparison, loads).best
+        largest = profiles.draw_residuals(panels[1, 0], comparison, loads, best)
+        profiles.share_limits([panels[1, 0]], largest)
         panels[0, 0].set_xlabel(ALONG_RADIUS)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
-        draw_effective(panels[1, 1], comparison, loads)
+        _draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)
     return figure
 
@@ -235,12 +247,12 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     figures: dict[str, Callable[[], Figure]] = {}
     if comparison.by_shear:
         return figures
-    measured = (profile.lubrication for profile in comparison.measured.profiles)
-    for lubrication in dict.fromkeys(measured):
-        tail = f"-{lubrication}" if lubrication else ""
-        of_state: dict[str, Any] = {"comparison": comparison, "lubrication": lubrication}
-        figures[f"profiles{tail}"] = partial(profiles.profile_figure, **of_state)
-        figures[f"friction-set{tail}"] = partial(profiles.friction_set_figure, **of_state)
+    for state in dict.fromkeys(profile.lubrication for profile in comparison.measured.profiles):
+        tail = f"-{state}" if state else ""
+        figures[f"profiles{tail}"] = partial(profiles.profile_figure, comparison, lubrication=state)
+        figures[f"friction-set{tail}"] = partial(
+            profiles.friction_set_figure, comparison, lubrication=state
+        )
     figures["maxima"] = partial(maxima_figure, comparison)
     figures["effective-friction"] = partial(effective_friction_figure, comparison)
     figures["likelihood"] = partial(likelihood_figure, comparison)
@@ -262,36 +274,38 @@ _HIGHEST = 12.0
 
 def effective_friction_figure(comparison: FrictionComparison) -> Figure:
     """Draw the effective friction coefficient against the load, with intervals."""
-    return _panels(comparison, draw_effective, 2.7, _BOTH_NOTE)
+    return _panels(comparison, _draw_effective, 2.7, _BOTH_NOTE)
 
 
-def draw_effective(
+def _draw_effective(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
     """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
-            reading = getattr(at_load, name)
             x = at_load.load + side * _ASIDE * span
             look = mark(at_load.lubrication, COLOURS[colour])
-            _draw_reading(axes, reading, x, words if i == 0 else "", look)
-    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
-    grey = COLOURS["muted"]
-    low, top = _ends(joint)
-    axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
+            _draw_reading(axes, getattr(at_load, name), x, words if i == 0 else "", look)
+    joint = joint_estimate(comparison, loads)
+    green = COLOURS["reference"]
+    axes.axhspan(*_ends(joint), color=green, alpha=0.18, lw=0, label="all loads, 95 %")
     if joint.value is not None:
-        axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)
+        axes.axhline(float(friction_position(joint.value)), color=green, lw=0.8)
     if comparison.macroscopic is not None:
-        value, u = comparison.macroscopic
-        place = float(friction_position(value))
-        axes.axhline(place, color=grey, lw=0.8, ls="--", label="macroscopic" + ", ±2u" * bool(u))
-        if u:
-            spread = EXPANDED * u
-            low, high = friction_position([max(value - spread, 0.0), value + spread])
-            axes.axhspan(low, high, color=grey, alpha=0.15, lw=0)
-    profiles.friction_axis(axes, "y")
+        _draw_macroscopic(axes, *comparison.macroscopic)
+    friction_axis(axes, "y")
     axes.set(xlim=(0, loads[-1].load + 0.08 * span), xlabel="load (N)")
+
+
+def _draw_macroscopic(axes: Axes, value: float, u: float | None) -> None:
+    grey = COLOURS["muted"]
+    label = "macroscopic, ±2u" if u else "macroscopic"
+    axes.axhline(float(friction_position(value)), color=grey, lw=0.8, ls="--", label=label)
+    if u:
+        spread = EXPANDED * u
+        low, high = friction_position([max(value - spread, 0.0), value + spread])
+        axes.axhspan(low, high, color=grey, alpha=0.15, lw=0)
 
 
 def _draw_reading(
@@ -299,18 +313,18 @@ def _draw_reading(
 ) -> None:
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
     colour = look["color"]
-    low = reading.interval.low
-    high = reading.interval.high
-    ends = _ends(reading)
-    (bar,) = axes.plot([x, x], ends, color=colour, lw=1.0, solid_capstyle="butt")
+    low, high = _ends(reading)
+    (bar,) = axes.plot([x, x], [low, high], color=colour, lw=1.0, solid_capstyle="butt")
     bar.set_gid("interval")
-    axes.plot([x], ends[:1], "_" if low > 0 else "", color=colour, ms=5, mew=1.0)
-    if high is None:
-        axes.plot([x], [1.0], "^", color=colour, ms=4, clip_on=False, label="_open")
+    cap = {"marker": "_", "ls": "none", "color": colour, "ms": 5, "mew": 1.0}
+    if reading.interval.low > 0:
+        axes.plot(x, low, **cap)
+    if reading.interval.high is None:
+        axes.plot(x, 1.0, "^", color=colour, ms=4, clip_on=False, label="_open")
     else:
-        axes.plot([x], ends[1:], "_", color=colour, ms=5, mew=1.0)
+        axes.plot(x, high, **cap)
     if reading.value is not None:
-        (value,) = axes.plot([x], friction_position([reading.value]), ms=4, mew=0.8, **look)
+        (value,) = axes.plot(x, friction_position(reading.value), ms=4, mew=0.8, **look)
         value.set(ls="none", zorder=3, label="_value")
     if label:
         axes.plot([], [], look["marker"], color=colour, ms=4, ls="-", lw=1.0, label=label)
@@ -338,22 +352,21 @@ def _panels(
                 draw(axes, comparison, profiles.chosen(comparison, loading, lubrication))
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
-        for axes in panels.flat:
-            axes.label_outer()
-        _one_legend(figure, panels.flat)
+                axes.label_outer()
+        names = dict.fromkeys(name for _, name in comparison_looks(comparison).values())
+        _one_legend(figure, panels.flat, list(names))
     return figure
 
 
-def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
-    """Put the entries of all panels above them, each label once."""
-    shown: dict[str, Any] = {}
+def _one_legend(figure: Figure, panels: Iterable[Axes], first: Sequence[str]) -> None:
+    """Put the entries of all panels above them, each label once, in order after the first."""
+    entries: dict[str, Any] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            shown.setdefault(label, handle)
-    of_loads = (label for label in shown if label.endswith(" N"))
-    loads = sorted(of_loads, key=lambda label: float(label.removesuffix(" N")))
-    order = [*loads, *(label for label in shown if label not in loads)]
-    handles = [shown[label] for label in order]
+            entries.setdefault(label, handle)
+    order = [label for label in first if label in entries]
+    order += [label for label in entries if label not in first]
+    handles = [entries[label] for label in order]
     figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), 7))
 
 
@@ -365,31 +378,28 @@ def likelihood_figure(comparison: FrictionComparison) -> Figure:
 def _draw_likelihood(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
-    looks = load_looks(profile.load for profile in comparison.measured.profiles)
-    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
-    curves = [(at_load.by_profile, *looks[at_load.load], 1.0) for at_load in loads]
-    for reading, colour, label, width in (*curves, (joint, COLOURS["measured"], "all loads", 1.8)):
-        place = friction_position(reading.values)
-        axes.plot(place, _rise(reading), color=colour, lw=width, label=label)
-    draw_levels(axes)
-    profiles.friction_axis(axes, "x")
+    looks = comparison_looks(comparison)
+    for at_load in loads:
+        colour, name = looks[at_load.load]
+        _draw_rise(axes, at_load.by_profile, color=colour, lw=1.0, label=name)
+    joint = joint_estimate(comparison, loads)
+    _draw_rise(axes, joint, color=COLOURS["measured"], lw=1.8, label="all loads")
+    _draw_levels(axes)
+    friction_axis(axes, "x")
     axes.set_ylabel(_RISE)
 
 
-def draw_levels(axes: Axes) -> None:
+def _draw_rise(axes: Axes, reading: BoundedEstimate, **look: Any) -> None:
+    axes.plot(friction_position(reading.values), _rise(reading), **look)
+
+
+def _draw_levels(axes: Axes) -> None:
     """Draw the levels that bound 68.3 % and 95 %, and end the axis not far above."""
+    look: dict[str, Any] = {"ha": "right", "fontsize": 6, "color": "0.4"}
+    look |= {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
     for level, words in _LEVELS:
         axes.axhline(level, color="0.6", lw=0.6, ls=":")
-        axes.annotate(
-            words,
-            (0.995, level),
-            (0, 1),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="right",
-            fontsize=6,
-            color="0.4",
-        )
+        axes.annotate(words, (0.995, level), (0, 1), **look)
     axes.set_ylim(0, _HIGHEST)
 
 

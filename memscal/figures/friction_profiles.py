@@ -1,6 +1,6 @@
 """Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -17,6 +17,8 @@ from memscal.figures.style import (
     EXPANDED,
     SCATTER_THRESHOLD,
     draw_measured,
+    draw_residual_band,
+    draw_zero,
     legend_above,
     load_looks,
     mark,
@@ -24,7 +26,7 @@ from memscal.figures.style import (
     panels_of,
 )
 from memscal.friction.family import FRICTION_SCALE, bounded
-from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
 
@@ -40,7 +42,8 @@ def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
-    (axes.set_xlim if which == "x" else axes.set_ylim)(-0.02, 1.02)
+    set_limits = axes.set_xlim if which == "x" else axes.set_ylim
+    set_limits(-0.02, 1.02)
     axis.set_label_text(r"effective friction coefficient $\mu_e$")
 
 
@@ -49,10 +52,9 @@ def friction_name(friction: float) -> str:
     return "∞" if np.isinf(friction) else f"{friction:.3g}"
 
 
-def friction_colours(friction: ArrayLike) -> list[str]:
-    """Return colours of friction coefficients, by their place between 0 and infinity."""
-    shades = mpl.colormaps["plasma"](0.8 * (1.0 - friction_position(friction)))
-    return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
+def friction_colour(friction: float) -> str:
+    """Return the colour of a friction coefficient, by its place between 0 and infinity."""
+    return mpl.colors.to_hex(mpl.colormaps["plasma"](0.8 * (1.0 - friction_position(friction))))
 
 
 def lubricated_words(lubrication: str) -> str:
@@ -79,27 +81,30 @@ def chosen(
     return sorted(loads, key=lambda at_load: at_load.load)
 
 
-def fitted_friction(
+def joint_estimate(
     comparison: FrictionComparison, loads: Sequence[LoadComparison]
-) -> tuple[float, str]:
-    """Return the most likely coefficient of all loads together, and its name."""
-    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
-    words = "most likely" if joint.value is None else "fitted"
-    return joint.best, rf"$\mu_e$ = {friction_name(joint.best)} ({words})"
+) -> BoundedEstimate:
+    """Return the coefficient of all loads together, of the lubrication and loading of some."""
+    return comparison.joint[loads[0].lubrication][loads[0].loading]
 
 
-def calculated_at(
+def comparison_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
+    """Return colour and name of each load of a comparison, lubricated or not."""
+    return load_looks(profile.load for profile in comparison.measured.profiles)
+
+
+def _calculated_at(
     comparison: FrictionComparison, at_load: LoadComparison, friction: float
 ) -> FloatArray:
     """Return the calculated blurred stress (n,), in Pa, at any coefficient within those solved."""
     from scipy.interpolate import PchipInterpolator
 
-    places = friction_position(comparison.friction)
     calculated = at_load.calculated
-    if places.size == 1:
+    if comparison.friction.size == 1:
         return np.asarray(calculated[0])
     # As the family interpolates: past the friction of full stick nothing changes.
-    return np.asarray(PchipInterpolator(places, calculated)(friction_position(friction)))
+    family = PchipInterpolator(friction_position(comparison.friction), calculated)
+    return np.asarray(family(friction_position(friction)))
 
 
 #: How strongly points are drawn that are not distinct from zero.
@@ -117,29 +122,23 @@ def _draw_points(
     s = profile.s_zz / KPA
     bars = EXPANDED * profile.s_zz_errors / KPA
     clear = s > bars if logarithmic else np.ones(s.size, dtype=bool)
+    look = mark(at_load.lubrication, colour) | _BARS | {"many": s.size > SCATTER_THRESHOLD}
     for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
-            look = mark(at_load.lubrication, colour) | _BARS | {"alpha": alpha}
-            look |= {"many": s.size > SCATTER_THRESHOLD, "label": label or "_points"}
-            draw_measured(axes, r[shown], s[shown], bars[shown], **look)
+            points = (r[shown], s[shown], bars[shown])
+            draw_measured(axes, *points, alpha=alpha, label=label, **look)
 
 
-def share_limits(panels: Sequence[Axes]) -> None:
+def share_limits(panels: Sequence[Axes], largest: float) -> None:
     """Give residual panels one scale that shows every point, and at least the band."""
-    sizes = [
-        np.abs(np.asarray(line.get_ydata()))
-        for axes in panels
-        for line in axes.lines
-        if line.get_marker() not in ("None", "", None)
-    ]
-    limit = max(_LEAST_LIMIT, 1.1 * float(np.max(np.concatenate(sizes))))
+    limit = max(_LEAST_LIMIT, 1.1 * largest)
     for axes in panels:
         axes.set_ylim(-limit, limit)
 
 
 _FINE = 241
 _DECADES = 3.3
-_SHOWN = (0.0, 0.05, 0.1, 0.2, 0.3, np.inf)
+_SHOWN = (0.05, 0.1, 0.2, 0.3)
 #: Panels of a row of loads: with more, only the smallest, the largest and those between fit.
 _MOST_LOADS = 4
 
@@ -152,9 +151,11 @@ def profile_figure(
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
+        largest = 0.0
         for axes, index in zip(panels[1], (0, -1), strict=True):
-            draw_residuals(axes, comparison, loads, float(comparison.friction[index]))
-        share_limits(panels[1])
+            friction = float(comparison.friction[index])
+            largest = max(largest, draw_residuals(axes, comparison, loads, friction))
+        share_limits(panels[1], largest)
     return figure
 
 
@@ -166,37 +167,53 @@ def draw_profiles(
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points, calculated curves of the fitted coefficient, and their limits."""
-    looks = load_looks(profile.load for profile in comparison.measured.profiles)
-    best, fitted = fitted_friction(comparison, loads)
-    ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
-    styles = {"-": fitted, ":": rf"$\mu$ = {ends[0]}", "--": rf"$\mu$ = {ends[1]}"}
+    looks = comparison_looks(comparison)
+    joint = joint_estimate(comparison, loads)
+    words = "most likely" if joint.value is None else "fitted"
+    styles = {
+        "-": rf"$\mu_e$ = {friction_name(joint.best)} ({words})",
+        ":": rf"$\mu$ = {friction_name(comparison.friction[0])}",
+        "--": rf"$\mu$ = {friction_name(comparison.friction[-1])}",
+    }
     for at_load in loads:
         colour, name = looks[at_load.load]
         r = np.linspace(0.0, at_load.profile.r[-1], _FINE)
-        shown = np.stack([calculated_at(comparison, at_load, best), *at_load.calculated[[0, -1]]])
+        fitted = _calculated_at(comparison, at_load, joint.best)
+        shown = np.stack([fitted, *at_load.calculated[[0, -1]]])
         curves = on_axis(at_load.profile.r, shown, r) / KPA
         for curve, ls in zip(curves, styles, strict=True):
             axes.plot(r / MM, curve, color=colour, lw=1.0 if ls == "-" else 0.8, ls=ls)
         _draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
-    if logarithmic:
-        top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
-        axes.set_yscale("log")
-        axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
-        for ls, label in styles.items():
-            axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
-        pale = mark(loads[0].lubrication, "0.3") | {"ls": "none", "ms": 3.0, "alpha": 2 * _PALE}
-        axes.plot([], [], label="pale: less than 2u", **pale)
-    else:
-        axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-        axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
-        lines = [lubricated_words(loads[0].lubrication)]
-        lines += [f"{loads[0].loading} loading"] if loads[0].loading else []
-        words = zip(("solid", "dotted", "dashed"), styles.values(), strict=True)
-        lines += [f"{line}: {label}" for line, label in words]
-        _note(axes, "\n".join(lines), (0.97, 0.95))
     axes.set_ylabel("blurred stress $S_{zz}$ (kPa)")
-    points = max(at_load.profile.r.size for at_load in loads)
-    legend_above(axes, columns=2 if logarithmic else 4, points=0 if logarithmic else points)
+    if logarithmic:
+        _finish_logarithmic(axes, loads, styles)
+    else:
+        _finish_linear(axes, loads, styles)
+
+
+def _finish_logarithmic(
+    axes: Axes, loads: Sequence[LoadComparison], styles: Mapping[str, str]
+) -> None:
+    top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
+    axes.set_yscale("log")
+    axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
+    for ls, label in styles.items():
+        axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
+    pale = mark(loads[0].lubrication, "0.3") | {"ls": "none", "ms": 3.0, "alpha": 2 * _PALE}
+    axes.plot([], [], label="pale: less than 2u", **pale)
+    legend_above(axes)
+
+
+def _finish_linear(axes: Axes, loads: Sequence[LoadComparison], styles: Mapping[str, str]) -> None:
+    draw_zero(axes)
+    axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
+    lines = [lubricated_words(loads[0].lubrication)]
+    if loads[0].loading:
+        lines.append(f"{loads[0].loading} loading")
+    for dashes, label in zip(("solid", "dotted", "dashed"), styles.values(), strict=True):
+        lines.append(f"{dashes}: {label}")
+    _note(axes, "\n".join(lines), (0.97, 0.95))
+    legend_above(axes, columns=4, points=max(at_load.profile.r.size for at_load in loads))
 
 
 def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
@@ -206,31 +223,32 @@ def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
 
 def draw_residuals(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], friction: float
-) -> None:
+) -> float:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    looks = load_looks(profile.load for profile in comparison.measured.profiles)
-    colours = [looks[at_load.load][0] for at_load in loads]
-    _plot_residuals(axes, comparison, loads, friction, colours)
+    looks = comparison_looks(comparison)
+    draw_residual_band(axes)
     axes.set_xlabel(ALONG_RADIUS)
     axes.set_ylabel(rf"residual / $u$, $\mu$ = {friction_name(friction)}")
+    return max(
+        _draw_residuals(axes, comparison, at_load, friction, looks[at_load.load][0])
+        for at_load in loads
+    )
 
 
-def _plot_residuals(
+def _draw_residuals(
     axes: Axes,
     comparison: FrictionComparison,
-    loads: Sequence[LoadComparison],
+    at_load: LoadComparison,
     friction: float,
-    colours: Sequence[str],
-) -> None:
-    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
-    axes.axhline(0.0, color="0.4", lw=0.6)
-    for at_load, colour in zip(loads, colours, strict=True):
-        profile = at_load.profile
-        look = mark(at_load.lubrication, colour)
-        calculated = calculated_at(comparison, at_load, friction)
-        z = (profile.s_zz - calculated) / profile.s_zz_errors
-        look |= {"many": z.size > SCATTER_THRESHOLD, "ls": "none", "ms": 2.5, "mew": 0.6}
-        draw_measured(axes, profile.r / MM, z, None, **look)
+    colour: str,
+) -> float:
+    """Draw the residuals of one load; return the largest."""
+    profile = at_load.profile
+    calculated = _calculated_at(comparison, at_load, friction)
+    z = (profile.s_zz - calculated) / profile.s_zz_errors
+    look = mark(at_load.lubrication, colour) | {"ls": "none", "ms": 2.5, "mew": 0.6}
+    draw_measured(axes, profile.r / MM, z, None, many=z.size > SCATTER_THRESHOLD, **look)
+    return float(np.abs(z).max())
 
 
 def friction_set_figure(
@@ -242,38 +260,36 @@ def friction_set_figure(
     loads = [loads[i] for i in np.unique(shown)]
     shared: dict[str, Any] = {"sharex": "col", "squeeze": False, "height_ratios": (1.5, 1.5, 1.0)}
     with panels_of(5.0, 3, len(loads), **shared) as (figure, panels):
-        for column, at_load in zip(panels.T, loads, strict=True):
+        largest = 0.0
+        for (stress, beyond, residual), at_load in zip(panels.T, loads, strict=True):
             frictionless = at_load.calculated[0]
-            column[0].set_title(f"{at_load.load:.3g} N", fontsize=8)
-            _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
-            column[0].set_ylim(bottom=0)
-            _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
-            best = at_load.by_profile.best
-            _plot_residuals(column[2], comparison, [at_load], best, [COLOURS["measured"]])
-            words = "fitted" if at_load.by_profile.value is not None else "most likely"
-            _note(column[2], rf"{words}: $\mu_e$ = {friction_name(best)}", (0.96, 0.93))
-        share_limits(panels[2])
-        low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
+            stress.set_title(f"{at_load.load:.3g} N", fontsize=8)
+            _draw_set(stress, comparison, at_load, 0.0 * frictionless, KPA)
+            stress.set_ylim(bottom=0)
+            _draw_set(beyond, comparison, at_load, frictionless, at_load.p0_max / 100)
+            fitted = at_load.by_profile
+            draw_residual_band(residual)
+            z = _draw_residuals(residual, comparison, at_load, fitted.best, COLOURS["measured"])
+            largest = max(largest, z)
+            words = "most likely" if fitted.value is None else "fitted"
+            _note(residual, rf"{words}: $\mu_e$ = {friction_name(fitted.best)}", (0.96, 0.93))
+            residual.set_xlabel("$r$ (mm)" if len(loads) > 2 else ALONG_RADIUS)
+        share_limits(panels[2], largest)
+        limits = np.array([axes.get_ylim() for axes in panels[1]])
         for axes in panels[1]:
-            axes.set_ylim(min(low), max(high))
-        of_rows = (
-            "blurred stress\n$S_{zz}$ (kPa)",
-            "beyond frictionless\n(% of its maximum)",
-            "residual / $u$",
-        )
-        for axes, label in zip(panels[:, 0], of_rows, strict=True):
-            axes.set_ylabel(label)
+            axes.set_ylim(limits.min(), limits.max())
+        panels[0, 0].set_ylabel("blurred stress\n$S_{zz}$ (kPa)")
+        panels[1, 0].set_ylabel("beyond frictionless\n(% of its maximum)")
+        panels[2, 0].set_ylabel("residual / $u$")
         figure.align_ylabels(panels[:, 0])
-        for axes in panels[2]:
-            axes.set_xlabel("$r$ (mm)" if len(loads) > 2 else ALONG_RADIUS)
         _legend_of_friction(figure, comparison, loads[0])
     return figure
 
 
 def _shown_indices(comparison: FrictionComparison) -> list[int]:
     """Return indices of the coefficients to draw: some of them, the ends always."""
-    names = {int(np.argmin(np.abs(comparison.friction - mu))) for mu in _SHOWN if np.isfinite(mu)}
-    return sorted(names | {0, comparison.friction.size - 1})
+    nearest = {int(np.argmin(np.abs(comparison.friction - mu))) for mu in _SHOWN}
+    return sorted(nearest | {0, comparison.friction.size - 1})
 
 
 def _draw_set(
@@ -291,34 +307,25 @@ def _draw_set(
     r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
-        axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
+        axes.plot(r / MM, curve / unit, color=friction_colour(comparison.friction[i]), lw=0.9)
     stress = (profile.s_zz - less) / unit
     errors = EXPANDED * profile.s_zz_errors / unit
-    look |= {"many": stress.size > SCATTER_THRESHOLD, "label": "_points"}
-    draw_measured(axes, profile.r / MM, stress, errors, **look)
+    many = stress.size > SCATTER_THRESHOLD
+    draw_measured(axes, profile.r / MM, stress, errors, many=many, **look)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
 
 
 def _legend_of_friction(
     figure: Figure, comparison: FrictionComparison, at_load: LoadComparison
 ) -> None:
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=friction_colours(comparison.friction[i])[0],
-            lw=1.2,
-            label=rf"$\mu$ = {friction_name(comparison.friction[i])}",
-        )
-        for i in _shown_indices(comparison)
-    ]
     point = Line2D([], [], ms=3, ls="none", **mark(at_load.lubrication, "k"))
     point.set_label(f"measured, {lubricated_words(at_load.lubrication)}")
+    handles = [point]
+    for i in _shown_indices(comparison):
+        mu = float(comparison.friction[i])
+        line = Line2D([], [], color=friction_colour(mu), lw=1.2)
+        line.set_label(rf"$\mu$ = {friction_name(mu)}")
+        handles.append(line)
     title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
-    figure.legend(
-        handles=[point, *handles],
-        loc="outside upper center",
-        ncols=len(handles) + 1,
-        title=title,
-        title_fontsize=8,
-    )
+    place = {"loc": "outside upper center", "ncols": len(handles)}
+    figure.legend(handles=handles, title=title, title_fontsize=8, **place)

@@ -1,5 +1,8 @@
 """Figure of a log: the holds that were found in it, and the readings that they give."""
 
+import math
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -14,38 +17,32 @@ _MOST_ROWS = 20_000
 def holds_figure(holds: Holds) -> Figure:
     """Draw position, load and reading over the lines of the file, and readings over position."""
     reading = holds.reading
+    reading_label = f"reading ({reading.unit})"
     names = {"x": ("x (mm)", MM), "y": ("y (mm)", MM), "normal_load": ("load (N)", 1.0)}
-    names["u_zz"] = (f"reading ({reading.unit})", reading.scale)
+    names["u_zz"] = (reading_label, reading.scale)
     shown = [name for name in names if name in holds.log and np.ptp(holds.log[name]) > 0]
-    along = "y" if np.ptp(holds.mean.get("y", 0.0)) > np.ptp(holds.mean["x"]) else "x"
-    chosen = np.arange(0, holds.line.size, -(-holds.line.size // _MOST_ROWS))
+    every = math.ceil(holds.line.size / _MOST_ROWS)
     first = holds.line[holds.first]
     last = holds.line[holds.stop - 1]
+    gold = COLOURS["gaussian"]
     with panels_of(1.6 * (len(shown) + 1.4), len(shown) + 1) as (figure, panels):
         for axes, name in zip(panels, shown, strict=False):
             label, scale = names[name]
-            axes.plot(holds.line[chosen], holds.log[name][chosen] / scale, color="0.6", lw=0.7)
-            axes.hlines(
-                holds.mean[name] / scale, first, last, color=COLOURS["gaussian"], lw=2.5, zorder=3
-            )
+            log = holds.log[name] / scale
+            axes.plot(holds.line[::every], log[::every], color="0.6", lw=0.7)
+            axes.hlines(holds.mean[name] / scale, first, last, color=gold, lw=2.5, zorder=3)
             axes.set_ylabel(label)
             axes.sharex(panels[0])
-        panels[0].set_title(
-            f"{first.size} holds (thick) in {holds.line.size} rows of the log", loc="left"
-        )
+        title = f"{first.size} holds (thick) in {holds.line.size} rows of the log"
+        panels[0].set_title(title, loc="left")
         panels[-2].set_xlabel("line of the file")
         axes = panels[-1]
-        (label, scale) = names["u_zz"]
-        axes.errorbar(
-            holds.mean[along] / MM,
-            holds.mean["u_zz"] / scale,
-            2 * holds.u_errors / scale,
-            fmt="o",
-            ms=marker_size(first.size),
-            color=COLOURS["measured"],
-            lw=0.8,
-            zorder=3,
-        )
-        axes.set(xlabel=f"{along} (mm)", ylabel=label)
+        along = "y" if np.ptp(holds.mean.get("y", 0.0)) > np.ptp(holds.mean["x"]) else "x"
+        x = holds.mean[along] / MM
+        u = holds.mean["u_zz"] / reading.scale
+        bars = 2 * holds.u_errors / reading.scale
+        look: dict[str, Any] = {"fmt": "o", "ms": marker_size(first.size), "lw": 0.8, "zorder": 3}
+        axes.errorbar(x, u, bars, color=COLOURS["measured"], **look)
+        axes.set(xlabel=f"{along} (mm)", ylabel=reading_label)
         axes.set_title("mean of each hold ± 2 standard uncertainties (k = 2)", loc="left")
     return figure

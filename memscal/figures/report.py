@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import singledispatch
 from html import escape
 from pathlib import Path
@@ -41,8 +41,8 @@ from memscal.version import __version__
 _PAGE = Path(__file__).with_name("report.html")
 #: Bytes that the figures of a page may have, which leaves it below a megabyte.
 _MOST_OF_FIGURES = 800_000
-#: What a figure is drawn as until all fit: an SVG, then images of fewer dots per inch.
-_FORMS = (("svg", 72.0), ("png", 200.0), ("png", 130.0), ("png", 90.0), ("png", 60.0))
+#: Dots per inch of figures that are too large as drawings.
+_COARSE = 90.0
 
 
 class Picture(NamedTuple):
@@ -79,26 +79,31 @@ def html_report(result: Result) -> str:
         "Results": _html(tables[: report.leading]),
         "Figures": html_figures(report.pictures),
         "Further results": _html(tables[report.leading :]),
-        "Quality checks": _checks(report.checks),
+        "Quality checks": _html([_checks(report.checks)]),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
         "Uncertainty budget": _html([report.budget] if report.budget else []),
         "What was measured on": _html(report.settings),
         "Provenance": _html(_provenance(report)),
     }
-    body = "\n".join(
-        f"<section>\n<h2>{heading}</h2>\n{content}\n</section>"
-        for heading, content in sections.items()
-        if content
-    )
+    title = escape(report.title)
+    body = [f"<h1>{title}</h1>", *_verdict(result, report)]
+    for heading, content in sections.items():
+        if content:
+            body.append(f"<section>\n<h2>{heading}</h2>\n{content}\n</section>")
+    page = Template(_PAGE.read_text(encoding="utf-8"))
+    program = f"memscal {__version__}"
+    return page.substitute(title=title, body="\n".join(body), program=program)
+
+
+def _verdict(result: Result, report: Report) -> list[str]:
+    """Return the paragraph that says what was found, if there is one."""
+    text = report.verdict or result.answer()
+    if not text:
+        return []
     failed = report.failed or not all(check.passed for check in report.checks)
     kind = "verdict failed" if failed else "verdict"
-    lines = "<br>\n".join(escape(report.verdict or result.answer()).splitlines())
-    note = f'<p class="{kind}" role="note">{lines}</p>\n' if lines else ""
-    heading = f"<h1>{escape(report.title)}</h1>\n{note}"
-    page = Template(_PAGE.read_text(encoding="utf-8"))
-    return page.substitute(
-        title=escape(report.title), body=heading + body, program=f"memscal {__version__}"
-    )
+    lines = "<br>\n".join(escape(text).splitlines())
+    return [f'<p class="{kind}" role="note">{lines}</p>']
 
 
 def _html(tables: Sequence[Table]) -> str:
@@ -112,23 +117,18 @@ def _html(tables: Sequence[Table]) -> str:
     return "\n".join(boxes)
 
 
-def _checks(checks: Sequence[QualityCheck]) -> str:
-    shown = checks_table(worst_checks(checks), meanings=True)
+def _checks(checks: Sequence[QualityCheck]) -> Table:
     title = "Each passes up to its limit; of one made several times, what failed and the worst"
-    return _html([Table(title, shown.head, shown.rows, shown.marked)])
+    return replace(checks_table(worst_checks(checks), meanings=True), title=title)
 
 
 def html_figures(pictures: Sequence[Picture]) -> str:
     """Return figures with their captions, as images that the page holds."""
     figures = [picture.draw() for picture in pictures]
-    images = [_image(figure, *_FORMS[0]) for figure in figures]
-    coarser = {i: iter(_FORMS[1:]) for i in range(len(images))}
-    while coarser and sum(map(len, images)) > _MOST_OF_FIGURES:
-        largest = max(coarser, key=lambda i: len(images[i]))
-        if (form := next(coarser[largest], None)) is None:
-            del coarser[largest]
-        else:
-            images[largest] = min(images[largest], _image(figures[largest], *form), key=len)
+    images = [_image(figure, "svg") for figure in figures]
+    for i in sorted(range(len(images)), key=lambda i: -len(images[i])):
+        if sum(map(len, images)) > _MOST_OF_FIGURES:
+            images[i] = _image(figures[i], "png")
     return "\n".join(
         f'<figure>\n<img alt="{escape(picture.alt)}" src="{image}">\n'
         f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
@@ -136,10 +136,10 @@ def html_figures(pictures: Sequence[Picture]) -> str:
     )
 
 
-def _image(figure: Figure, file_format: str, dpi: float) -> str:
+def _image(figure: Figure, form: str) -> str:
     """Return a figure as the address of an image, which holds it."""
-    content = base64.b64encode(render_figure(figure, file_format, dpi=dpi)).decode("ascii")
-    return f"data:image/{file_format.replace('svg', 'svg+xml')};base64,{content}"
+    content = base64.b64encode(render_figure(figure, form, dpi=_COARSE)).decode("ascii")
+    return f"data:image/{'svg+xml' if form == 'svg' else form};base64,{content}"
 
 
 @singledispatch
@@ -150,10 +150,13 @@ def report_of(result: Result) -> Report:
         report: Report = module(drawn_in).report(result)
         return report
     tables: list[Table] = result.tables()
-    checks, messages = (getattr(result, name, ()) for name in ("checks", "messages"))
     title = tables[0].title if tables else type(result).__name__
-    pictures = [Picture(result.plot, title, title)] if drawn_in else []
-    return Report(title=title, pictures=pictures, checks=checks, messages=messages)
+    return Report(
+        title=title,
+        pictures=[Picture(result.plot, title, title)] if drawn_in else [],
+        checks=getattr(result, "checks", ()),
+        messages=getattr(result, "messages", ()),
+    )
 
 
 @report_of.register(ApparatusFunction)
@@ -174,10 +177,10 @@ def _of_calibration(result: Calibration | ApparatusFunction) -> Report:
         "over the plane, from g: voltage, residuals and G; at several loads a row for each."
     )
     values = dict(zip(data.parameters.names, data.parameters.values, strict=True))
-    budgets = [
-        (estimated_quantity(name).read_in(data.reading), budget, values.get(name, 0.0), "")
-        for name, budget in data.budget.items()
-    ]
+    budgets = []
+    for name, budget in data.budget.items():
+        quantity = estimated_quantity(name).read_in(data.reading)
+        budgets.append((quantity, budget, values.get(name, 0.0), ""))
     return Report(
         title=sensor_title(data),
         pictures=[Picture(result.plot, alt, caption)],
@@ -204,18 +207,18 @@ def _of_stress(stress: MeasuredStress) -> Report:
         "logarithmic scale, pale where the stress is not distinct from zero."
     )
     quantities = by_name(records.STRESS_NUMBERS.quantities)
-    budgets = [
-        (quantities[name], getattr(p, f"{name}_budget"), getattr(p, name), f"{i}: {p.label}, ")
-        for i, p in enumerate(stress.profiles, start=1)
-        for name in ("force", "maximum")
-    ]
+    budgets = []
+    for i, p in enumerate(stress.profiles, start=1):
+        label = f"{i}: {p.label}, "
+        budgets.append((quantities["force"], p.force_budget, p.force, label))
+        budgets.append((quantities["maximum"], p.maximum_budget, p.maximum, label))
     return Report(
         title=f"Stress measured at the base of {_contact_words(stress.scans[0])}",
         pictures=[Picture(stress.plot, alt, caption)],
         checks=stress.checks,
         messages=stress.messages,
         budget=_budget(*budgets),
-        **_of_measurement(stress),
+        **_measured_on(stress),
     )
 
 
@@ -232,53 +235,57 @@ def _of_restoration(restored: Restoration) -> Report:
         "stress where there is one, and the scan. b: residuals over the standard uncertainty of "
         "the noise."
     )
-    of_force = by_name(records.RESTORED)["force"], restored.force_budget, restored.force, ""
+    force = by_name(records.RESTORED)["force"]
     return Report(
         title=f"Stress restored at the base of {_contact_words(restored.scan)}",
         pictures=[Picture(restored.plot, alt, caption)],
         checks=restored.checks,
         messages=restored.messages,
-        budget=_budget(of_force),
+        budget=_budget((force, restored.force_budget, restored.force, "")),
         settings=[_setting(restored.scan, restored.scan.load)],
         files={"artifact": restored.apparatus.source, "scan": restored.scan.source},
     )
 
 
-#: Captions of a comparison's figures, by the beginning of their names.
+#: First sentences of the captions of a comparison's figures, by the beginning of their names.
 _COMPARED = {
-    "profiles": "Measured and calculated profiles{}. Points: measured stress; lines: calculated, "
-    "with the friction coefficients that the legend names. Below: measured less calculated stress "
-    "over its uncertainty.",
-    "maxima": "Maximum of the stress against the load. Points: the largest measured stress over "
-    "the largest of the frictionless contact; lines: the same calculated with each friction "
-    "coefficient.",
+    "profiles": "Measured and calculated profiles{}",
+    "maxima": "Maximum of the stress against the load",
     "effective-friction": "Effective friction coefficient against the load, by the maximum and by "
-    "the whole profile, with 95 % intervals; band: all loads together.",
+    "the whole profile, with 95 % intervals; band: all loads together",
     "likelihood": "Likelihood of each friction coefficient: twice the loss of its logarithm, for "
-    "each load and for all together; dotted: what bounds 68 % and 95 %.",
+    "each load and for all together; dotted: what bounds 68 % and 95 %",
     "interface": "Laws of the interface: how well each length explains all loads, the evidence of "
-    "each law, and the friction coefficients that a slip length means.",
+    "each law, and the friction coefficients that a slip length means",
+}
+_DETAILS = {
+    "profiles": " Points: measured stress; lines: calculated, with the friction coefficients that "
+    "the legend names. Below: measured less calculated stress over its uncertainty.",
+    "maxima": " Points: the largest measured stress over the largest of the frictionless contact; "
+    "lines: the same calculated with each friction coefficient.",
 }
 
 
 @report_of.register
 def _of_comparison(compared: FrictionComparison) -> Report:
-    measured = compared.measured
-    pictures = []
+    return Report(
+        title=f"Friction of {_contact_words(compared.measured.scans[0])}",
+        leading=1 + len(compared.loadings),
+        pictures=list(_compared_pictures(compared)),
+        checks=compared.checks,
+        messages=comparisons.notes(compared),
+        **_measured_on(compared.measured),
+    )
+
+
+def _compared_pictures(compared: FrictionComparison) -> Iterator[Picture]:
     joint = joint_text(compared.joint)
     for stem, draw in comparison_figures(compared).items():
-        for name in (name for name in _COMPARED if stem.startswith(name)):
-            caption = _COMPARED[name].format(stem.removeprefix(name).replace("-", ", "))
-            alt = f"{caption.partition('.')[0]}. All loads together: {joint}."
-            pictures.append(Picture(draw, alt, caption))
-    return Report(
-        title=f"Friction of {_contact_words(measured.scans[0])}",
-        leading=1 + len(compared.loadings),
-        pictures=pictures,
-        checks=compared.checks,
-        messages=tuple(comparisons.notes(compared)),
-        **_of_measurement(measured),
-    )
+        for name, subject in _COMPARED.items():
+            if stem.startswith(name):
+                shown = subject.format(stem.removeprefix(name).replace("-", ", "))
+                alt = f"{shown}. All loads together: {joint}."
+                yield Picture(draw, alt, f"{shown}.{_DETAILS.get(name, '')}")
 
 
 def _contact_words(scan: Scan | MeasuredScan) -> str:
@@ -290,12 +297,16 @@ def _contact_words(scan: Scan | MeasuredScan) -> str:
     return f"a {film.thickness / MM:.4g} mm film under {pressed}"
 
 
-def _of_measurement(measured: MeasuredStress) -> dict[str, Any]:
+def _measured_on(measured: MeasuredStress) -> dict[str, Any]:
     """Return what was measured on what, and the files and versions of it."""
-    settings = {(table := _setting(scan)).plain(): table for scan in measured.scans}
-    files = {f"scan {i}": scan.source for i, scan in enumerate(measured.scans, start=1)}
-    files = {"artifact": measured.artifact, **files}
-    return {"settings": [*settings.values()], "files": files, "process": measured.process}
+    settings: list[Table] = []
+    files: dict[str, SourceFile | None] = {"artifact": measured.artifact}
+    for i, scan in enumerate(measured.scans, start=1):
+        files[f"scan {i}"] = scan.source
+        setting = _setting(scan)
+        if setting not in settings:
+            settings.append(setting)
+    return {"settings": settings, "files": files, "process": measured.process}
 
 
 def _setting(
@@ -305,15 +316,14 @@ def _setting(
 ) -> Table:
     """Return sensor, indenter, film and reference as a table of items and values."""
     indenter = holder.indenter
-    rows = [
-        *_stated("", records.SENSOR, holder.sensor),
-        *([] if load is None else [("load", f"{load:.4g} N")]),
-        *_stated("", records.LOAD_CELL, getattr(holder, "load_cell", None)),
-        *_stated(f"{getattr(indenter, 'shape', '')}, ", records.ROUND_INDENTER, indenter),
-        *_stated("film, ", records.FILM, holder.film),
-        *_stated("reference, ", records.SOLVER, reference),
-        *_stated("reference, ", records.NUMERICS, reference),
-    ]
+    rows = [*_stated("", records.SENSOR, holder.sensor)]
+    if load is not None:
+        rows.append(("load", f"{load:.4g} N"))
+    rows += _stated("", records.LOAD_CELL, getattr(holder, "load_cell", None))
+    rows += _stated(f"{getattr(indenter, 'shape', '')}, ", records.ROUND_INDENTER, indenter)
+    rows += _stated("film, ", records.FILM, holder.film)
+    rows += _stated("reference, ", records.SOLVER, reference)
+    rows += _stated("reference, ", records.NUMERICS, reference)
     return Table("Sensor, indenter and film", ("item", "value"), rows)
 
 
@@ -325,12 +335,11 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
             yield prefix + quantity.words, value
         elif isinstance(value, float) and not quantity.name.endswith("_uncertainty"):
             value = value / quantity.scale
-            spread = f"{quantity.name}_uncertainty"
             text = f"{value:.3g} {quantity.unit}".strip()
+            spread = f"{quantity.name}_uncertainty"
             if hasattr(holder, spread):
                 u = getattr(holder, spread)
-                u = None if u is None else u / quantity.scale
-                text = format_measured(value, u, quantity.unit)
+                text = format_measured(value, u and u / quantity.scale, quantity.unit)
             yield prefix + quantity.words, text
 
 
@@ -339,14 +348,17 @@ def _budget(*rows: tuple[Quantity, Mapping[str, float], float, str], down: bool 
 
     Each value has its quantity, its uncertainty by source, itself, and what it is of.
     """
-    sources = dict.fromkeys(source for _, budget, *_ in rows for source in budget)
+    sources: dict[str, None] = {}
+    for _, budget, *_ in rows:
+        sources |= dict.fromkeys(budget)
     words = (source.replace("_", " ") for source in sources)
     lines = [("source" if down else "", *words, "root sum of squares", "relative")]
-    for quantity, budget, value, of in rows:
+    for quantity, budget, value, subject in rows:
         total = total_of(budget)
-        cells = (_share(budget.get(source), total, quantity.scale) for source in sources)
-        relative = f"{100 * total / abs(value):.2g}%" if value else "–"
-        lines.append((of + quantity.heading, *cells, f"{total / quantity.scale:.2g}", relative))
+        cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
+        cells.append(f"{total / quantity.scale:.2g}")
+        cells.append(f"{100 * total / abs(value):.2g}%" if value else "–")
+        lines.append((subject + quantity.heading, *cells))
     head, *body = zip(*lines, strict=True) if down else lines
     title = "Standard uncertainty by source, and its share of the variance"
     return Table(title, head, body if sources else [])
@@ -355,8 +367,8 @@ def _budget(*rows: tuple[Quantity, Mapping[str, float], float, str], down: bool 
 def _share(u: float | None, total: float, scale: float) -> str:
     if u is None:
         return "–"
-    share = np.copysign((u / total) ** 2, u) if total > 0 else None
-    return f"{u / scale:.2g}" + ("" if share is None else f" ({share:.0%})")
+    size = f"{u / scale:.2g}"
+    return f"{size} ({np.copysign((u / total) ** 2, u):.0%})" if total > 0 else size
 
 
 def _provenance(report: Report) -> list[Table]:
@@ -371,8 +383,11 @@ def _provenance(report: Report) -> list[Table]:
             rows.append((f"its SHA-256 ({name})", source.sha256))
     tables = [Table("What was run on what", ("item", "value"), rows)]
     if process is not None:
-        held = {"Options": process.configuration, "Versions": process.environment}
-        for title, mapping in held.items():
-            pairs = [(str(key), stated_text(value)) for key, value in mapping.items()]
-            tables.append(Table(title, ("name", "value"), pairs))
+        tables.append(_named_values("Options", process.configuration))
+        tables.append(_named_values("Versions", process.environment))
     return tables
+
+
+def _named_values(title: str, values: Mapping[str, Any]) -> Table:
+    rows = [(str(name), stated_text(value)) for name, value in values.items()]
+    return Table(title, ("name", "value"), rows)

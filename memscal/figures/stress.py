@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.figures import style
@@ -24,37 +26,41 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
     # Dots of many points have no bars.
     many = min(profile.r.size for profile in measured.profiles) > style.SCATTER_THRESHOLD
     with style.panels_of(3.6, 1, 2, "" if many else style.COVERAGE_NOTE) as (figure, panels):
+        linear, logarithmic = panels
         looks = style.load_looks(profile.load for profile in measured.profiles)
-        scales = ("linear scale", "logarithmic scale; pale: less than 2u")
-        for axes, scale in zip(panels, scales, strict=True):
-            axes.set_title(scale, fontsize=8, loc="left")
-            for profile in measured.profiles:
-                _draw(axes, profile, looks[profile.load][0], logarithmic=axes is panels[1])
+        for profile in measured.profiles:
+            colour, _ = looks[profile.load]
+            clear = profile.s_zz > EXPANDED * profile.s_zz_errors
+            _draw(linear, profile, colour, np.ones_like(clear))
+            _draw(logarithmic, profile, colour, clear)
+        for axes in panels:
             axes.set(xlabel=ALONG_RADIUS, ylabel="blurred stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
-        panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
+        linear.set_title("linear scale", fontsize=8, loc="left")
+        style.draw_zero(linear)
+        words = "logarithmic scale; pale: less than 2u"
+        logarithmic.set_title(words, fontsize=8, loc="left")
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
-        panels[1].set_yscale("log")
-        panels[1].set_ylim(_DECADES * top, 1.6 * top)
-        panels[1].yaxis.set_major_formatter("{x:g}")
+        logarithmic.set_yscale("log")
+        logarithmic.set_ylim(_DECADES * top, 1.6 * top)
+        logarithmic.yaxis.set_major_formatter("{x:g}")
         _legend(figure, measured, dict(looks.values()), many=many)
     return figure
 
 
-def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: bool) -> None:
-    """Draw a profile; if ``logarithmic``, points not distinct from zero are pale, without bars."""
+def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: NDArray[np.bool_]) -> None:
+    """Draw a profile; points that are not clear of zero are pale, without bars."""
     dashes = "--" if profile.lubrication == "lubricated" else "-"
     (line,) = axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, color=colour, lw=0.8)
     line.set(ls=dashes, alpha=0.7)
-    bars = EXPANDED * profile.s_zz_errors
-    shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
     look = style.mark(profile.lubrication, colour) | {"ls": "none", "mew": 0.7, "ms": 2.6}
     look |= {"many": profile.r.size > style.SCATTER_THRESHOLD, "elinewidth": 0.6}
     r = profile.r / MM
     stress = profile.s_zz / KPA
-    style.draw_measured(axes, r[shown], stress[shown], bars[shown] / KPA, **look)
-    if not shown.all():
-        style.draw_measured(axes, r[~shown], stress[~shown], None, alpha=0.3, **look)
+    bars = EXPANDED * profile.s_zz_errors / KPA
+    style.draw_measured(axes, r[clear], stress[clear], bars[clear], **look)
+    if not clear.all():
+        style.draw_measured(axes, r[~clear], stress[~clear], None, alpha=0.3, **look)
     radius = profile.contact_radius / MM
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
@@ -65,10 +71,14 @@ def _legend(
     """Name loads by colour and states by mark, once for both panels."""
     handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
-        look = style.mark(state, "0.2") | ({"marker": "."} if many else {})
-        handle = Line2D([], [], lw=0.8, ms=3.2, **look)
+        look = style.mark(state, "0.2")
+        words = state or "measured"
+        if many:
+            look["marker"] = "."
+        else:
+            words += ", ±2u"
+        handle = Line2D([], [], lw=0.8, ms=3.2, label=words, **look)
         handle.set_linestyle("--" if state == "lubricated" else "-")
-        handle.set_label(f"{state or 'measured'}{'' if many else ', ±2u'}")
         handles.append(handle)
     radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
     handles.append(radius)
@@ -91,29 +101,29 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison |
     r = restored.r / MM
     stress = restored.sigma_zz / KPA
     band = EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
-    blue = COLOURS["deconvolved"]
-    axes.fill_between(r, stress - band, stress + band, color=blue, alpha=0.25, lw=0)
-    axes.plot(r, stress, color=blue, label=r"restored $\sigma_{zz}$, ±2u")
+    style.draw_band(axes, r, stress - band, stress + band)
+    axes.plot(r, stress, color=COLOURS["deconvolved"], label=r"restored $\sigma_{zz}$, ±2u")
     blurred = restored.blurred_stress(restored.r) / KPA
-    axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.")
-    axes.lines[-1].set_label(r"blurred again, $S_{zz} = G*\sigma_{zz}$")
+    label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
+    axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.", label=label)
     if compared is not None:
         label = "expected"
         if isinstance(compared.stress, Contact):
             friction = compared.stress.friction
-            of = f"friction {friction:.3g}" if friction else "no friction"
-            label = rf"calculated $\sigma_{{zz}}$, {of}"
+            words = f"friction {friction:.3g}" if friction else "no friction"
+            label = rf"calculated $\sigma_{{zz}}$, {words}"
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
-    many = restored.points.u.size > style.SCATTER_THRESHOLD
-    size = 1.2 if many else 0.8 * style.marker_size(restored.points.u.size)
+    count = restored.points.u.size
+    many = count > style.SCATTER_THRESHOLD
     (points,) = axes.plot(restored.distance / MM, restored.measured_stress / KPA, "o")
-    points.set(color=COLOURS["measured"], ms=size, mfc="none", mew=0.6)
+    points.set(color=COLOURS["measured"], mfc="none", mew=0.6)
     points.set(label="scan, blurred stress $S_{zz} = U/A$", rasterized=many)
-    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    points.set_markersize(1.2 if many else 0.8 * style.marker_size(count))
+    style.draw_zero(axes)
     axes.set_xlim(0, max(r[-1], float(restored.distance.max()) / MM))
     axes.set_xlabel(ALONG_RADIUS)
     axes.set_ylabel(r"stress $\sigma_{zz}$ at the base, blurred stress $S_{zz}$ (kPa)")
-    style.legend_above(axes, columns=2, points=restored.points.u.size)
+    style.legend_above(axes, points=count, first=points)
 
 
 def _draw_residuals(axes: Axes, restored: Restoration) -> None:
@@ -123,13 +133,12 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     ordinary = np.abs(z) <= limit
     along = "x" if restored.points.free[0, 0] else "y"
     side = getattr(restored.points, along) / MM
-    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
-    axes.axhline(0.0, color="0.4", lw=0.6)
+    style.draw_residual_band(axes)
     size = style.marker_size(z.size)
-    label = f"scan: rms {float(np.sqrt(np.mean(z**2))):.2f}"
+    label = f"scan: rms {np.sqrt(np.mean(z**2)):.2f}"
     axes.plot(side[ordinary], z[ordinary], "o", color=COLOURS["measured"], ms=size, label=label)
     edge = 0.93 * limit * np.sign(z[~ordinary])
-    axes.plot(side[~ordinary], edge, "^", color=COLOURS["failed"], ms=4, label="_beyond the axis")
+    axes.plot(side[~ordinary], edge, "^", color=COLOURS["failed"], ms=4)
     axes.set_ylim(-limit, limit)
     axes.set(xlabel=f"position ${along}$ (mm)", ylabel="residual / $u$")
     style.legend_above(axes, columns=1)
@@ -148,7 +157,8 @@ def contact_figure(
     contacts: Contact | Sequence[Contact], *, beside: Sequence[Contact] = ()
 ) -> Figure:
     """Draw pressure and shear of one contact or several; of several, load against depth, too."""
-    contacts = [*([contacts] if isinstance(contacts, Contact) else contacts), *beside]
+    first = [contacts] if isinstance(contacts, Contact) else contacts
+    contacts = [*first, *beside]
     if not contacts:
         raise InputError("There is no contact to draw.")
     several = len(contacts) > 1
@@ -157,19 +167,25 @@ def contact_figure(
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
-            depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
-            load = [contact.load for contact in contacts]
-            panels[2].plot(depth, load, color=COLOURS["muted"], lw=0.8)
-            panels[2].scatter(depth, load, c=list(colours), s=14, zorder=3)
-            panels[2].set_ylim(bottom=0)
-            panels[2].set_xlim(left=min(0.0, 1.05 * float(depth.min())))
-            panels[2].set(xlabel="depth (µm)", ylabel="load (N)")
+            _draw_loads(panels[2], contacts, colours)
     return figure
+
+
+def _draw_loads(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
+    depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
+    load = [contact.load for contact in contacts]
+    axes.plot(depth, load, color=COLOURS["muted"], lw=0.8)
+    axes.scatter(depth, load, c=list(colours), s=14, zorder=3)
+    axes.set_ylim(bottom=0)
+    axes.set_xlim(left=min(0.0, 1.05 * float(depth.min())))
+    axes.set(xlabel="depth (µm)", ylabel="load (N)")
 
 
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
     r = np.linspace(0.0, 1.15 * max(contact.contact_radius for contact in contacts), _RADII)
     highest = 0.0
+    stick: dict[str, Any] = {"marker": "o", "ms": 3, "mfc": "none"}
+    slipping = False
     for i, (contact, colour) in enumerate(zip(contacts, colours, strict=True)):
         pressure = contact.interface_pressure(r)
         label = f"{contact.load:.3g} N" if i < _NAMED else None
@@ -182,15 +198,15 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
         highest = max(highest, top)
         axes.plot(contact.contact_radius / MM, 0.0, marker="|", ms=8, mew=1.2, color=colour)
         if 0 < contact.stick_radius < contact.contact_radius:
-            axes.plot(contact.stick_radius / MM, 0.0, "o", ms=3, mfc="none", color=colour)
+            axes.plot(contact.stick_radius / MM, 0.0, color=colour, ls="none", **stick)
+            slipping = True
     axes.set_ylim(top=1.08 * highest / KPA)
     axes.plot([], [], color="0.4", marker="|", ms=8, ls="none", label="contact radius")
-    if any(0 < contact.stick_radius < contact.contact_radius for contact in contacts):
-        label = "stick radius"
-        axes.plot([], [], color="0.4", marker="o", ms=3, mfc="none", ls="none", label=label)
-    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    if slipping:
+        axes.plot([], [], color="0.4", ls="none", label="stick radius", **stick)
+    style.draw_zero(axes)
     axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the interface (kPa)")
-    style.legend_above(axes, columns=2)
+    style.legend_above(axes)
 
 
 def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
@@ -201,6 +217,6 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
         axes.plot(r / MM, contact.base_shear(r) / KPA, color=colour, ls="--")
     axes.plot([], [], color="0.4", label=r"normal, $\sigma_{zz}$")
     axes.plot([], [], color="0.4", ls="--", label=r"shear, outward, $\sigma_{rz}$")
-    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    style.draw_zero(axes)
     axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the base (kPa)")
     style.legend_above(axes, columns=1)

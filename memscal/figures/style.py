@@ -153,7 +153,7 @@ def load_looks(loads: Iterable[float]) -> dict[float, tuple[str, str]]:
             groups[-1].append(load)
         else:
             groups.append([load])
-    looks = {}
+    looks: dict[float, tuple[str, str]] = {}
     for group, colour in zip(groups, shades(len(groups), 0.2), strict=True):
         name = f"{np.mean(group):.3g} N"
         looks |= dict.fromkeys(group, (colour, name))
