@@ -54,7 +54,8 @@ def friction_name(friction: float) -> str:
 
 def friction_colour(friction: float) -> str:
     """Return the colour of a friction coefficient, by its place between 0 and infinity."""
-    return mpl.colors.to_hex(mpl.colormaps["plasma"](0.8 * (1.0 - friction_position(friction))))
+    place = float(friction_position(friction))
+    return mpl.colors.to_hex(mpl.colormaps["plasma"](0.8 * (1.0 - place)))
 
 
 def lubricated_words(lubrication: str) -> str:
@@ -327,5 +328,5 @@ def _legend_of_friction(
         line.set_label(rf"$\mu$ = {friction_name(mu)}")
         handles.append(line)
     title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
-    place = {"loc": "outside upper center", "ncols": len(handles)}
+    place: dict[str, Any] = {"loc": "outside upper center", "ncols": len(handles)}
     figure.legend(handles=handles, title=title, title_fontsize=8, **place)

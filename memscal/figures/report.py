@@ -273,7 +273,7 @@ def _of_comparison(compared: FrictionComparison) -> Report:
         leading=1 + len(compared.loadings),
         pictures=list(_compared_pictures(compared)),
         checks=compared.checks,
-        messages=comparisons.notes(compared),
+        messages=tuple(comparisons.notes(compared)),
         **_measured_on(compared.measured),
     )
 
