@@ -96,10 +96,10 @@ class AngularDepartures:
         r = np.hypot(x[near], y[near])
         angle = np.arctan2(y[near], x[near])
         table = step * np.arange(float(np.ceil(r.max(initial=0.0) / step)) + 4)
-        for i, of_rings in enumerate(self._by_rings(coefficients)):
+        for i, amplitudes in enumerate(self._by_rings(coefficients)):
             m = ORDERS[i // 2]
             turn = (np.cos, np.sin)[i % 2]
-            profiles = rings_of_order(m, table, rings.radius, rings.blur) @ of_rings
+            profiles = rings_of_order(m, table, rings.radius, rings.blur) @ amplitudes
             total[near] += turn(m * angle)[:, None] * CubicSpline(table, profiles)(r)
         return total
 
@@ -107,14 +107,12 @@ class AngularDepartures:
         self, model: ForwardModel, centres: FloatArray, coefficients: FloatArray
     ) -> FloatArray:
         """Voltages of combinations (count, c) at the points, for centres in m: (n, c), in V."""
-        count = coefficients.shape[1]
         parts = self._by_rings(coefficients)
-        total: FloatArray = np.zeros((model.points.u.size, count))
+        total: FloatArray = np.zeros((model.points.u.size, coefficients.shape[1]))
         for i, m in enumerate(ORDERS):
             rings = self.rings.transform(m, model.k)
-            cosines, sines = (rings @ part for part in parts[2 * i : 2 * i + 2])
-            both = model.around(m, cosines, sines, centres)
-            total += both[:, :count] + both[:, count:]
+            both = model.around(m, rings @ parts[2 * i], rings @ parts[2 * i + 1], centres)
+            total += np.add(*np.hsplit(both, 2))
         return total
 
     def _by_rings(self, coefficients: FloatArray) -> list[FloatArray]:
@@ -142,25 +140,32 @@ def angular_departures(
     """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
     # ``columns``, standardised: data (n,), of the fit's parameters, of all radial departures and
     # of the rings, (n, p).
-    data, flat, radial, of_rings = (values / noise for values in columns)
-    radius = rings.radius
+    data, flat, radial, by_rings = (values / noise for values in columns)
     width = rings.blur / _BLUR
     size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
-    plain = np.repeat([np.diag(size * a) for a in _unit_amplitudes(radius, width)], 2, axis=0)
+    units = _unit_amplitudes(rings.radius, width)
     # Shifts of all scans along x and y, then the ellipse along x and along the diagonals.
     axis = np.nonzero(fit.points.free)[1]
     shifts = flat[:, 2 : 2 + axis.size] @ np.eye(2)[axis]
-    moved = [*shifts.T, *flat[:, -2:].T]
-    blocks = [b @ a for b, a in zip(np.split(of_rings, len(plain), axis=1), plain, strict=True)]
-    kept = [np.linalg.svd((c @ b)[None, :])[2][1:].T for c, b in zip(moved, blocks, strict=False)]
-    kept += [np.eye(radius.size)] * (len(blocks) - len(kept))
+    parameters = [*shifts.T, *flat[:, -2:].T]
+    amplitudes = []
+    voltages = []
+    for i, block in enumerate(np.split(by_rings, 2 * len(ORDERS), axis=1)):
+        kernels = np.diag(size * units[i // 2])
+        if i < len(parameters):
+            # All combinations that the scan can tell from that parameter.
+            alike = parameters[i] @ (block @ kernels)
+            kernels = kernels @ np.linalg.svd(alike[None])[2][1:].T
+        amplitudes.append(kernels)
+        voltages.append(block @ kernels)
     left, singular, _ = np.linalg.svd(np.hstack([flat, radial]), full_matrices=False)
     base = left[:, singular > _RESOLVED]
-    free = np.hstack([block @ keep for block, keep in zip(blocks, kept, strict=True)])
-    data, free = (values - base @ (base.T @ values) for values in (data, free))
-    strengths = np.repeat(_expected_strengths(free, data, [keep.shape[1] for keep in kept]), 2)
-    parts = zip(strengths, plain, kept, strict=True)
-    return AngularDepartures(rings, tuple(s * (each @ keep) for s, each, keep in parts))
+    free = np.hstack(voltages)
+    free -= base @ (base.T @ free)
+    data -= base @ (base.T @ data)
+    strengths = _expected_strengths(free, data, [kernels.shape[1] for kernels in amplitudes])
+    sizes = zip(np.repeat(strengths, 2), amplitudes, strict=True)
+    return AngularDepartures(rings, tuple(strength * kernels for strength, kernels in sizes))
 
 
 def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
@@ -175,16 +180,16 @@ def _unit_amplitudes(radius: FloatArray, width: float) -> list[FloatArray]:
 
 def _expected_strengths(columns: FloatArray, data: FloatArray, counts: list[int]) -> FloatArray:
     """Root mean square of each order's strength over its posterior, given the others'."""
-    # Beside an ellipse orders mix: its shift has one of 1 and one of 3.
+    # With an ellipse orders mix: its shift has one of 1 and one of 3.
     square = columns.T @ columns
-    along = columns.T @ data
+    product = columns.T @ data
     order = np.repeat(np.arange(len(counts)) // 2, counts)
     strengths = np.full(len(ORDERS), _FIRST)
 
     def log_marginal(trial: FloatArray) -> float:
         size = trial[order]
         root = np.linalg.cholesky(np.eye(size.size) + np.outer(size, size) * square)
-        explained = np.linalg.solve(root, size * along)
+        explained = np.linalg.solve(root, size * product)
         return float(0.5 * explained @ explained - np.log(np.diag(root)).sum())
 
     for _ in range(_SWEEPS):

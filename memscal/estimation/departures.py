@@ -75,10 +75,15 @@ class Shape:
 
 #: Edges (a disc, a plateau), a core (a ring, a spike), and tails.
 SHAPES = (
-    *(Shape("edge", 0.65, extent) for extent in (0.8, 1.2)),
-    *(Shape("rough edge", blur, extent) for blur in (0.4, 0.5) for extent in (0.8, 1.2)),
+    Shape("edge", 0.65, 0.8),
+    Shape("edge", 0.65, 1.2),
+    Shape("rough edge", 0.4, 0.8),
+    Shape("rough edge", 0.4, 1.2),
+    Shape("rough edge", 0.5, 0.8),
+    Shape("rough edge", 0.5, 1.2),
     Shape("core", 0.3, 2.0, scales=True),
-    *(Shape("tail", 0.85, extent) for extent in (1.8, 3.0)),
+    Shape("tail", 0.85, 1.8),
+    Shape("tail", 0.85, 3.0),
 )
 
 
@@ -129,7 +134,7 @@ def _sensors(
     width: FloatArray,
     place: FloatArray,
     side: Side,
-    offset: FloatArray | float = 0.0,
+    offset: float = 0.0,
 ) -> FloatArray:
     """G of families for widths (m,), the shares off by some of their spreads: (place, m)."""
     share, spread, ratio = np.array([[f.share, f.spread, f.ratio] for f in families]).T
@@ -137,13 +142,12 @@ def _sensors(
     disc = ratio == 0
     x = place[:, None]
     columns = np.empty((place.size, width.size))
-    w = width[disc]
-    f = share[disc]
-    columns[:, disc] = side.disc(x, 2 * w * np.sqrt(f), w * np.sqrt(1 - f))
-    w = width[~disc]
-    f = share[~disc]
-    second = (ratio * width)[~disc]
-    columns[:, ~disc] = (1 - f) * side.gaussian(x, w) + f * side.gaussian(x, second)
+    core = width[disc]
+    radius = 2 * core * np.sqrt(share[disc])
+    columns[:, disc] = side.disc(x, radius, core * np.sqrt(1 - share[disc]))
+    first = side.gaussian(x, width[~disc])
+    second = side.gaussian(x, (ratio * width)[~disc])
+    columns[:, ~disc] = (1 - share[~disc]) * first + share[~disc] * second
     return columns
 
 
@@ -182,9 +186,10 @@ class ReducedScan:
         """Reduce a scan with weights (n,), with angular rings or without."""
         points = model.points
         count = fit.jacobian.shape[1]
-        beside = [(points.u - fit.predicted)[:, None], fit.jacobian]
-        beside += [rings.signal(model, fit.centre)] if rings else []
-        columns, mix = model.framed(fit.geometry, beside)
+        first = [(points.u - fit.predicted)[:, None], fit.jacobian]
+        if rings:
+            first.append(rings.signal(model, fit.centre))
+        columns, mix = model.framed(fit.geometry, first)
         columns = points.standardise(columns, weights)
         right = None
         last = columns.shape[1]
@@ -267,9 +272,8 @@ class DepartureBasis:
         count = fit.jacobian.shape[1]
         volts = fit.jacobian @ coefficients[:count]
         if self.angular:
-            theirs = coefficients[count : self.flat]
-            around = self.angular.signal(model, fit.centre, theirs.reshape(len(theirs), -1))
-            volts += around.reshape(volts.shape)
+            angular = coefficients[count : self.flat].reshape(self.flat - count, -1)
+            volts += self.angular.signal(model, fit.centre, angular).reshape(volts.shape)
         kernels = self.kernels(model.k)[:, self.flat :]
         return volts + model.signal(fit.geometry, kernels @ coefficients[self.flat :])
 
@@ -289,15 +293,13 @@ class DepartureBasis:
             if len(self._tables) == _KEPT:
                 self._tables.clear()
             # The first two are by A and width; parameters that move no kernel hold zeros.
-            table = np.zeros((place.size, self.blocks[-1].stop if self.blocks else self.flat))
-            table[:, 0], table[:, 1] = self._sensor(place, side)
-            first = self.flat
+            gaussian, slope = self._sensor(place, side)
+            parts = [gaussian[:, None], slope[:, None], np.zeros((place.size, self.flat - 2))]
             if self.rings:
-                rings = Rings.joined(self.rings)
-                table[:, first : first + rings.radius.size] = side.rings(rings, place)
-                first += rings.radius.size
+                parts.append(side.rings(Rings.joined(self.rings), place))
             if self.families:
-                table[:, first:] = self._families(table[:, :1], place, side)
+                parts.append(self._families(gaussian[:, None], place, side))
+            table = np.hstack(parts)
             table.flags.writeable = False
             self._tables[key] = table
         return self._tables[key]
@@ -309,14 +311,12 @@ class DepartureBasis:
 
     def _families(self, gaussian: FloatArray, place: FloatArray, side: Side) -> FloatArray:
         """Three columns of each: less the Gaussian; changes by ln(width), the share's spread."""
-        families, a, widths = zip(
-            *((fit.family, fit.conversion_constant, fit.width) for fit in self.families),
-            strict=True,
-        )
-        width = np.outer([1, 1 + _RELATIVE_STEP, 1], widths).ravel()
-        offset = np.repeat([0.0, 0.0, -1.0], len(a))
-        values = _sensors(3 * families, width, place, side, offset)
-        sensor, wider, less = np.moveaxis(values.reshape(place.size, 3, -1), 1, 0) * np.array(a)
+        families = [fit.family for fit in self.families]
+        widths = np.array([fit.width for fit in self.families])
+        a = np.array([fit.conversion_constant for fit in self.families])
+        sensor = a * _sensors(families, widths, place, side)
+        wider = a * _sensors(families, (1 + _RELATIVE_STEP) * widths, place, side)
+        less = a * _sensors(families, widths, place, side, offset=-1.0)
         change = (wider - sensor) / _RELATIVE_STEP
         columns = [sensor - self.conversion_constant * gaussian, change, sensor - less]
         return np.stack(columns, axis=2).reshape(place.size, -1)
@@ -357,13 +357,15 @@ def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
 
     gaussian = fit.conversion_constant * kernels.gaussian_transfer(k, fit.sigma)
     data = free(reduced.data + reduced.signal(gaussian))
-    widths, amplitudes = np.full((2, len(FAMILIES)), start)
+    widths = np.full(len(FAMILIES), start)
     for _ in range(_FAMILY_ROUNDS):
-        both = _sensors(2 * FAMILIES, np.append(widths, (1 + step) * widths), k, _TRANSFORMS)
-        signal, wider = np.hsplit(free(reduced.signal(both)), 2)
+        signal = free(reduced.signal(_sensors(FAMILIES, widths, k, _TRANSFORMS)))
+        wider = free(reduced.signal(_sensors(FAMILIES, (1 + step) * widths, k, _TRANSFORMS)))
         # Least squares in A and A d ln(width), of all families at once.
         slope = (wider - signal) / step
-        a, b, c = (np.sum(x, axis=0) for x in (signal**2, signal * slope, slope**2))
+        a = np.sum(signal**2, axis=0)
+        b = np.sum(signal * slope, axis=0)
+        c = np.sum(slope**2, axis=0)
         determinant = a * c - b**2
         amplitudes = (c * (data @ signal) - b * (data @ slope)) / determinant
         growth = (a * (data @ slope) - b * (data @ signal)) / determinant / amplitudes
