@@ -144,8 +144,8 @@ class ScanPoints:
     @cached_property
     def places(self) -> tuple[Places, ...]:
         """The places of each scan's points."""
-        chosen = [self.scan == scan for scan in range(self.scans)]
-        return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in chosen)
+        inside = [self.scan == scan for scan in range(self.scans)]
+        return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in inside)
 
     def of_places(self, name: str) -> IndexArray:
         """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
@@ -185,8 +185,7 @@ class ScanPoints:
 
     def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
-        root = np.sqrt(weights)
-        scaled = values * (root if values.ndim == 1 else root[:, None])
+        scaled = (values.T * np.sqrt(weights)).T
         return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
@@ -216,8 +215,6 @@ class ScanPoints:
 def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     """Flatten a scan to the measured points of one channel."""
     u, errors = channel_signal(scan, channel)
-    load = np.full(u.shape, scan.stated_load) if scan.normal_load is None else scan.normal_load
-    x, y = scan.positions
     keep = measured_mask(scan, channel)
     if not keep.any():
         problem = f"Every point of u_{channel} is missing (NaN)."
@@ -228,13 +225,19 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         why = "A point without noise would outweigh every other point."
         cure = "Give the electronic noise, or leave it out to have it estimated."
         raise InputError(problem, why=why, cure=cure)
-    arrays = {"x": x, "y": y, "u": u, "load": load, "repeat": scan.passes}
-    arrays["x_errors"] = np.broadcast_to(0.0 if scan.x_errors is None else scan.x_errors, u.shape)
-    arrays["branch"] = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
-    columns: dict[str, Any] = {name: values[keep] for name, values in arrays.items()}
+    x, y = scan.positions
+    load = scan.stated_load if scan.normal_load is None else scan.normal_load
+    x_errors = 0.0 if scan.x_errors is None else scan.x_errors
+    branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     points = ScanPoints(
-        **columns,
+        x=x[keep],
+        y=y[keep],
+        u=u[keep],
+        load=np.broadcast_to(load, u.shape)[keep],
         u_errors=None if errors is None else errors[keep],
+        x_errors=np.broadcast_to(x_errors, u.shape)[keep],
+        repeat=scan.passes[keep],
+        branch=branch[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
         missing=int(u.size - keep.sum()),
@@ -297,14 +300,14 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
             if not groups or load > (1 + _SAME_LOAD) * groups[-1][0][0]:
                 groups.append([])
             groups[-1].append((load, number))
-        if len(groups) < 2:
-            split.append(scan)
-        for group in groups if len(groups) > 1 else ():
-            part = scan.only_passes(sorted(number for _, number in group))
+        parts = []
+        for group in groups if len(groups) > 1 else []:
             load = float(np.mean([load for load, _ in group]))
             u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
-            split.append(replace(part, load=load, load_uncertainty=u))
-        owners += [i] * (len(split) - len(owners))
+            part = scan.only_passes(sorted(number for _, number in group))
+            parts.append(replace(part, load=load, load_uncertainty=u))
+        split += parts or [scan]
+        owners += [i] * max(len(parts), 1)
     return split, tuple(owners)
 
 
@@ -333,13 +336,15 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
         problem = "Some of the scans state their noise (u_zz_errors) and others do not."
         cure = "State it in every scan, or leave it out of every one."
         raise InputError(problem, why="It determines their relative weights.", cure=cure)
-    first_repeat = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans[:-1])])
-    repeats = [points.repeat + first for points, first in zip(scans, first_repeat, strict=True)]
-    numbers = [np.full(points.u.size, i, dtype=np.intp) for i, points in enumerate(scans)]
-    columns: dict[str, Any] = {
-        name: np.concatenate([getattr(points, name) for points in scans])
-        for name in ("x", "y", "u", "load", "x_errors", "branch", "free")
-    }
+    repeats = []
+    numbers = []
+    first = 0
+    for number, points in enumerate(scans):
+        repeats.append(points.repeat + first)
+        numbers.append(np.full_like(points.scan, number))
+        first += int(points.repeat.max()) + 1
+    names = ("x", "y", "u", "load", "x_errors", "branch", "free")
+    columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     return ScanPoints(
         **columns,
         u_errors=np.concatenate(stated) if stated else None,
@@ -368,16 +373,17 @@ def _decorrelation(scan: Scan, keep: BoolArray) -> Decorrelation | None:
     """Cholesky factors of the correlation of all kept points, repeat by repeat."""
     if scan.u_zz_correlation is None:
         return None
-    size = len(scan.u_zz_correlation)
     blocks = []
     first = 0
     roots: dict[bytes, FloatArray] = {}
-    for measured in keep.reshape(-1, size):
+    for measured in keep.reshape(-1, len(scan.u_zz_correlation)):
         kept = np.flatnonzero(measured)
-        if (key := measured.tobytes()) not in roots and kept.size:
+        if not kept.size:
+            continue
+        key = measured.tobytes()
+        if key not in roots:
             roots[key] = root_of(of_points(scan.u_zz_correlation, kept))
-        if kept.size:
-            blocks.append((np.arange(first, first + kept.size), roots[key]))
+        blocks.append((np.arange(first, first + kept.size), roots[key]))
         first += kept.size
     return Decorrelation(tuple(blocks))
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -47,9 +48,10 @@ def expected_spectra(
     for scan, stress, reference in zip(scans, stresses, references, strict=True):
         film = scan.film
         made_on = film_of(stress)
-        stated = film is not None and made_on is not None and film.expected != film
-        if stated and film and made_on and film.poisson_ratio == made_on.poisson_ratio:
-            change = _difference(scan.set_up, reference, (scan.set_up.expected, scan.set_up))
+        same_ratio = film and made_on and film.poisson_ratio == made_on.poisson_ratio
+        if film and same_ratio and film.expected != film:
+            set_up = scan.set_up
+            change = _difference(set_up, reference, set_up.expected, set_up)
             reference = replace(reference, values=reference.values + change)
         moved.append(reference)
     return tuple(moved)
@@ -63,9 +65,9 @@ def reference_spectra(
     """Transforms of the references per newton, on common nodes that serve every distance."""
     pairs = list(zip(references, data, strict=True))
     if wavenumbers is None:
-        last = max(_last_wavenumber(*pair) for pair in pairs)
+        last = max(_last_wavenumber(stress, points) for stress, points in pairs)
         # Fields are lifted to squares that reach one span from the centre, to their corners.
-        wavenumbers = Wavenumbers.covering(last, 1.5 * max(map(_span, data)))
+        wavenumbers = Wavenumbers.covering(last, 1.5 * max(_span(points) for points in data))
     return tuple(_spectrum(stress, wavenumbers, points) for stress, points in pairs)
 
 
@@ -101,8 +103,8 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     passed = _PASSED if form is None else 0.75 * _PASSED
     k = np.linspace(0.0, passed / points.step, _WAVENUMBERS)[1:]
     values = form.transform(k) if form else hankel_transform(reference.r, reference.sigma_zz, k)
-    values = np.abs(values)
-    return float(k[values > _NOTHING * values.max()][-1])
+    size = np.abs(values)
+    return float(k[size > _NOTHING * size.max()][-1])
 
 
 def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
@@ -121,7 +123,7 @@ def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -
     _require_coverage(reference, stress, span)
     values = hankel_transform(reference.r, stress, k, order=order) / reference.load
     # Most of a shear, whatever the film, holds the film back.
-    if order and values[int(np.argmax(np.abs(values)))] > 0:
+    if order and values[np.argmax(np.abs(values))] > 0:
         raise InputError(
             "The shear of the reference pulls the film outward.",
             why="sigma_rz is the traction of the base on the film, positive outward: a film that "
@@ -155,7 +157,7 @@ def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
 
 def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -> None:
     needed = span / 2
-    tail = abs(float(stress[-1])) / float(np.abs(stress).max())
+    tail = abs(stress[-1]) / np.abs(stress).max()
     if profile.r[-1] < needed and tail > _DECAYED:
         raise InputError(
             f"The reference ends at r = {profile.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
@@ -163,29 +165,27 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
             why="The stress beyond the table would be missing from every distant point.",
             cure="Extend the reference to where it has decayed, or leave it out to compute it.",
         )
-    first = profile.r[0]
-    if first > 0.1 * needed:
+    if profile.r[0] > 0.1 * needed:
         why = "The stress on the axis, its largest, is missing."
         cure = "Give the reference from r = 0 outward."
-        raise InputError(f"The reference begins at r = {first * 1e3:.4g} mm.", why=why, cure=cure)
+        problem = f"The reference begins at r = {profile.r[0] * 1e3:.4g} mm."
+        raise InputError(problem, why=why, cure=cure)
 
 
 def reference_sensitivities(
     scans: Sequence[Scan], references: Sequence[RadialSpectrum]
 ) -> dict[str, list[FloatArray]]:
     """Change of each scan's transform by one standard uncertainty of each input, by its name."""
-    # Scans share the error of a common film or rod, and that of the film's law.
     changes: dict[str, list[FloatArray]] = {}
-    of_inputs = film_sensitivities, rod_sensitivities, law_sensitivities
-    inputs = zip(of_inputs, ("film", "indenter", "law"), strict=True)
-    todo = [(function, of, i) for function, of in inputs for i in range(len(scans))]
-    found = (f(scans[i].set_up, references[i]) if scans[i].film else {} for f, _, i in todo)
-    done = counted(found, "uncertain inputs", len(todo))
-    for (_, of, i), by_source in zip(todo, done, strict=True):
-        owners = [getattr(scan, of, None) for scan in scans]
+    todo = list(product(_SENSITIVITIES, range(len(scans))))
+    for owner, i in counted(todo, "uncertain inputs", len(todo)):
+        if scans[i].film is None:
+            continue
+        # Scans share the error of a common film or rod, and that of the film's law.
+        owners = [getattr(scan, owner, None) for scan in scans]
         number = list(dict.fromkeys(owners)).index(owners[i])
         suffix = f"_{number + 1}" if number else ""
-        for source, change in by_source.items():
+        for source, change in _SENSITIVITIES[owner](scans[i].set_up, references[i]).items():
             blank = [np.zeros_like(change) for _ in scans]
             changes.setdefault(source + suffix, blank)[i] = change
     return changes
@@ -202,22 +202,26 @@ def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str,
         changes["young_modulus"] = np.zeros_like(reference.values)
     # At a given load the modulus does not change the stress in a linear film.
     names = ["thickness", "poisson_ratio"]
-    for name in names if film.law in ("", LINEAR) else ["young_modulus", *names]:
-        if ends := more_and_less(film, name):
-            *films, share = ends
-            varied = [set_up._replace(film=film) for film in films]
-            changes[name] = share * _difference(set_up, reference, varied)
+    if film.law not in ("", LINEAR):
+        names.append("young_modulus")
+    for name in names:
+        ends = more_and_less(film, name)
+        if ends:
+            more, less, share = ends
+            varied = (set_up._replace(film=more), set_up._replace(film=less))
+            changes[name] = share * _difference(set_up, reference, *varied)
     return changes
 
 
 def rod_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of the rod's radius."""
     rod = set_up.indenter
-    if not (u := rod.radius_uncertainty):
+    u = rod.radius_uncertainty
+    if not u:
         return {}
-    radii = (rod.radius + u, max(rod.radius - u, rod.radius / 2))
-    varied = [set_up._replace(indenter=replace(rod, radius=radius)) for radius in radii]
-    return {"rod_radius": _difference(set_up, reference, varied) / 2}
+    more = set_up._replace(indenter=replace(rod, radius=rod.radius + u))
+    less = set_up._replace(indenter=replace(rod, radius=max(rod.radius - u, rod.radius / 2)))
+    return {"rod_radius": _difference(set_up, reference, more, less) / 2}
 
 
 def load_sensitivities(
@@ -229,9 +233,9 @@ def load_sensitivities(
     for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
         if scan.film and scan.film.law not in ("", LINEAR) and scan.load_uncertainty:
             set_up = scan.set_up.expected
-            u = scan.load_uncertainty
-            varied = [set_up._replace(load=load) for load in (set_up.load + u, set_up.load - u)]
-            changes[i] = _difference(set_up, reference, varied) / 2
+            more = set_up._replace(load=set_up.load + scan.load_uncertainty)
+            less = set_up._replace(load=set_up.load - scan.load_uncertainty)
+            changes[i] = _difference(set_up, reference, more, less) / 2
     return changes
 
 
@@ -250,30 +254,38 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
     film, rod, load, friction = set_up
     if film.law == LINEAR or (film.law and friction is not None):
         return {}
-    k = reference.wavenumbers.k.tobytes()
-    order = reference.order
     rubber = set_up.under(NEO_HOOKEAN).film
     end = load
     if film.law and isinstance(rod, Rod):
         # A film that slides is drawn out from under the rod, and is not solved to any depth.
         end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False)) or load
     try:
-        if not film.law:
-            pair = press_neo_hookean(set_up), press_rod(film, rod, load)
+        if film.law:
+            first = press_rod(rubber, rod, end, math.inf)
+            second = press_rod(rubber, rod, end, 0.0)
         else:
-            pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)
+            first = press_neo_hookean(set_up)
+            second = press_rod(film, rod, load)
     except (ConvergenceError, DomainError):
         return {}
-    change = np.subtract(*(_base_spectrum(c, k, order) / c.load for c in pair))
+    k = reference.wavenumbers.k.tobytes()
+    upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
     source = "rod_friction" if film.law else "model_form"
-    return {source: RECTANGLE * change * load / pair[0].load}
+    return {source: RECTANGLE * (upper - lower) * load / first.load}
 
 
-def _difference(set_up: SetUp, reference: RadialSpectrum, varied: Sequence[SetUp]) -> FloatArray:
+#: Whose error each is: scans of one film share that of the film.
+_SENSITIVITIES = {
+    "film": film_sensitivities,
+    "indenter": rod_sensitivities,
+    "law": law_sensitivities,
+}
+
+
+def _difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     k = reference.wavenumbers.k.tobytes()
-    order = reference.order
-    return reference.values * _relative_difference(set_up, *varied, k, order)
+    return reference.values * _relative_difference(set_up, more, less, k, reference.order)
 
 
 @lru_cache(maxsize=256)
@@ -283,7 +295,8 @@ def _relative_difference(
     """Difference of two rods per newton over the scan's own, kept for scans of other voltages."""
     law = law_at_once(set_up)
     upper, lower, own = (
-        _rod_at(nodes, rod, law, order) / (rod.load / set_up.load) for rod in (more, less, set_up)
+        _base_spectrum(press_rod(*rod.under(law)), nodes, order) / (rod.load / set_up.load)
+        for rod in (more, less, set_up)
     )
     return relative(upper - lower, own)
 
@@ -303,8 +316,5 @@ def law_at_once(set_up: SetUp) -> str:
 
 def rod_spectrum(set_up: SetUp, reference: RadialSpectrum, law: str) -> FloatArray:
     """Transform of the base stress of a rod, by a law, at the nodes of a reference (N)."""
-    return _rod_at(reference.wavenumbers.k.tobytes(), set_up, law, reference.order)
-
-
-def _rod_at(nodes: bytes, set_up: SetUp, law: str, order: int) -> FloatArray:
-    return _base_spectrum(press_rod(*set_up.under(law)), nodes, order)
+    nodes = reference.wavenumbers.k.tobytes()
+    return _base_spectrum(press_rod(*set_up.under(law)), nodes, reference.order)

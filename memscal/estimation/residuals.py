@@ -60,29 +60,29 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     u = points.u
     if clip_outliers:
         most = _CLIPPED * estimate.noise
-        u = np.where(ordinary, u, estimate.predicted + np.clip(u - estimate.predicted, -most, most))
+        clipped = estimate.predicted + np.clip(u - estimate.predicted, -most, most)
+        u = np.where(ordinary, u, clipped)
         ordinary = np.ones_like(ordinary)
     weights = np.where(ordinary, weights, estimate.weights)
     point = np.flatnonzero(ordinary)
     fit = estimate.gaussian
     model = estimate.model
     kernels = basis.kernels(model.k)[:, basis.flat :]
-    unexplained = (u - fit.predicted)[:, None]
-    beside = [unexplained, fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)]
+    scaled = fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)
+    first = [(u - fit.predicted)[:, None], scaled]
     if basis.angular:
-        around = basis.angular.rings.signal(model, fit.centre)
-        beside.append(basis.angular.combined(around))
-    columns, mix = model.framed(fit.geometry, beside)
-    last = columns.shape[1] - (0 if mix is None else len(mix))
+        first.append(basis.angular.combined(basis.angular.rings.signal(model, fit.centre)))
+    columns, mix = model.framed(fit.geometry, first)
     columns = points.standardise(columns, weights)
-    q = None
     columns[~ordinary] = 0.0
     data = columns[point, 0]
+    q = None
     if mix is None:
         flat = columns[point, 1:]
         rings = points.standardised(model.signal(fit.geometry, kernels), weights)[point]
     else:
         q, columns = orthonormalised(columns)
+        last = columns.shape[1] - len(mix)
         flat = columns[:, 1:last]
         rings = columns[:, last:] @ (mix @ kernels)
     # Angular departures are no parameters: what of them stands above the noise counts.
@@ -148,12 +148,14 @@ class Residuals:
         # is then nearest to their own residuals.  Of very many, they are among some.
         count = self.values.size
         some = evenly(np.arange(count), _CANDIDATES)
-        dropped = some[qr(self.basis[some].T, mode="r", pivoting=True)[1][: self.basis.shape[1]]]
+        pivots = qr(self.basis[some].T, mode="r", pivoting=True)[1]
+        dropped = some[pivots[: self.basis.shape[1]]]
         rest = np.delete(np.arange(count), dropped)
         # The symmetric inverse root of 1 - QQ' for the rows that are left of Q, by Q'Q of others.
-        shares, vectors = np.linalg.eigh(self.basis[dropped].T @ self.basis[dropped])
+        lost = self.basis[dropped]
+        shares, vectors = np.linalg.eigh(lost.T @ lost)
         root = np.sqrt(np.maximum(shares, np.finfo(float).eps))
-        along = self.basis.T @ self.values - self.basis[dropped].T @ self.values[dropped]
+        along = self.basis.T @ self.values - lost.T @ self.values[dropped]
         growth = vectors @ ((vectors.T @ along) / (root * (1 + root)))
         return (self.values + self.basis @ growth)[rest], rest
 
@@ -166,11 +168,8 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     along = np.where(runs_along_x, points.x, points.y)
     across = np.where(runs_along_x, points.of_places("row"), 0)
     order = np.lexsort((along, across, points.repeat, points.scan))
-    keys = np.stack([points.scan, points.repeat, across])[:, order]
-    new = np.any(np.diff(keys, axis=1, prepend=keys[:, :1]) != 0, axis=0)
     place = np.argsort(order)
-    sequence = np.empty_like(order)
-    sequence[order] = np.cumsum(new)
+    sequence = grouped(across, points.repeat, points.scan)
     order = np.argsort(place[model.point])
     point = model.point[order]
     basis = orthonormal(model.design[order])
@@ -193,8 +192,8 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     # leaves m degrees of pure error; the means take l.  This is exact also where repeats lie only
     # near each other (Christensen, Ann. Stat. 17, 1989): the design contains their difference.
     points = estimate.points
-    place = points.scan, points.of_places("index"), points.load
-    group = grouped(*(values[model.point] for values in place))
+    keys = (points.scan, points.of_places("index"), points.load)
+    group = grouped(*(key[model.point] for key in keys))
     if points.decorrelation is not None or group.max() + 1 == group.size:
         return None
     weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.point]
@@ -209,9 +208,10 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     left_over = model.data - basis @ (basis.T @ model.data)
     moved = within(basis)
     _, singular, right = np.linalg.svd(triangular(moved), full_matrices=False)
-    near = moved @ (right[singular > _APART].T / singular[singular > _APART])
+    apart = singular > _APART
+    near = moved @ (right[apart].T / singular[apart])
     scatter = within(model.data[:, None])[:, 0]
-    scatter = scatter - near @ (near.T @ scatter)
+    scatter -= near @ (near.T @ scatter)
     pure = float(scatter @ scatter)
     pure_degrees = group.size - int(group.max()) - 1 - near.shape[1]
     misfit = max(float(left_over @ left_over) - pure, 0.0)
@@ -264,13 +264,13 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
 
 def _neighbours(residuals: Residuals) -> list[FloatArray]:
     """Weights of the pairs of residuals that follow each other in one pass, by their distance."""
-    sequence = residuals.sequence
-    n = residuals.place.size
     place = residuals.place
-    apart = range(1, min(_FARTHEST, n - 1) + 1)
-    return [
-        0.5 * _DECAY ** (place[i:] - place[:-i]) * (sequence[i:] == sequence[:-i]) for i in apart
-    ]
+    sequence = residuals.sequence
+    pairs = []
+    for i in range(1, min(_FARTHEST, place.size - 1) + 1):
+        weights = 0.5 * _DECAY ** (place[i:] - place[:-i])
+        pairs.append(weights * (sequence[i:] == sequence[:-i]))
+    return pairs
 
 
 def _weighted(pairs: list[FloatArray], values: FloatArray) -> FloatArray:
@@ -284,12 +284,12 @@ def _weighted(pairs: list[FloatArray], values: FloatArray) -> FloatArray:
 
 def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, float]:
     """Traces of the first three powers of (1 - QQ') W, for a W without diagonal."""
-    squared = 2 * sum(float(weights @ weights) for weights in pairs)
+    squared = 2 * sum(weights @ weights for weights in pairs)
     cubed = 0.0
     for i, first in enumerate(pairs, start=1):
         for j, second in enumerate(pairs[: len(pairs) - i], start=1):
             both = pairs[i + j - 1]
-            cubed += 6 * float(np.sum(first[: both.size] * second[i : i + both.size] * both))
+            cubed += 6 * np.sum(first[: both.size] * second[i : i + both.size] * both)
     # Q'WQ, Q'W^2 Q and Q'W^3 Q, some columns at a time.
     products = np.zeros((3, basis.shape[1], basis.shape[1]))
     for start in range(0, basis.shape[1], _COLUMNS):
@@ -298,17 +298,10 @@ def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, f
         for product in products:
             moved = _weighted(pairs, moved)
             product[some] = moved @ basis
-    within, second, third = products
-    return (
-        float(-np.trace(within)),
-        float(squared - 2 * np.trace(second) + np.trace(within @ within)),
-        float(
-            cubed
-            - 3 * np.trace(third)
-            + 3 * np.sum(within * second)
-            - np.trace(within @ within @ within)
-        ),
-    )
+    first, second, third = products
+    squared += np.sum(first * first.T) - 2 * np.trace(second)
+    cubed += 3 * np.sum(first * second) - 3 * np.trace(third) - np.trace(first @ first @ first)
+    return float(-np.trace(first)), float(squared), float(cubed)
 
 
 def grouped(*keys: NDArray[Any]) -> IndexArray:

@@ -73,7 +73,8 @@ def require_one_kind(
     """Refuse references that no one conversion constant belongs to."""
     forms = [reference and reference.form for reference in references]
     kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
-    if len(kinds) > 1 or any(map(is_source, alternatives)) or (kinds != {None} and alternatives):
+    sources = kinds != {None}
+    if len(kinds) > 1 or (sources and alternatives) or any(map(is_source, alternatives)):
         raise InputError(
             "Sources and stresses, slits and other sources, or sources of several units are mixed.",
             why="One conversion constant has one unit; an alternative is of a film's stress.",
@@ -130,10 +131,12 @@ def require_same_set_up(
     # alternative may have another law and friction, which it is given for.
     given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
     differences: list[str] = []
-    for kind, stresses in (("reference", given), ("alternative", alternatives)):
-        for scan, stress in zip(scans, stresses, strict=False):
-            if stress is not None and not (kind == "reference" and is_source(stress)):
-                differences += _other_set_up(scan, stress, kind)
+    for scan, stress in zip(scans, given, strict=True):
+        if stress is not None and not is_source(stress):
+            differences += _other_set_up(scan, stress, "reference")
+    for scan, stress in zip(scans, alternatives, strict=False):
+        if stress is not None:
+            differences += _other_set_up(scan, stress, "alternative")
     cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
     cure += "value that is wrong."
     if any(text.startswith("load") for text in differences):
@@ -152,7 +155,7 @@ def require_same_set_up(
 def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
     """Return in words what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
-    places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
+    places = (file_in_words(scan.source, "scan"), file_in_words(source, kind))
     film = film_of(stress)
     law = "" if film is None else film.law
     names = ["thickness", "poisson_ratio"]

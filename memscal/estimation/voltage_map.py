@@ -67,9 +67,9 @@ class VoltageMap:
 
     def __matmul__(self, values: FloatArray) -> FloatArray:
         """Changes (m,) or (m, q) of the numbers for changes (n,) or (n, q) of the voltages."""
-        terms = [
-            left @ (values if right is None else _gram(right, values)) for left, right in self.parts
-        ]
+        terms = []
+        for left, right in self.parts:
+            terms.append(left @ (values if right is None else _gram(right, values)))
         return np.asarray(sum(terms))
 
     def __rmatmul__(self, rows: FloatArray) -> VoltageMap:
@@ -78,8 +78,7 @@ class VoltageMap:
 
     def __mul__(self, factors: float | FloatArray) -> VoltageMap:
         """Multiply all numbers by one factor, or each by its own, (m,)."""
-        scale: Any = factors if np.ndim(factors) == 0 else np.asarray(factors)[:, None]
-        return VoltageMap(tuple((left * scale, right) for left, right in self.parts))
+        return VoltageMap(tuple(((left.T * factors).T, right) for left, right in self.parts))
 
     def __add__(self, other: VoltageMap) -> VoltageMap:
         """Add two maps to the same numbers."""
@@ -112,17 +111,20 @@ class VoltageMap:
 
     def covariance(self, noise: FloatArray, factor: Decorrelation | None = None) -> FloatArray:
         """Covariance (m, m) of the numbers, for voltages of a noise (n,) and its correlation."""
-        tall = [(left, np.eye(left.shape[1]) if r is None else r) for left, r in self.parts]
-        if factor is not None:
-            dense = (r if isinstance(r, np.ndarray) else r.toarray() for _, r in tall)
-            moved = (factor.correlate_adjoint(noise[:, None] * r) for r in dense)
-            tall = [(left, r) for (left, _), r in zip(tall, moved, strict=True)]
-            noise = np.ones_like(noise)
+        parts = []
+        for left, right in self.parts:
+            columns: Any = np.eye(left.shape[1]) if right is None else right
+            if factor is not None:
+                dense = columns if isinstance(columns, np.ndarray) else columns.toarray()
+                columns = factor.correlate_adjoint(noise[:, None] * dense)
+            parts.append((left, columns))
+        weight = noise**2 if factor is None else np.ones_like(noise)
         total: FloatArray = np.zeros((len(self), len(self)))
-        for i, (left, right) in enumerate(tall):
-            for j, (other, columns) in enumerate(tall[: i + 1]):
-                product = left @ _gram(right, columns, noise**2) @ other.T
-                total += product if i == j else product + product.T
+        for i, (left, right) in enumerate(parts):
+            total += left @ _gram(right, right, weight) @ left.T
+            for other, columns in parts[:i]:
+                product = left @ _gram(right, columns, weight) @ other.T
+                total += product + product.T
         return total
 
 
@@ -134,9 +136,9 @@ def _placed(right: Tall, factors: FloatArray, rows: IndexArray, count: int) -> T
     from scipy.sparse import coo_array
 
     entries = right.tocoo()
-    data = entries.data * factors[entries.coords[0]]
-    places = (rows[entries.coords[0]], entries.coords[1])
-    return coo_array((data, places), shape=(count, right.shape[1])).tocsr()
+    row, column = entries.coords
+    data = entries.data * factors[row]
+    return coo_array((data, (rows[row], column)), shape=(count, right.shape[1])).tocsr()
 
 
 def _gram(first: Any, second: Any, weight: FloatArray | None = None) -> FloatArray:
