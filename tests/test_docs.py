@@ -16,7 +16,7 @@ import jupytext
 import nbformat
 import pytest
 from helpers.bench import Bench
-from helpers.console import Outcome, Run
+from helpers.console import Outcome, Run, numbers, words
 from helpers.scans import simulate
 
 import memscal
@@ -154,18 +154,6 @@ def test_the_page_on_tables_imports_the_shipped_ones(tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     for line in "".join(blocks("import_tables.md", "console")).splitlines():
         assert main(shlex.split(line)[1:]) == 0, line
-
-
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
-
-
-def numbers(line: str) -> list[float]:
-    return [float(text) for text in NUMBER.findall(line)]
-
-
-def words(line: str) -> list[str]:
-    """What is left of a line of a table without its numbers and rules."""
-    return NUMBER.sub("", line).replace("-", "").split()
 
 
 def follow(page: str, run: Run) -> dict[str, Outcome]:
@@ -343,8 +331,8 @@ def test_every_picture_is_there_with_words_and_made_by_a_command_or_script_of_th
     shown = re.findall(r"!\[(.+)\]\(images/([\w-]+)\.png\)", page)
     commands = "".join(re.findall(r"^```console\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
     assert len(shown) >= 15
-    for words, name in shown:
-        assert len(words) > 20
+    for caption, name in shown:
+        assert len(caption) > 20
         assert f"{name}.png" in commands or name in figure_stems(["dry"], interface=True)
     stored = {path.stem for path in (DOCS / "images").glob("*.png")}
     assert stored == {name for _, name in shown} | {"overview"}

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers.console import numbers, words
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -33,10 +34,6 @@ def run_installed(arguments: list[str]) -> list[str]:
     return run.stdout.splitlines()
 
 
-def numbers(line: str) -> list[float]:
-    return [float(text) for text in re.findall(r"-?\d+(?:\.\d+)?", line)]
-
-
 def test_set_up_takes_exactly_two_commands() -> None:
     assert [block.count("\n") for block in COMMANDS[:2]] == [1, 1]
 
@@ -44,9 +41,14 @@ def test_set_up_takes_exactly_two_commands() -> None:
 def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> None:
     program, *arguments = shlex.split(COMMANDS[0])[-7:]
     assert Path(program).name == "memscal"
-    run_installed(arguments)
+    printed = run_installed(arguments)
     assert (fresh_folder / "rod_scan_65.apparatus.h5").is_file()
     assert (fresh_folder / "calibration.png").is_file()
+    shown = README.split("```text\n")[1].split("\n```")[0].splitlines()
+    for line, expected in zip(printed[: len(shown)], shown, strict=True):
+        assert words(line) == words(expected)
+        # The last digit of another machine may differ.
+        assert numbers(line) == pytest.approx(numbers(expected), rel=0.02, abs=0.02)
 
 
 @pytest.mark.usefixtures("fresh_folder")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -40,6 +41,19 @@ class Outcome:
 
 Run = Callable[..., Outcome]
 """Run ``memscal`` with arguments."""
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def numbers(line: str) -> list[float]:
+    """Return the numbers of a line of a table."""
+    return [float(text) for text in NUMBER.findall(line)]
+
+
+def words(line: str) -> list[str]:
+    """What is left of a line of a table without its numbers and rules."""
+    return NUMBER.sub("", line).replace("-", "").split()
 
 
 def names(folder: Path) -> list[str]:
