@@ -9,11 +9,12 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.film_inference import FilmLawComparison
 from memscal.calibration.messages import calibration_messages
-from memscal.calibration.prepare import Prepared, stress_table
+from memscal.calibration.prepare import Prepared
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution
 from memscal.calibration.uncertainty import Results
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import loads_differ
+from memscal.mechanics.contact import stress_table
 from memscal.model.apparatus import (
     ApparatusField,
     ApparatusRadial,

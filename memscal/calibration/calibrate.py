@@ -261,9 +261,9 @@ def _with_thickness(prepared: Prepared) -> Prepared:
     """Estimate the thickness of the films from the scans, and take it for that of the rods."""
     require_free(prepared.request.free, prepared.scans, prepared.references)
     thickness = free_thickness(_solved(prepared))
-    scans = thickness.of(prepared.scans)
+    scans = thickness.estimated(prepared.scans)
     stresses = tuple(reference_profile(scan, None) for scan in scans)
-    return replace(prepared, scans=tuple(scans), stresses=stresses, thickness=thickness)
+    return replace(prepared, scans=scans, stresses=stresses, thickness=thickness)
 
 
 def _propagated(

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints, joined_points
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
 from memscal.estimation.reference_spectra import reference_spectra
-from memscal.mechanics.contact import BaseStress, Contact
+from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Rod
@@ -59,16 +60,20 @@ def diagnosed(
 ) -> Exception:
     """Return why the profile of scans has no width, or cannot be fitted at all."""
     # The search takes some of the points, evenly, without correlations.
-    steps = [-(-scan.u.size // _MOST_POINTS) for scan in points]
-    some = [p.selected(np.arange(0, p.u.size, step)) for p, step in zip(points, steps, strict=True)]
+    some = []
+    for measured in points:
+        step = -(-measured.u.size // _MOST_POINTS)
+        some.append(measured.selected(np.arange(0, measured.u.size, step)))
     search = _Search(tuple(scans), tuple(stresses), tuple(some))
-    if error := search.error():
+    error = search.error()
+    if error is not None:
         return error
     if isinstance(outcome, ProfileEstimate):
         return _hidden(outcome, search)
+    if isinstance(outcome, FitError):
+        return outcome
     cure = "Look at the scan; check the values and units of positions, film and rod."
-    singular = FitError("No apparatus function of any width fits the scan.", cure=cure)
-    return outcome if isinstance(outcome, FitError) else singular
+    return FitError("No apparatus function of any width fits the scan.", cure=cure)
 
 
 def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
@@ -84,12 +89,14 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     noise = 0.0 if stated is None else np.median(stated) / estimate.largest_signal
     residual = np.median(estimate.noise) / estimate.largest_signal
     why = (
-        f"The nearest fit leaves residuals of {residual:.1%} of the largest signal: the voltage "
-        "does not rise and fall with the distance from one centre."
-        if residual > max(_MISFIT, 2 * noise)
-        else "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
+        "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
         f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined."
     )
+    if residual > max(_MISFIT, 2 * noise):
+        why = (
+            f"The nearest fit leaves residuals of {residual:.1%} of the largest signal: the "
+            "voltage does not rise and fall with the distance from one centre."
+        )
     places = ", ".join(length.place for length in search.lengths)
     return FitError(
         "The scan is as narrow as its reference, the stress at the base of the film: the width of "
@@ -137,8 +144,8 @@ class _Length:
 
     def scaled(self, factor: float, limit: str = "") -> str:
         """Name the length and the value that the factor gives."""
-        words = "" if limit else mistaken_unit(factor)
-        unit = f" ({words}?)" if words else ""
+        meant = "" if limit else mistaken_unit(factor)
+        unit = f" ({meant}?)" if meant else ""
         if self.stated == 1.0:
             return f"{self.place} {limit}{factor:.3g} times as large{unit}"
         value = factor * self.stated * 1e3
@@ -175,29 +182,35 @@ class _Search:
     def error(self) -> FitError | None:
         """Return the error that names the lengths at fault; ``None`` if none is."""
         trials = {length: self._coarse(length) for length in self.lengths}
-        fitted = [trial for tried in trials.values() for trial in tried if trial.fit is not None]
+        fitted = [trial for trial in chain(*trials.values()) if trial.fit is not None]
         if not fitted:
             return None
         # Where no noise is stated, it is that of the best fit.
-        stated = self.points[0].u_errors is not None
-        noise = 1.0 if stated else min(robust_scale(trial.residual) for trial in fitted)
+        noise = 1.0
+        if self.points[0].u_errors is None:
+            noise = min(robust_scale(trial.residual) for trial in fitted)
         best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
         least = min(trial.loss(noise) for trial in best.values())
         unscaled = trials[self.lengths[0]][0].loss(noise)
         per_degree = max(1.0, least / fitted[0].residual.size)
         most = min(unscaled - _CLEARLY * per_degree, 2 * least + _CLEARLY)
         wider = noise * float(np.sqrt(per_degree))
-        fits = {x: t.loss(noise) <= most and t.explains(wider) for x, t in best.items()}
-        causes = [self._cause(x, trials[x], best[x], noise) for x in fits if fits[x]]
+        causes = []
+        others = []
+        for length, trial in best.items():
+            if trial.loss(noise) <= most and trial.explains(wider):
+                causes.append(self._cause(length, trials[length], trial, noise))
+            else:
+                others.append(length.place)
         if not causes:
             return None
-        others = " or ".join(length.place for length in fits if not fits[length])
-        beyond = f" No other value of {others} makes it fit." if others else ""
+        beyond = f" No other value of {' or '.join(others)} makes it fit." if others else ""
         source = self.scans[0].source
+        file = f"{source.file_name}: the " if source else "The "
         cause = "; or with ".join(causes)
         return FitError(
-            f"{f'{source.file_name}: the' if source else 'The'} scan is narrower than its "
-            "reference, the stress at the base of the film as stated.",
+            f"{file}scan is narrower than its reference, the stress at the base of the film as "
+            "stated.",
             why="Film and rod blur the sensor's image, so that no voltage is narrower than the "
             "reference: the width of the apparatus function would be zero, and A any number.",
             cure=f"Check the stated lengths. The scan would fit with {cause}.{beyond}",
@@ -272,10 +285,12 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
         else:
             film = replace(film, thickness=film.thickness * factor)
         return press_rod(replace(film, law="", mooney_rivlin_ratio=None), rod, _LOAD)
-    profile = stress.profile() if isinstance(stress, Contact) else stress
-    if profile.ideal is not None:
-        return replace(profile, ideal=replace(profile.ideal, size=profile.ideal.size * factor))
-    if (field := profile.field) is not None:
+    profile = stress_table(stress)
+    ideal = profile.ideal
+    if ideal is not None:
+        return replace(profile, ideal=replace(ideal, size=ideal.size * factor))
+    field = profile.field
+    if field is not None:
         return replace(profile, field=replace(field, x=field.x * factor, y=field.y * factor))
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
     zz = profile.sigma_zz / factor**2

@@ -64,20 +64,21 @@ class FilmLawComparison:
     @property
     def record(self) -> list[dict[str, Any]]:
         """What files and JSON hold: of each law its evidence below the best's, A and sigma."""
-        return [
-            {
+        unit = self.reading.over(self.reading.unit)
+        rows: list[dict[str, Any]] = []
+        for law in self.laws:
+            factor = self.factor(law)
+            a = law.conversion_constant / self.reading.scale
+            row = {
                 "law": law.law,
                 "is_reference": law.law == self.reference,
-                "log_evidence_below_best": self.factor(law).log_factor,
-                "best_against_it": self.factor(law).words if law is not self.laws[0] else None,
-                "conversion_constant": {
-                    "value": law.conversion_constant / self.reading.scale,
-                    "unit": self.reading.over(self.reading.unit),
-                },
+                "log_evidence_below_best": factor.log_factor,
+                "best_against_it": factor.words if rows else None,
+                "conversion_constant": {"value": a, "unit": unit},
                 "gaussian_sigma": {"value": law.gaussian_sigma / MM, "unit": "mm"},
             }
-            for law in self.laws
-        ]
+            rows.append(row)
+        return rows
 
     @property
     def message(self) -> Message:
@@ -107,56 +108,56 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     loads = tuple(scan.stated_load for scan in solution.scans)
     if not loads_differ(loads) or any(scan.film is None for scan in solution.scans):
         return None
-    made_on = [film_of(stress) for stress in solution.stresses]
-    stated = {("", None) if f is None else (f.law, f.mooney_rivlin_ratio) for f in made_on}
+    films = [film_of(stress) for stress in solution.stresses]
+    stated = {(film.law, film.mooney_rivlin_ratio) if film else ("", None) for film in films}
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
-    solved: dict[str, Solution] = {}
+    channel = solution.estimate.points.channel
+    solutions: dict[str, Solution] = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
-        of_law = ratio if law == reference else None
-        form: dict[str, Any] = {"law": law, "mooney_rivlin_ratio": of_law}
-        scans = [replace(s, film=replace(s.set_up.film, **form)) for s in solution.scans]
+        known = ratio if law == reference else None
+        scans = []
+        for scan in solution.scans:
+            film = replace(scan.set_up.film, law=law, mooney_rivlin_ratio=known)
+            scans.append(replace(scan, film=film))
         if law == reference:
-            solved[law] = replace(solution, scans=tuple(scans))
-            continue
-        keys = [scan.set_up for scan in scans]
+            solutions[law] = replace(solution, scans=tuple(scans))
         # Finite elements take long: other laws are weighed where closed form or table has them.
-        if law == LINEAR or all(is_tabulated(*key) for key in keys):
-            stresses = [press_rod(*key) for key in keys]
+        elif law == LINEAR or all(is_tabulated(*scan.set_up) for scan in scans):
+            stresses = [press_rod(*scan.set_up) for scan in scans]
             with suppress(MemscalError):  # no apparatus function may explain the scans by it
-                channel = solution.estimate.points.channel
-                solved[law] = solve(scans, stresses, solution.method, channel)
-    if len(solved) < 2:
+                solutions[law] = solve(scans, stresses, solution.method, channel)
+    if len(solutions) < 2:
         return None
-    estimates = [each.estimate for each in solved.values()]
+    estimates = [by_law.estimate for by_law in solutions.values()]
     outlier = np.max([estimate.outlier_weight for estimate in estimates], axis=0)
     weights = solution.estimate.weights / solution.estimate.outlier_weight * outlier
     noise = min(estimate.noise_scale for estimate in estimates)
     laws = []
-    for law, by_law in solved.items():
+    for law, by_law in solutions.items():
         estimate = replace(by_law.estimate, weights=weights, outlier_weight=outlier)
         evidence = float(log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0])
         a = by_law.deconvolution.conversion_constant
-        sigma = estimate.gaussian.sigma
-        laws.append(WeighedLaw(law, evidence, a, sigma))
-    ranked = sorted(laws, key=lambda law: -law.log_evidence)
-    return FilmLawComparison(tuple(ranked), reference, loads, solution.scan.reading)
+        laws.append(WeighedLaw(law, evidence, a, estimate.gaussian.sigma))
+    laws.sort(key=lambda law: -law.log_evidence)
+    return FilmLawComparison(tuple(laws), reference, loads, solution.scan.reading)
 
 
 def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     """Voltages by one standard uncertainty of each stated input, (n, q), in V."""
     estimate = solution.estimate
     effects = input_effects(solution.scans, solution.stresses, estimate)
-    names = [name for name in effects if name != "load" and name.rstrip("0123456789") != without]
-    columns = [effects[name].voltage for name in names]
+    columns = []
+    for name, effect in effects.items():
+        if name != "load" and name.rstrip("0123456789") != without:
+            columns.append(effect.voltage)
     # A balance's error may differ from load to load; repeats at one load share it.
     signal = estimate.predicted - estimate.background
-    scan_of_points = estimate.points.scan
     pairs = zip(solution.owners, solution.scans, strict=True)
-    keys = [(o, s.stated_load, s.load_uncertainty) for o, s in pairs]
-    for key in dict.fromkeys(keys):
-        _, load, u = key
-        chosen = np.array([other == key for other in keys])[scan_of_points]
-        columns.append(np.where(chosen, signal * (u or 0.0) / load, 0.0))
+    balances = [(owner, scan.stated_load, scan.load_uncertainty) for owner, scan in pairs]
+    for balance in dict.fromkeys(balances):
+        _, load, u = balance
+        weighed = np.array([other == balance for other in balances])[estimate.points.scan]
+        columns.append(np.where(weighed, signal * (u or 0.0) / load, 0.0))
     return np.stack(columns, axis=1)
 
 
@@ -166,9 +167,9 @@ class FreeThickness:
 
     films: Mapping[ElasticFilm, ElasticFilm]
 
-    def of(self, scans: Sequence[Scan]) -> list[Scan]:
+    def estimated(self, scans: Sequence[Scan]) -> tuple[Scan, ...]:
         """Return the scans with the thickness and its uncertainty as estimated."""
-        return [replace(scan, film=self.films[scan.set_up.film]) for scan in scans]
+        return tuple(replace(scan, film=self.films[scan.set_up.film]) for scan in scans)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -223,14 +224,13 @@ def require_free(
     free: str | Sequence[str], scans: Sequence[Scan], stated: Sequence[object]
 ) -> None:
     """Refuse to free what scans do not determine; ``stated``: references that were given."""
-    names = [free] if isinstance(free, str) else free
-    if unknown := [name for name in names if name != THICKNESS]:
-        raise InputError(f"There is no free input {unknown[0]!r}.", cure=f"Give {THICKNESS!r}.")
+    for name in [free] if isinstance(free, str) else free:
+        if name != THICKNESS:
+            raise InputError(f"There is no free input {name!r}.", cure=f"Give {THICKNESS!r}.")
     rods = {scan.set_up.indenter for scan in scans}
     laws = {scan.set_up.film.law for scan in scans}
-    if len(rods) < 2 and not (
-        loads_differ([s.stated_load for s in scans]) and laws.isdisjoint(("", LINEAR))
-    ):
+    at_loads = loads_differ([s.stated_load for s in scans]) and laws.isdisjoint(("", LINEAR))
+    if len(rods) < 2 and not at_loads:
         raise InputError(
             "The scans do not determine the film's thickness.",
             why="With one rod, at one load or on a linear film, whose voltage is in proportion to "
@@ -238,8 +238,9 @@ def require_free(
             cure="Give scans with rods of several radii, or at several loads on a film of another "
             "stated law.",
         )
-    if (count := len({scan.film for scan in scans})) > len(_NODES):
-        problem = f"The scans have {count} films of unknown thickness."
+    films = {scan.film for scan in scans}
+    if len(films) > len(_NODES):
+        problem = f"The scans have {len(films)} films of unknown thickness."
         raise InputError(problem, cure=f"Give scans on at most {len(_NODES)} films.")
     if not all(scan.set_up.film.thickness_uncertainty for scan in scans):
         raise InputError(
@@ -248,7 +249,8 @@ def require_free(
             cure="State it (memscal import --thickness-uncertainty, or "
             "/entry/sample/film/thickness_uncertainty).",
         )
-    if any(reference is not None for reference in [*stated, *(scan.reference for scan in scans)]):
+    references = [*stated, *(scan.reference for scan in scans)]
+    if any(reference is not None for reference in references):
         why = "To estimate the thickness the rod is solved on films of others."
         cure = "Leave the reference out, of the scan's file as well."
         raise InputError("A reference is given, of one thickness.", why=why, cure=cure)
@@ -267,12 +269,16 @@ def free_thickness(solution: Solution) -> FreeThickness:
     nodes = estimate.model.reference.wavenumbers
 
     def log_posterior(z: FloatArray) -> FloatArray:
-        pairs = zip(films, stated + z * u, strict=True)
-        at = {film: replace(film, thickness=float(h)) for film, h in pairs}
-        rods = [press_rod(at[film], *rest) for film, *rest in (scan.set_up for scan in scans)]
+        varied = {}
+        for film, thickness in zip(films, stated + z * u, strict=True):
+            varied[film] = replace(film, thickness=float(thickness))
+        rods = []
+        for scan in scans:
+            set_up = scan.set_up
+            rods.append(press_rod(*set_up._replace(film=varied[set_up.film])))
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
-        both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
-        return np.asarray(both - z @ z / 2)
+        evidences = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
+        return np.asarray(evidences - z @ z / 2)
 
     # Sums over a grid, which are good to 1e-2 while its step is at most twice the width of a normal
     # density; where the posterior is narrower it is made finer.
@@ -290,10 +296,10 @@ def free_thickness(solution: Solution) -> FreeThickness:
         if (spread > half_step).all():
             break
         reach = np.minimum(reach, _WIDTHS * np.maximum(spread, half_step))
-    pairs = zip(films, stated + middle * u, np.minimum(spread, 1.0) * u, strict=True)
-    return FreeThickness(
-        {
-            film: replace(film, thickness=float(h), thickness_uncertainty=float(left))
-            for film, h, left in pairs
-        }
-    )
+    estimated = {}
+    thicknesses = stated + middle * u
+    uncertainties = np.minimum(spread, 1.0) * u
+    for film, thickness, left in zip(films, thicknesses, uncertainties, strict=True):
+        h = float(thickness)
+        estimated[film] = replace(film, thickness=h, thickness_uncertainty=float(left))
+    return FreeThickness(estimated)

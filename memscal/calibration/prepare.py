@@ -21,7 +21,7 @@ from memscal.estimation.set_up import (
     require_same_set_up,
     with_film_of,
 )
-from memscal.mechanics.contact import BaseStress, Contact
+from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.model.film import LINEAR
 from memscal.model.notation import Reading
 from memscal.model.provenance import accepted_alterations
@@ -150,11 +150,6 @@ def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:
     load = None if stress else scan.load
     loads: dict[str, Any] = {"normal_load": None, "normal_load_errors": None}
     return replace(scan, load=load, load_uncertainty=None, **loads)
-
-
-def stress_table(stress: BaseStress) -> StressProfile:
-    """Return a base stress as a table over the radius."""
-    return stress.profile() if isinstance(stress, Contact) else stress
 
 
 def _references(

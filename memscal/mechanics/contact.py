@@ -232,6 +232,11 @@ BaseStress: TypeAlias = StressProfile | Contact
 """A calculated stress at the base of a film, as a table or as the contact itself."""
 
 
+def stress_table(stress: BaseStress) -> StressProfile:
+    """Return a base stress as a table over the radius."""
+    return stress.profile() if isinstance(stress, Contact) else stress
+
+
 def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -> DomainError:
     """Return the error for an indenter that would pass through the film."""
     return DomainError(
