@@ -1,4 +1,4 @@
-"""Print the table of the paper's sphere that stands in docs/mechanics.md.
+"""Print the table of the paper's sphere that stands in docs/sphere.md, for two ratios.
 
 Run it where memscal is installed: ``python docs/sphere_table.py``.
 """
