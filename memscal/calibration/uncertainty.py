@@ -40,12 +40,14 @@ from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-#: Windows below this have closed; what sums of squares lose to rounding.
-_CLOSED = _ROUNDING = 1e-9
+#: Windows below this have closed.
+_CLOSED = 1e-9
+#: What sums of squares lose to rounding.
+_ROUNDING = 1e-9
 #: Columns over many points that are made at a time.
 _COLUMNS = 8
 #: Parameters whose uncertainty is broken down by source.
@@ -104,7 +106,7 @@ def input_effects(
             changes.setdefault("reference_stress", blank)[i] = errors
     if alternatives is not None:
         pairs = zip(alternatives, model.references, strict=True)
-        changes["model_form"] = [RECTANGLE * (a.values - ours.values) for a, ours in pairs]
+        changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
     effects = {name: InputEffect(_mistaken(estimate, change)) for name, change in changes.items()}
     shares = np.array([scan.position_scale_uncertainty or 0.0 for scan in scans])
     if shares.any():
@@ -142,10 +144,11 @@ def _of_loads(
     }
     effects = {}
     for source, stated in shares.items():
-        of_scans = np.array([share or 0.0 for share in stated])
-        apart = (of_scans - of_scans.mean())[estimate.points.scan]
-        if any(share is not None for share in stated):
-            effects[source] = InputEffect(-apart * signal, -float(of_scans.mean()))
+        if all(share is None for share in stated):
+            continue
+        by_scan = np.array([share or 0.0 for share in stated])
+        apart = (by_scan - by_scan.mean())[estimate.points.scan]
+        effects[source] = InputEffect(-apart * signal, -float(by_scan.mean()))
     return effects
 
 
@@ -214,10 +217,18 @@ class _Derivatives:
     def __getitem__(self, rows: slice) -> _Derivatives:
         return _Derivatives(self.by_voltage[rows], self.by_state[rows], self.hidden[rows])
 
-    def combined(self, row: FloatArray) -> _Derivatives:
-        """Derivatives of a sum of the results."""
-        rows = row[None, :]
+    def combined(self, rows: FloatArray) -> _Derivatives:
+        """Derivatives of sums of the results, by rows (l, m)."""
         return _Derivatives(rows @ self.by_voltage, rows @ self.by_state, rows @ self.hidden)
+
+    @classmethod
+    def stacked(cls, parts: Sequence[_Derivatives]) -> _Derivatives:
+        """Put the derivatives of several results below each other."""
+        return cls(
+            VoltageMap.stacked([part.by_voltage for part in parts]),
+            np.vstack([part.by_state for part in parts]),
+            np.vstack([part.hidden for part in parts]),
+        )
 
 
 def propagate(
@@ -230,17 +241,14 @@ def propagate(
 ) -> Results:
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
     estimate = solution.estimate
-    radii = deconvolution.g.r.size
     kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
-    numbers = _numbers(estimate, deconvolution, kernel)
-    names = tuple(numbers)
-    values = np.array([value for value, _ in numbers.values()])
-    parts = [*(derivatives for _, derivatives in numbers.values()), kernel[1:]]
-    by_voltage = VoltageMap.stacked([part.by_voltage for part in parts])
+    names, values, of_parameters = _parameters(estimate, deconvolution, kernel)
+    derivatives = _Derivatives.stacked([of_parameters, kernel[1:]])
+    by_voltage = derivatives.by_voltage
     columns = {
         "noise": estimate.scattered(by_voltage),
-        "regularisation": np.vstack([part.by_state for part in parts]) @ estimate.fixed_root,
-        "window": np.vstack([part.hidden for part in parts]),
+        "regularisation": derivatives.by_state @ estimate.fixed_root,
+        "window": derivatives.hidden,
     }
     rows = [names.index(name) for name in _OF_GAUSSIAN if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -258,10 +266,16 @@ def propagate(
         together = np.hstack([columns[name] for name in effects])
         independent.append(together @ square_root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
+    g = deconvolution.g.radial
     count = len(names)
-    stop = len(names) + radii
+    stop = count + g.size
     stored = everything[:stop] @ everything[:stop].T
-    scatter = [columns["noise"], *(independent[-1:] if effects else [])]
+    scatter = np.hstack([columns["noise"], *(independent[-1:] if effects else [])])
+    g_over_a = g / deconvolution.conversion_constant
+    kernel_changes = {}
+    for source in effects if not correlations else ():
+        change = columns[source][:stop, 0]
+        kernel_changes[source] = change[count:] + g_over_a * change[0]
     return Results(
         parameters=ParameterSet(names, values, stored[:count, :count]),
         changes={source: columns[source][:count, 0] for source in effects},
@@ -269,20 +283,11 @@ def propagate(
         radial_covariance=stored[count:, count:],
         cross_covariance=stored[count:, :count],
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
-        radial_scatter=np.linalg.norm(np.hstack(scatter)[count:stop], axis=1),
+        radial_scatter=np.linalg.norm(scatter[count:stop], axis=1),
         by_voltage=by_voltage[:count],
-        kernel_changes={}
-        if correlations
-        else {source: _of_kernel(columns[source][:stop, 0], deconvolution) for source in effects},
+        kernel_changes=kernel_changes,
         division=division,
     )
-
-
-def _of_kernel(change: FloatArray, deconvolution: Deconvolution) -> FloatArray:
-    """Change of A G(r) over A, from those of the parameters, A the first, and of G."""
-    g = deconvolution.g.radial
-    a = deconvolution.conversion_constant
-    return np.asarray(change[-g.size :] + g * (change[0] / a))
 
 
 def changes_by(
@@ -317,14 +322,15 @@ def _replace_exactly(
     assert other is not None
     r = deconvolution.g.r
     fit = exact.estimate.gaussian
-    count = len(names)
     numbers, g = read_off(other, r)
-    of_fit = {"gaussian_sigma": fit.sigma, "conversion_constant_gaussian": fit.conversion_constant}
-    for name, value in (numbers | of_fit).items():
-        column[names.index(name)] = RECTANGLE * (value - values[names.index(name)])
+    numbers["gaussian_sigma"] = fit.sigma
+    numbers["conversion_constant_gaussian"] = fit.conversion_constant
+    for name, value in numbers.items():
+        row = names.index(name)
+        column[row] = RECTANGLE * (value - values[row])
     change = RECTANGLE * (g - deconvolution.g.radial)
-    column[count : count + r.size] = change
-    column[count + r.size :] = (bessel_table(wavenumbers, r) * ring_areas(r)) @ change
+    transfer = bessel_table(wavenumbers, r) * ring_areas(r)
+    column[len(names) :] = np.append(change, transfer @ change)
 
 
 def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float], FloatArray]:
@@ -342,11 +348,9 @@ def expected_values(solution: Solution) -> dict[str, float]:
     estimate = solution.estimate
     deconvolution = solution.deconvolution
     kernel, _ = _kernel_derivatives(solution, deconvolution, np.zeros(0))
-    residual = estimate.points.u - drawn_about(solution)
-    return {
-        name: value - float((derivatives.by_voltage @ residual)[0])
-        for name, (value, derivatives) in _numbers(estimate, deconvolution, kernel).items()
-    }
+    names, values, derivatives = _parameters(estimate, deconvolution, kernel)
+    noise = derivatives.by_voltage @ (estimate.points.u - drawn_about(solution))
+    return dict(zip(names, (values - noise).tolist(), strict=True))
 
 
 def drawn_about(solution: Solution) -> FloatArray:
@@ -367,67 +371,67 @@ def _budget(
     return budget
 
 
-def _numbers(
+def _parameters(
     estimate: ProfileEstimate, deconvolution: Deconvolution, kernel: _Derivatives
-) -> dict[str, tuple[float, _Derivatives]]:
-    """Value and derivatives of each parameter, in the order in which they are reported."""
-    of_g = kernel[1 : 1 + deconvolution.g.r.size]
-    functionals = kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma)
-    of_functionals = {f.name: (f.value, of_g.combined(f.row)) for f in functionals}
+) -> tuple[tuple[str, ...], FloatArray, _Derivatives]:
+    """Names, values and derivatives of the parameters, in the order in which they are reported."""
+    fit = estimate.gaussian
+    g = deconvolution.g
+    of_g = kernel[1 : 1 + g.r.size]
+    functionals = kernel_functionals(g, deconvolution.gaussian_sigma)
+    widths = of_g.combined(np.stack([functional.row for functional in functionals]))
     if deconvolution.divided and of_g.hidden.size:
         # What a window hides of G adds to the integral of its square by its own square.
-        value, derivatives = of_functionals["noise_equivalent_area"]
-        whole = noise_area(deconvolution.g.r, deconvolution.g.radial + of_g.hidden[:, 0])
-        derivatives.hidden[0, 0] = whole - value
-    hidden = kernel.hidden.shape[1]
-    gaussian = estimate.gaussian
+        whole = noise_area(g.r, g.radial + of_g.hidden[:, 0])
+        widths.hidden[-1, 0] = whole - functionals[-1].value
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain = estimate.gaussian_gain
-    count = estimate.points.ellipse
-    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1:2], hidden))}
-    first = len(gain) - count
-    for i, name in enumerate(_OF_GAUSSIAN[2 : 2 + count]):
-        numbers[name] = (
-            float(gaussian.ellipticity[i]),
-            _fitted(estimate, gain[first + i : first + i + 1], hidden),
-        )
-    return {
-        "conversion_constant": (deconvolution.conversion_constant, kernel[:1]),
-        **numbers,
-        **of_functionals,
-        **_nuisances(estimate, hidden),
-    }
+    ellipse = estimate.points.ellipse
+    nuisances, scale = _nuisances(estimate.points.free)
+    count = len(scale)
+    parts = [
+        kernel[:1],
+        _fitted(kernel, gain[[1, *range(len(gain) - ellipse, len(gain))]]),
+        widths,
+        _fitted(kernel, estimate.weighed.gain[2 : 2 + count] * scale),
+        _fitted(kernel, gain[:1]),
+    ]
+    parts[3].by_state[:, 2 : 2 + count] = np.diag(scale)
+    values = [
+        *(deconvolution.conversion_constant, fit.sigma, *fit.ellipticity[:ellipse]),
+        *(functional.value for functional in functionals),
+        *scale * np.append(estimate.centres[estimate.points.free], estimate.drifts),
+        fit.conversion_constant,
+    ]
+    names = (
+        "conversion_constant",
+        "gaussian_sigma",
+        *_OF_GAUSSIAN[2 : 2 + ellipse],
+        *(functional.name for functional in functionals),
+        *nuisances,
+        "conversion_constant_gaussian",
+    )
+    return names, np.array(values), _Derivatives.stacked(parts)
 
 
-def _fitted(estimate: ProfileEstimate, row: VoltageMap, hidden: int) -> _Derivatives:
-    """Derivatives of a parameter that no regularisation touches."""
-    states = np.zeros((1, estimate.basis.integrals.size))
-    return _Derivatives(row, states, np.zeros((1, hidden)))
+def _fitted(kernel: _Derivatives, by_voltage: VoltageMap) -> _Derivatives:
+    """Derivatives of parameters that no regularisation touches."""
+    count = len(by_voltage)
+    states = np.zeros((count, kernel.by_state.shape[1]))
+    return _Derivatives(by_voltage, states, np.zeros((count, kernel.hidden.shape[1])))
 
 
-def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float, _Derivatives]]:
-    """Centre, baseline and drift of each scan (of the second ``_2``), and the Gaussian's A."""
-    free = estimate.points.free
-    gain = estimate.weighed.gain
-    entries = [(("centre", "centre_y")[axis] + _number(i), 1.0) for i, axis in np.argwhere(free)]
-    for i, directions in enumerate(free):
+def _nuisances(free: BoolArray) -> tuple[list[str], FloatArray]:
+    """Names of centre, baseline and drift of each scan (of the second ``_2``), and their scale."""
+    suffixes = [f"_{i + 1}" if i else "" for i in range(len(free))]
+    names = [("centre", "centre_y")[axis] + suffixes[i] for i, axis in np.argwhere(free)]
+    scales = [1.0] * len(names)
+    for directions, suffix in zip(free, suffixes, strict=True):
         # The drift is stated across the whole range; its coefficient spans half of it.
-        along = [("drift", "drift_y")[axis] + _number(i) for axis in np.flatnonzero(directions)]
-        entries += [("baseline" + _number(i), 1.0), *((name, 2.0) for name in along)]
-    values = np.concatenate([estimate.centres[free], estimate.drifts])
-    states = np.eye(estimate.basis.integrals.size)
-    numbers = {}
-    for i, (name, scale) in enumerate(entries):
-        fitted = _fitted(estimate, gain[2 + i : 3 + i] * scale, hidden)
-        state = scale * states[2 + i : 3 + i]
-        numbers[name] = scale * float(values[i]), replace(fitted, by_state=state)
-    gaussian = _fitted(estimate, estimate.gaussian_gain[:1], hidden)
-    numbers["conversion_constant_gaussian"] = (estimate.gaussian.conversion_constant, gaussian)
-    return numbers
-
-
-def _number(scan: int) -> str:
-    return "" if scan == 0 else f"_{scan + 1}"
+        along = [("drift", "drift_y")[axis] + suffix for axis in np.flatnonzero(directions)]
+        names += ["baseline" + suffix, *along]
+        scales += [1.0, *(2.0 for _ in along)]
+    return names, np.array(scales)
 
 
 def _kernel_derivatives(
@@ -498,8 +502,6 @@ def _division_map(
     model = estimate.model
     a = deconvolution.conversion_constant
     r = deconvolution.g.r
-    g = deconvolution.g.radial
-    gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     reference = model.reference
     axis, window = fields.along_axis(deconvolution.quotient.window)
     window = np.interp(model.k, axis, window, right=0.0)
@@ -510,16 +512,17 @@ def _division_map(
     rings = ring_areas(r)
 
     # From changes of A G at its radii to those of A, G and its transfer function.
-    of_g = (np.eye(r.size) - np.multiply.outer(g, rings)) / a
-    transfer = (bessel_table(wavenumbers, r) * rings) @ of_g
-    normalised = np.vstack([rings, of_g, transfer])
+    by_radius = (np.eye(r.size) - np.multiply.outer(deconvolution.g.radial, rings)) / a
+    transfer = (bessel_table(wavenumbers, r) * rings) @ by_radius
+    normalised = np.vstack([rings, by_radius, transfer])
+    gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
+    direct = normalised @ synthesis @ gain
     geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
     starts = range(0, kernels.shape[1], count)
     signals = (model.signal(geometry, kernels[:, i : i + count]) for i in starts)
-    direct = normalised @ synthesis @ gain
     kept = np.hstack([direct @ voltages for voltages in signals])
     radial = np.column_stack([estimate.radial(r), basis.radial(r)])
     return DivisionMap(direct, nuisance, kept, normalised @ radial - kept)
@@ -542,8 +545,8 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     noise = estimate.scattered(direct - moved @ estimate.weighed.gain)
     difference = direct @ (estimate.points.u - estimate.predicted)
     variance = np.sum(np.hstack([noise, moved @ estimate.fixed_root]) ** 2, axis=1)
-    of_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
-    return float(max(abs(difference[0]) / np.sqrt(variance[0]), of_g))
+    in_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
+    return float(max(abs(difference[0]) / np.sqrt(variance[0]), in_g))
 
 
 def _drawn_columns(

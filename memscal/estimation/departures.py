@@ -359,8 +359,8 @@ def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
     data = free(reduced.data + reduced.signal(gaussian))
     widths = np.full(len(FAMILIES), start)
     for _ in range(_FAMILY_ROUNDS):
-        signal = free(reduced.signal(_sensors(FAMILIES, widths, k, _TRANSFORMS)))
-        wider = free(reduced.signal(_sensors(FAMILIES, (1 + step) * widths, k, _TRANSFORMS)))
+        both = _sensors(2 * FAMILIES, np.append(widths, (1 + step) * widths), k, _TRANSFORMS)
+        signal, wider = np.hsplit(free(reduced.signal(both)), 2)
         # Least squares in A and A d ln(width), of all families at once.
         slope = (wider - signal) / step
         a = np.sum(signal**2, axis=0)
