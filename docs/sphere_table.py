@@ -1,4 +1,4 @@
-"""Print the table of the paper's sphere that stands in docs/sphere.md, for two ratios.
+"""Print the table of the paper's sphere of docs/sphere.md, and that for a Poisson's ratio of 0.495.
 
 Run it where memscal is installed: ``python docs/sphere_table.py``.
 """
