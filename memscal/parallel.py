@@ -30,13 +30,9 @@ THREAD_VARIABLES = (
 )
 
 
-def _set_by_user() -> bool:
-    return any(name in os.environ for name in THREAD_VARIABLES)
-
-
 def one_thread_per_process() -> None:
     """Have BLAS start one thread, unless the user set a number or numpy is loaded already."""
-    if "numpy" not in sys.modules and not _set_by_user():
+    if "numpy" not in sys.modules and not os.environ.keys() & THREAD_VARIABLES:
         os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
 
 
@@ -53,7 +49,7 @@ def _controller() -> ThreadpoolController:
 def single_threaded() -> Iterator[None]:
     """Run BLAS on one thread, also as a decorator; a number that the user set stays."""
     # On matrices of a few hundred rows, waiting threads cost ten times the work's processor time.
-    if _set_by_user():
+    if os.environ.keys() & THREAD_VARIABLES:
         yield
     else:
         with _controller().limit(limits=1, user_api="blas"):  # some 25 us

@@ -122,7 +122,7 @@ class Contact(Result):
         At radii ``r`` from 0 upward, in m, of any shape; zero where it has decayed below 1e-13 of
         its maximum.
         """
-        return self.inside.base_normal(_radii(r))
+        return self.inside.base(_radii(r), 0)
 
     def base_spectrum(self, k: ArrayLike) -> FloatArray:
         r"""Return the two-dimensional Fourier transform of the base stress, in N.
@@ -130,7 +130,7 @@ class Contact(Result):
         At ``k`` in rad/m, of any shape and sign:
         :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, which is the load at k = 0.
         """
-        return self.inside.base_spectrum(np.abs(np.asarray(k, dtype=np.float64)))
+        return self.inside.spectrum(np.abs(np.asarray(k, dtype=np.float64)), 0)
 
     def base_shear(self, r: ArrayLike) -> FloatArray:
         r"""Return the radial traction of the base on the film, in Pa, positive outward.
@@ -138,7 +138,7 @@ class Contact(Result):
         As :meth:`base_stress`; with the third axis from base to surface it is
         :math:`-\sigma_{rz}`, and it is negative where the film is squeezed outward.
         """
-        return self.inside.base_shear(_radii(r))
+        return self.inside.base(_radii(r), 1)
 
     def base_shear_spectrum(self, k: ArrayLike) -> FloatArray:
         r"""Return the Hankel transform of order one of the base shear, in N.
@@ -147,7 +147,7 @@ class Contact(Result):
         :meth:`base_shear`, which is odd in k and zero at k = 0.
         """
         signed = np.asarray(k, dtype=np.float64)
-        return np.sign(signed) * self.inside.base_shear_spectrum(np.abs(signed))
+        return np.sign(signed) * self.inside.spectrum(np.abs(signed), 1)
 
     def interface_pressure(self, r: ArrayLike) -> FloatArray:
         """Return the pressure between indenter and film in Pa; zero outside the contact.
@@ -176,11 +176,11 @@ class Contact(Result):
 
     def surface_depression(self, r: ArrayLike) -> FloatArray:
         """Return the normal displacement of the film's surface in m, positive into the film."""
-        return self.inside.depression(_radii(r))
+        return self.inside.surface(_radii(r), 0)
 
     def surface_outward(self, r: ArrayLike) -> FloatArray:
         """Return the radial displacement of the film's surface in m, positive outward."""
-        return self.inside.outward(_radii(r))
+        return self.inside.surface(_radii(r), 1)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and stress in the whole film, on the mesh of its finite elements."""

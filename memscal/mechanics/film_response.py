@@ -251,15 +251,9 @@ class RingTraction:
         if np.any(values):
             for start in range(0, flat.size, _CHUNK):
                 chunk = slice(start, start + _CHUNK)
-                hats = _hat_transform(self.rings.tobytes(), flat[chunk].tobytes(), order)
+                hats = hat_transform(self.rings.tobytes(), flat[chunk].tobytes(), order)
                 transform[chunk] = hats @ values
         return transform.reshape(np.shape(k))
-
-
-def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
-    r"""Return :math:`\int\phi_j\,J_n(kr)\,r\,dr` n = 0 and 1, shapes (k, rings), in m^2."""
-    zero, one = (_hat_transform(rings.tobytes(), k.tobytes(), order) for order in (0, 1))
-    return zero, one
 
 
 #: Wavenumbers that are treated together: bounds the memory.
@@ -267,8 +261,9 @@ _CHUNK = 2048
 
 
 @lru_cache(maxsize=8)
-def _hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
-    """Return the hats' transforms of one order, (k, rings); the contacts of a path share them."""
+def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
+    r"""Return :math:`\int\phi_j\,J_n(kr)\,r\,dr` of an order n, shape (k, rings), in m^2."""
+    # The contacts of a path share them: the arguments are the arrays' content.
     rings = np.frombuffer(ring_bytes)
     k = np.frombuffer(k_bytes)
     widths = np.diff(rings)
@@ -297,7 +292,8 @@ class HankelFilm:
         direct = surface.singular_integrals(r, r)
         across = surface.coupling_integrals(r, r)
         k, weights = _wavenumbers(film, 2 * r[-1])
-        layer = _layer_integrals(film, r, (k, weights), hat_transforms(r, k))
+        normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
+        layer = _layer_integrals(film, r, (k, weights), (normal, radial))
         matrices = _displacements(film, (direct[0], *across, direct[1]), layer)
         return surface.SurfaceCompliance(r, *matrices)
 
@@ -308,53 +304,23 @@ class HankelFilm:
         return HankelField(self.film, RingTraction(self.r, pressure, shear))
 
 
-class FieldByOrder:
-    """A film's field by one function for normal (0) and radial (1); see ``memscal.FilmField``."""
-
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa."""
-        return self._base(r, 0)
-
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa."""
-        return self._base(r, 1)
-
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of order zero of the normal stress at ``k`` (rad/m), in N."""
-        return self._spectrum(k, 0)
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        """Return the transform of order one of the base shear at ``k`` (rad/m), in N."""
-        return self._spectrum(k, 1)
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m."""
-        return self._surface(r, 0)
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return the radial displacement of the surface in m."""
-        return self._surface(r, 1)
-
-    def _base(self, r: FloatArray, order: int) -> FloatArray:
-        raise NotImplementedError
-
-    _spectrum = _surface = _base
-
-
 @dataclass(frozen=True, eq=False)
-class HankelField(FieldByOrder):
+class HankelField:
     """The field in a film under a traction; base stresses below 1e-13 of their peak are zero."""
 
     film: ElasticFilm
     traction: InterfaceTraction
 
-    def _base(self, r: FloatArray, order: int) -> FloatArray:
+    def base(self, r: FloatArray, order: int) -> FloatArray:
+        """Return normal stress or outward traction at the base in Pa."""
         return base_stress(self.film, self.traction, r, order=order)
 
-    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+    def spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
         return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=order)
 
-    def _surface(self, r: FloatArray, order: int) -> FloatArray:
+    def surface(self, r: FloatArray, order: int) -> FloatArray:
+        """Return depression or outward displacement of the surface in m."""
         x = np.ravel(np.asarray(r, dtype=np.float64))
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
@@ -362,7 +328,7 @@ class HankelField(FieldByOrder):
         layer = _layer_integrals(self.film, x, (k, weights), transforms)
         displaced = _displacements(self.film, traction.half_space_integrals(x), layer)
         by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
-        return np.asarray(by_pressure + by_shear).reshape(np.shape(r))
+        return (by_pressure + by_shear).reshape(np.shape(r))
 
 
 _Pair = tuple[FloatArray, FloatArray]

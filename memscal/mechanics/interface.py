@@ -135,7 +135,7 @@ class ExponentialCompliance:
     # Both take the film as every law does; this one does not depend on it.
     def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:  # noqa: ARG002
         """Return the pressure in Pa at a ``separation`` in m."""
-        return np.asarray(self.reference_pressure * np.exp(-separation / self.decay_length))
+        return self.reference_pressure * np.exp(-separation / self.decay_length)
 
     def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return minus the derivative of the pressure by the separation, in Pa/m."""
@@ -143,7 +143,7 @@ class ExponentialCompliance:
 
     def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:  # noqa: ARG002
         """Return the separation in m at which the pressure is ``pressure`` in Pa."""
-        return np.asarray(-self.decay_length * np.log(pressure / self.reference_pressure))
+        return -self.decay_length * np.log(pressure / self.reference_pressure)
 
 
 NormalLaw = GreenwoodTripp | ExponentialCompliance

@@ -4,7 +4,7 @@ import math
 from functools import lru_cache
 
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.tabulated_rod import tabulated_rod
+from memscal.mechanics.tabulated_rod import largest_tabulated_load, tabulated_rod
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
 
@@ -39,4 +39,4 @@ def is_tabulated(
 ) -> bool:
     """Whether a neo-Hookean film is found in the table, in milliseconds; else it is solved."""
     sticking = friction is None or friction > 0
-    return isinstance(rod, Rod) and tabulated_rod(film, rod, load, sticking=sticking) is not None
+    return isinstance(rod, Rod) and load <= largest_tabulated_load(film, rod, sticking=sticking)

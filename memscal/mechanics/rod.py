@@ -92,7 +92,9 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
         if order < count:
             rows[order] = current
         norm += (2 * order + 1) * current**2
-        above, current = current, (2 * order + 1) / x * current - above
+        below = (2 * order + 1) / x * current - above
+        above = current
+        current = below
         size = np.abs(current)
         if np.max(size, initial=0.0) > 1e100:
             scale = 1 / np.maximum(size, 1.0)
@@ -137,7 +139,8 @@ class RodTraction:
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""
         ratio, m, under, scale = self._inside(r)
-        if (count := self.shear_terms.size) == 0:
+        count = self.shear_terms.size
+        if count == 0:
             return np.zeros_like(m)
         series = np.zeros(2 * count)
         series[1::2] = self.shear_terms * _term_scale(count) / (2 * np.arange(count) + 1)
@@ -176,7 +179,7 @@ class RodTraction:
         ratio = np.asarray(r, dtype=np.float64) / self.radius
         under = ratio < 1
         m = np.sqrt(np.where(under, (1 - ratio) * (1 + ratio), 1.0))
-        return ratio, np.asarray(m), under, self.load / (2 * np.pi * self.radius**2)
+        return ratio, m, under, self.load / (2 * np.pi * self.radius**2)
 
 
 @dataclass(frozen=True, eq=False)

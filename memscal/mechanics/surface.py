@@ -66,32 +66,25 @@ class SurfaceCompliance:
 class FilmField(Protocol):
     """The field in a film under given tractions at its two faces; radii in m, of any shape.
 
+    Of order zero it is the normal component, of order one the radial one.
+
     Examples
     --------
     >>> import memscal
     >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     >>> contact = memscal.indent(film, memscal.Sphere(radius=0.1), load=0.5, friction=0.1)
-    >>> float(contact.inside.base_normal(0.0)) == float(contact.base_stress(0.0))
+    >>> float(contact.inside.base(0.0, order=0)) == float(contact.base_stress(0.0))
     True
     """
 
-    def base_normal(self, r: FloatArray) -> FloatArray:
-        """Return the normal stress at the base in Pa, compression positive."""
+    def base(self, r: FloatArray, order: int) -> FloatArray:
+        """Return the stress at the base in Pa: in compression, or outward on the film."""
 
-    def base_shear(self, r: FloatArray) -> FloatArray:
-        """Return the radial traction of the base on the film in Pa, positive outward."""
+    def spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma\,J_n(kr)\,r\,dr` of that stress at ``k`` (rad/m), in N."""
 
-    def base_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-
-    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-
-    def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m, positive into the film."""
-
-    def outward(self, r: FloatArray) -> FloatArray:
-        """Return the radial displacement of the surface in m, positive outward."""
+    def surface(self, r: FloatArray, order: int) -> FloatArray:
+        """Return the displacement of the surface in m: into the film, or outward."""
 
 
 def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[np.int64]:

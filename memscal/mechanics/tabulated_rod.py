@@ -19,7 +19,6 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.film_response import FieldByOrder
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
@@ -33,14 +32,15 @@ _STEPS = np.linspace(0.0, 1.0, 65)
 
 
 @dataclass(frozen=True, eq=False)
-class TabulatedField(FieldByOrder):
+class TabulatedField:
     """Base stress of a rod by its transforms (N) at wavenumbers (rad/m), and nothing else."""
 
     k: FloatArray
     transforms: tuple[FloatArray, FloatArray]  # of the normal stress, and of order one of the shear
     radius: float
 
-    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
+    def spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
         from scipy.interpolate import CubicSpline
 
         # Even in k, or odd.
@@ -48,9 +48,10 @@ class TabulatedField(FieldByOrder):
         spline = CubicSpline(self.k, self.transforms[order], bc_type=ends)
         return np.where(k <= self.k[-1], spline(np.minimum(k, self.k[-1])), 0.0)
 
-    def _base(self, r: FloatArray, order: int) -> FloatArray:
+    def base(self, r: FloatArray, order: int) -> FloatArray:
+        """Return normal stress or outward traction at the base in Pa."""
         nodes = Wavenumbers.covering(float(self.k[-1]), float(np.max(r, initial=self.radius)))
-        values = self._spectrum(nodes.k, order)
+        values = self.spectrum(nodes.k, order)
         return nodes.synthesise(values, np.ravel(r), order=order).reshape(np.shape(r))
 
     def _absent(self, *_: Any, **__: Any) -> NoReturn:
@@ -58,20 +59,23 @@ class TabulatedField(FieldByOrder):
         cure = "Press the rod by memscal.indent, which solves the whole film."
         raise InputError(problem, cure=cure)
 
-    _surface = pressure = shear = pressure_transform = shear_transform = _absent
+    surface = pressure = shear = pressure_transform = shear_transform = _absent
     half_space_integrals = _absent
 
 
 def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -> Contact | None:
     """Return a rod on a neo-Hookean film under a load (N); ``None`` outside the table."""
+    from scipy.optimize import brentq
+
     column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
-    scale = film.shear_modulus * film.thickness**2
-    if column is None or load > column.load(column.deepest) * scale:
+    if column is None or load > largest_tabulated_load(film, rod, sticking=sticking):
         return None
-    depth = column.depth(load / scale)
-    normal, shear = column.rows(np.cbrt(depth))[1:].reshape(2, -1) * load
+    rows, deepest = column
+    scale = film.shear_modulus * film.thickness**2
+    depth = float(brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12))
+    normal, shear = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
     inside: Any = TabulatedField(_table()["kh"] / film.thickness, (normal, shear), rod.radius)
-    loads = column.load(_STEPS * depth) * scale
+    loads = _load(rows, _STEPS * depth) * scale
     work = float(np.trapezoid(loads, _STEPS * depth * film.thickness))
     return Contact(
         film=film,
@@ -99,26 +103,16 @@ def largest_tabulated_load(film: ElasticFilm, rod: Rod, *, sticking: bool) -> fl
     """Return the load (N) at which the table ends for a rod; 0 outside the table."""
     column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
     scale = film.shear_modulus * film.thickness**2
-    return 0.0 if column is None else float(column.load(column.deepest)) * scale
+    return 0.0 if column is None else float(_load(*column)) * scale
 
 
-@dataclass(frozen=True, eq=False)
-class _Column:
-    """A rod by its depth over the thickness; loads in units of G h^2."""
+_Rows = Callable[[Any], Any]
+"""Of the cube root of the depth: log of load over depth, spectra of stress and shear over load."""
 
-    # Of the cube root of the depth: log of load over depth, spectra of stress and shear over load.
-    rows: Callable[[Any], Any]
-    deepest: float
 
-    def load(self, depth: Any) -> Any:
-        """Load at depths."""
-        return np.exp(self.rows(np.cbrt(depth))[..., 0]) * depth
-
-    def depth(self, load: float) -> float:
-        """Depth at a load."""
-        from scipy.optimize import brentq
-
-        return float(brentq(lambda d: float(self.load(d)) - load, 0.0, self.deepest, xtol=1e-12))
+def _load(rows: _Rows, depth: Any) -> Any:
+    """Return loads in units of G h^2 at depths over the thickness."""
+    return np.exp(rows(np.cbrt(depth))[..., 0]) * depth
 
 
 @lru_cache(maxsize=1)
@@ -130,40 +124,41 @@ def _table() -> dict[str, FloatArray]:
 
 
 @lru_cache(maxsize=256)
-def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
-    """Interpolate between the columns; ``None`` outside the table."""
+def _column(poisson: float, radius: float, *, sticking: bool) -> tuple[_Rows, float] | None:
+    """Interpolate between the columns: a rod and its deepest depth; ``None`` outside the table."""
     from scipy.interpolate import CubicSpline
 
     table = _table()
-    ratios, radii, depths = (table[name] for name in ("poisson_ratio", "radius", "depth"))
+    ratios = table["poisson_ratio"]
+    radii = table["radius"]
+    depths = table["depth"]
     if not (ratios[0] <= poisson <= ratios[-1] and radii[0] <= radius <= radii[-1]):
         return None
     columns = table["table"][0 if sticking else 1]
-    # How many depths each column has; it ends where the first of those beside it does.
+    # How many depths each column has; the rod's ends where the first of its neighbours does.
     reached = np.isfinite(columns[..., 0]).sum(axis=-1)
-    i, j = (
-        int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
-        for axis, value in ((ratios, poisson), (radii, radius))
-    )
+    # The interval of each axis that the rod lies in.
+    i = int(np.searchsorted(ratios[1:-1], poisson, side="right"))
+    j = int(np.searchsorted(radii[1:-1], radius, side="right"))
     ends = reached[i : i + 2, j : j + 2].min(axis=1)
     count = int(ends[_polynomial(tuple(ratios[i : i + 2]), poisson) != 0].min())
     if count < _STENCIL:
         return None
     rows = np.empty((count, columns.shape[-1]))
     for n in range(count):
-        of_ratios = np.empty((ratios.size, columns.shape[-1]))
+        at_ratios = np.empty((ratios.size, columns.shape[-1]))
         usable = []
         for m in range(ratios.size):
             nodes = _nearest(np.flatnonzero(reached[m] > n), j)
             if {j, j + 1} <= set(nodes):
                 usable.append(m)
                 weights = _polynomial(tuple(np.log(radii[nodes])), np.log(radius))
-                of_ratios[m] = weights @ columns[m, nodes, n]
+                at_ratios[m] = weights @ columns[m, nodes, n]
         chosen = _nearest(np.array(usable), i)
-        rows[n] = _polynomial(tuple(ratios[chosen]), poisson) @ of_ratios[chosen]
+        rows[n] = _polynomial(tuple(ratios[chosen]), poisson) @ at_ratios[chosen]
     flat: Any = ((1, np.zeros(rows.shape[1])), "not-a-knot")
     spline = CubicSpline(np.cbrt(depths[:count]), rows, bc_type=flat)
-    return _Column(spline, float(depths[count - 1]))
+    return spline, float(depths[count - 1])
 
 
 def _nearest(nodes: Any, place: int) -> list[int]:

@@ -37,7 +37,7 @@ _HELD = 1.0
 
 def determinant(F: FloatArray) -> FloatArray:
     """Return the volume ratio J of gradients of shape (..., 5)."""
-    return np.asarray((F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4])
+    return (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
 
 
 def cofactor(F: FloatArray) -> FloatArray:
@@ -93,7 +93,7 @@ class Rubber:
     def _pressing(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return minus the factor of the cofactor in the stress."""
         pressure = 2 * self.c1 + 4 * self.c2 + p - self.held * (determinant(F) - 1)
-        return np.asarray(pressure[..., None])
+        return pressure[..., None]
 
     def stress(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the nominal (first Piola-Kirchhoff) stress, shape (..., 5)."""
@@ -101,7 +101,7 @@ class Rubber:
         stress = 2 * self.c1 * F - self._pressing(F, p) * cof
         if self.c2:
             stress += 2 * self.c2 * (_curvature(F) @ cof[..., None])[..., 0]
-        return np.asarray(stress)
+        return stress
 
     def tangent(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the derivative of the nominal stress by the gradient, shape (..., 5, 5)."""
@@ -112,14 +112,14 @@ class Rubber:
         if self.c2:
             stiffness += 2 * self.c2 * (second @ second + _curvature(cof))
         stiffness[..., range(5), range(5)] += 2 * self.c1
-        return np.asarray(stiffness)
+        return stiffness
 
     def cauchy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the Cauchy stress rr, zz, hoop and rz, tension positive, shape (..., 4)."""
         S = np.moveaxis(self.stress(F, p), -1, 0)
         (rr, rz, zr, zz, hoop) = np.moveaxis(F, -1, 0)
         pulled = [S[0] * rr + S[1] * rz, S[2] * zr + S[3] * zz, S[4] * hoop, S[0] * zr + S[1] * zz]
-        return np.asarray(np.stack(pulled, axis=-1) / determinant(F)[..., None])
+        return np.stack(pulled, axis=-1) / determinant(F)[..., None]
 
 
 # Sides below the contact, as a share of the rod's radius or of the contact's ...

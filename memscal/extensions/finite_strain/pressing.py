@@ -249,7 +249,7 @@ class Pressing:
         n = self.elements.n
         change = self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
-        solution = tangent.factors.solve(-np.asarray(change.T @ forces))
+        solution = tangent.factors.solve(-(change.T @ forces))
         sunk = goal.value - state.depth
         if isinstance(goal, Load):
             load = -float(np.sum(forces[touching + n]))
@@ -308,7 +308,7 @@ class Pressing:
         sinking = np.zeros(forces.size)
         sinking[touching + n] = -1.0
         sunk = stiffness @ sinking
-        pushed = np.asarray(change.T @ sunk)
+        pushed = change.T @ sunk
         along = -factors.solve(pushed)
         return _Tangent(factors, pushed, along, float(sinking @ sunk + pushed @ along))
 

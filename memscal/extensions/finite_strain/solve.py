@@ -26,7 +26,7 @@ from memscal.extensions.finite_strain.pressing import (
     work,
 )
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.film_response import FieldByOrder, RingTraction
+from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise
@@ -257,7 +257,7 @@ class _Request:
         # Between the last node that touches and the next.
         field = FiniteStrainField(pressing, pressed)
         last = int(np.flatnonzero(np.isin(elements.surface, pressed.touching))[-1])
-        ends = field.surface[0][last : last + 2] + field.surface[2][last : last + 2]
+        ends = field.displacements[0][last : last + 2] + field.displacements[2][last : last + 2]
         radius = min(float(np.mean(ends)), self.indenter.extent if rod else math.inf)
         energy = elements.energy(pressed.x) / _MM
         # Without friction the energy is the work; a sphere that sticks has no way.
@@ -287,16 +287,15 @@ class _Request:
 
 
 @dataclass(frozen=True, eq=False)
-class FiniteStrainField(FieldByOrder):
+class FiniteStrainField:
     """The field in a film at finite strain; zero beyond the film's edge."""
 
     # An element of the bonded base does not deform: its Cauchy traction is the nominal one.
-    # ``depression`` and ``outward`` are functions of a point's radius *before* the deformation.
     pressing: Pressing
     pressed: Pressed
 
     @cached_property
-    def base(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def tractions(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Radii at the base (m), pressure and outward shear on the film there (Pa)."""
         # Of the splines that do the same work as the nodal forces on every displacement that is
         # linear between the corners: more accurate than stresses taken inside the elements, and in
@@ -313,7 +312,7 @@ class FiniteStrainField(FieldByOrder):
         return np.asarray(r[1:]) / _MM, np.asarray(normal * _MPA), np.asarray(shear * _MPA)
 
     @cached_property
-    def surface(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def displacements(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Radii of the surface's nodes before deformation, their depression and outward shift."""
         elements = self.pressing.elements
         x = self.pressed.x
@@ -323,16 +322,21 @@ class FiniteStrainField(FieldByOrder):
         u = x[nodes]
         return r / _MM, w / _MM, u / _MM
 
-    def _base(self, r: FloatArray, order: int) -> FloatArray:
-        return _interpolated(self.base[0], self.base[1 + order], r, parity=-1 if order else 1)
+    def base(self, r: FloatArray, order: int) -> FloatArray:
+        """Return normal stress or outward traction at the base in Pa."""
+        return _interpolated(
+            self.tractions[0], self.tractions[1 + order], r, parity=-1 if order else 1
+        )
 
-    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
-        r = self.base[0]
-        traction = self.base[1 + order]
+    def spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
+        r = self.tractions[0]
+        traction = self.tractions[1 + order]
         return hankel_transform(r, traction, np.ravel(k), order=order).reshape(np.shape(k))
 
-    def _surface(self, r: FloatArray, order: int) -> FloatArray:
-        return _interpolated(self.surface[0], self.surface[1 + order], r, parity=0)
+    def surface(self, r: FloatArray, order: int) -> FloatArray:
+        """Return depression or outward displacement in m at radii before the deformation."""
+        return _interpolated(self.displacements[0], self.displacements[1 + order], r, parity=0)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
@@ -400,8 +404,7 @@ def _spline(r: FloatArray, values: FloatArray, parity: int) -> Callable[[FloatAr
     from scipy.interpolate import CubicSpline
 
     mirrored = np.concatenate([parity * values[3::-1], values])
-    spline = CubicSpline(np.concatenate([-r[3::-1], r]), mirrored)
-    return lambda radii: np.asarray(spline(radii))
+    return CubicSpline(np.concatenate([-r[3::-1], r]), mirrored)
 
 
 def _spline_masses(r: FloatArray, parity: int) -> FloatArray:

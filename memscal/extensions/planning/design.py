@@ -165,7 +165,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     points = measured_points(scan)
     model = ForwardModel(points, reference_spectra([stress], [points]))
     assert points.u_errors is not None  # the plan's: the voltages themselves have none
-    weights = np.asarray(1 / points.u_errors**2)
+    weights = 1 / points.u_errors**2
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
     reduced = ReducedScan.of(model, fit, weights)
     basis = departure_basis(model, fit, reduced)

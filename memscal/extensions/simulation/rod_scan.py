@@ -140,7 +140,7 @@ def simulate(
     def blurred(kernel: RadialKernel, order: int) -> FloatArray:
         stress = blurred_stress(contacts, kernel, distance, order=order)
         stress = stress * (loads / solved)[:, None, None]
-        return np.asarray(stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0))
+        return stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0)
 
     stresses = sensor.stresses(blurred, offset, distance)
     stress = stresses["zz"]

@@ -33,7 +33,6 @@ from scipy.sparse import block_array, csc_array, csr_array
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
-from memscal.mechanics.film_response import FieldByOrder
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
@@ -106,8 +105,7 @@ def smooth(
 
     # Mirrored about the axis, so that what is fitted has the right symmetry.
     table = mirrored(r, -1), mirrored(quartic, parity), mirrored(knots, -1)
-    spline = make_lsq_spline(*table, k=_SMOOTH_DEGREE, w=mirrored(weights, 1))
-    return lambda radius: np.asarray(spline(radius))
+    return make_lsq_spline(*table, k=_SMOOTH_DEGREE, w=mirrored(weights, 1))
 
 
 def _quartics(along: FloatArray) -> FloatArray:
@@ -243,7 +241,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     displacement[index, 1] = -solution[inward]
 
     def averaged(values: FloatArray) -> FloatArray:
-        return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel()))
+        return np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel())
 
     radial = averaged(gradient[0][0])
     vertical = averaged(gradient[1][1])
@@ -346,7 +344,7 @@ class ElementFilm:
 
 
 @dataclass(frozen=True, eq=False)
-class ElementField(FieldByOrder):
+class ElementField:
     """The field in a film under a traction, zero beyond the film's edge at ``radius`` (m)."""
 
     film: ElasticFilm
@@ -358,12 +356,12 @@ class ElementField(FieldByOrder):
         """Return displacement and stress inside the film, on quadratic triangles."""
         return field_mesh(self.system, self.solution, self.film)
 
-    def _spectrum(self, k: FloatArray, order: int) -> FloatArray:
-        """Return a transform of the base's tractions, to 1e-5 of the load."""
+    def spectrum(self, k: FloatArray, order: int) -> FloatArray:
+        """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
         nodes = self.system.side(1.0)[0].r * self.film.thickness
         index = np.arange(_PER_NODE * (nodes.size - 1) + 1) / _PER_NODE
         r = np.interp(index, np.arange(nodes.size), nodes)
-        return hankel_transform(r, self._base(r, order), np.ravel(k), order=order).reshape(k.shape)
+        return hankel_transform(r, self.base(r, order), np.ravel(k), order=order).reshape(k.shape)
 
     @cached_property
     def _tractions(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
@@ -378,12 +376,14 @@ class ElementField(FieldByOrder):
         shear = np.append(0.0, spsolve(mass[1:, 1:], held[1:]))
         return smooth(line, -spsolve(mass, pushed), 1), smooth(line, shear, -1)
 
-    def _base(self, r: FloatArray, order: int) -> FloatArray:
+    def base(self, r: FloatArray, order: int) -> FloatArray:
+        """Return normal stress or outward traction at the base in Pa."""
         flat = np.ravel(np.asarray(r, dtype=np.float64))
         values = self._tractions[order](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
-    def _surface(self, r: FloatArray, order: int) -> FloatArray:
+    def surface(self, r: FloatArray, order: int) -> FloatArray:
+        """Return depression or outward displacement of the surface in m."""
         flat = np.ravel(np.asarray(r, dtype=np.float64))
         if np.any(flat > self.radius):
             raise DomainError(
@@ -392,4 +392,4 @@ class ElementField(FieldByOrder):
             )
         line, outward, inward = self.system.side(0.0)
         values = line.at(flat / self.film.thickness) @ self.solution[outward if order else inward]
-        return np.asarray(self.film.thickness * values).reshape(np.shape(r))
+        return (self.film.thickness * values).reshape(np.shape(r))

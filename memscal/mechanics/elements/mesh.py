@@ -72,7 +72,7 @@ class _Sizes:
         away = (np.asarray(r) - self.contact) / self.thickness
         widest = np.interp(away, _DISTANCES, _WIDEST)
         widest += _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
-        return np.asarray(widest * self.thickness / self.refinement)
+        return widest * self.thickness / self.refinement
 
 
 def _surface_nodes(rings: FloatArray, radius: float, sizes: _Sizes) -> FloatArray:

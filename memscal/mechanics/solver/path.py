@@ -29,9 +29,10 @@ def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> Contact
     """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
     # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
     state = step.take_step(problem, start, Touch(ring), same_contact=True)
-    pulls = state.pressure.min() < -_PULL * state.pressure.max()
-    wrong = pulls or _overlaps(problem, state)
-    return step.take_step(problem, start, Touch(ring)) if wrong else state
+    in_tension = state.pressure.min() < -_PULL * state.pressure.max()
+    if in_tension or _overlaps(problem, state):
+        return step.take_step(problem, start, Touch(ring))
+    return state
 
 
 def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
@@ -63,7 +64,7 @@ def _reached(state: ContactState, target: Target) -> float:
 
 def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
     """Return the state at ``target``, one step from the untouched film."""
-    untouched = np.zeros(problem.size)
+    untouched = np.zeros_like(problem.heights)
     start = replace(smooth, anchor=untouched, outward=untouched)
     try:
         return step.take_step(problem, start, target)
@@ -80,17 +81,18 @@ def _between_rings(
     """Find the neighbouring rings between which the edge lies; mix the states that meet there."""
 
     def meeting_at(ring: int) -> ContactState:
-        inside = replace(start, touching=np.arange(problem.size) < ring)
+        inside = replace(start, touching=np.arange(start.touching.size) < ring)
         return step.take_step(problem, inside, Touch(ring), same_contact=True)
 
-    rings = min(rings, problem.size - 1)
+    last = problem.heights.size - 1
+    rings = min(rings, last)
     upper = meeting_at(rings)
-    while _reached(upper, target) < target.value and rings < problem.size - 1:
+    while _reached(upper, target) < target.value and rings < last:
         rings += 1
         upper = meeting_at(rings)
     lower = meeting_at(rings - 1)
     while _reached(lower, target) > target.value and rings > 2:
-        rings = rings - 1
+        rings -= 1
         upper = lower
         lower = meeting_at(rings - 1)
     state = _mixture(lower, upper, target)
@@ -149,7 +151,7 @@ class _Walk:
         self.work += (before.load + following.load) / 2 * (following.depth - before.depth)
         self.dissipated += _dissipation(self.problem, before, following)
         self.state = following
-        self.steps = self.steps + 1
+        self.steps += 1
 
     def point(self) -> PathPoint:
         energy = _elastic_energy(self.problem, self.state)

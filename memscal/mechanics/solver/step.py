@@ -47,27 +47,22 @@ class ContactProblem:
     friction: float
     interface: Interface
 
-    @property
-    def size(self) -> int:
-        """Number of rings."""
-        return self.heights.size
-
     def displacements(self, p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
         both = self.compliance.whole @ np.concatenate([p, q])
-        return both[: self.size], both[self.size :]
+        return both[: p.size], both[p.size :]
 
     def separations(self, state: ContactState) -> FloatArray:
         """Return the distance between the two surfaces in m, ``inf`` beyond the indenter."""
         w, _ = self.displacements(state.pressure, state.shear)
-        return np.asarray(self.heights - state.depth + w)
+        return self.heights - state.depth + w
 
     def virgin(self) -> ContactState:
         """Return the state of the first touch, at the ring (or rings) of the lowest height."""
-        nothing = np.zeros(self.size)
+        nothing = np.zeros_like(self.heights)
         lowest = float(self.heights.min())
         touching = self.heights <= lowest
-        slip = np.zeros(self.size, dtype=np.int8)
+        slip = np.zeros_like(self.heights, dtype=np.int8)
         return ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
 
 
@@ -110,10 +105,6 @@ Target = Load | Depth
 Goal = Load | Depth | Touch
 
 
-_Rings = NDArray[np.intp]
-_Pair = tuple[_Rings, _Rings]  # that press, and that stick
-
-
 @dataclass(frozen=True, eq=False)
 class _Status:
     """Status and trial values of the n rings while the equations are solved."""
@@ -140,7 +131,7 @@ class _Trial(NamedTuple):
 def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trial:
     c = problem.compliance
     mu = problem.friction
-    n = problem.size
+    n = problem.heights.size
     rows = np.flatnonzero(status.pressing)
     off_axis = c.r > 0
     stuck = np.flatnonzero(status.pressing & (status.slip == 0) & off_axis) if mu > 0 else rows[:0]
@@ -160,9 +151,17 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     matrix[:, slipping] += equations.take(n + rows[slipping], axis=1) * ratio[slipping]
     matrix[: rows.size, -1] = matrix[-1, -1] = -unit
     right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [-problem.heights[ring]]])
-    if not isinstance(goal, Touch):
-        matrix[-1], right[-1] = _goal_row(problem, goal, rows, unknown.size, unit)
-    if (law := problem.interface.normal_law) is not None:
+    if isinstance(goal, Depth):
+        matrix[-1] = 0.0
+        matrix[-1, -1] = unit
+        right[-1] = goal.value
+    elif isinstance(goal, Load):
+        scale = unit / c.areas.sum()
+        matrix[-1] = 0.0
+        matrix[-1, : rows.size] = c.areas[rows] * scale
+        right[-1] = goal.value * scale
+    law = problem.interface.normal_law
+    if law is not None:
         # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
         gap = status.separation[rows]
         stiffness = law.stiffness(gap, problem.film)
@@ -170,7 +169,7 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
         matrix[diagonal, diagonal] += 1 / stiffness
         right[diagonal] += gap + law.pressure(gap, problem.film) / stiffness
     if problem.interface.slip_length > 0 and math.isfinite(mu):
-        _add_tangential_compliance(problem, status, (rows, stuck), matrix, right)
+        _add_tangential_compliance(problem, status, rows, stuck, matrix, right)
     try:
         solution = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
@@ -190,37 +189,27 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
     return _Trial(pressure, shear, depth, problem.heights - depth + w, u)
 
 
-def _goal_row(
-    problem: ContactProblem, goal: Target, rows: _Rings, unknowns: int, unit: float
-) -> tuple[FloatArray, float]:
-    """Return the equation that ends the step, of the size of the others."""
-    row = np.zeros(unknowns + 1)
-    if isinstance(goal, Load):
-        areas = problem.compliance.areas
-        scale = unit / areas.sum()
-        row[: rows.size] = areas[rows] * scale
-        return row, goal.value * scale
-    row[-1] = unit
-    return row, goal.value
-
-
 def _add_tangential_compliance(
-    problem: ContactProblem, status: _Status, rings: _Pair, matrix: FloatArray, right: FloatArray
+    problem: ContactProblem,
+    status: _Status,
+    pressing: NDArray[np.intp],
+    stuck: NDArray[np.intp],
+    matrix: FloatArray,
+    right: FloatArray,
 ) -> None:
     r"""Replace :math:`u = u^0` by :math:`\mu p\,(u - u^0) + \ell q = 0`, linearised."""
-    rows, stuck = rings
     mu = problem.friction
     length = problem.interface.slip_length
     limit = mu * np.maximum(status.pressure[stuck], 0.0)
     # The equation is divided by what keeps it of the size of the others, also where p vanishes.
     size = limit + length / np.diagonal(problem.compliance.radial)[stuck]
-    here = rows.size + np.arange(stuck.size)
+    here = pressing.size + np.arange(stuck.size)
     matrix[here] *= (limit / size)[:, None]
     right[here] *= limit / size
     matrix[here, here] += length / size
-    pull = mu * status.stretch[stuck] / size
-    matrix[here, np.searchsorted(rows, stuck)] += pull
-    right[here] += pull * status.pressure[stuck]
+    by_pressure = mu * status.stretch[stuck] / size
+    matrix[here, np.searchsorted(pressing, stuck)] += by_pressure
+    right[here] += by_pressure * status.pressure[stuck]
 
 
 _MOST_ITERATIONS = 200
@@ -243,7 +232,7 @@ def take_step(
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
     law = problem.interface.normal_law
     pressing = start.touching.copy()
-    separation = np.zeros(problem.size)  # counts where the interface is compliant alone
+    separation = np.zeros_like(problem.heights)  # counts where the interface is compliant alone
     if law is not None:
         separation = problem.separations(start)
         pressing = _bearing(problem, law, separation)
@@ -369,6 +358,6 @@ def _accepted(
     # What slips drags its anchor along, a slip length behind; what is free has none.
     moving = ~status.pressing | (slip != 0)
     anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
-    touching = status.pressing | (np.arange(problem.size) == held)
+    touching = status.pressing | (np.arange(p.size) == held)
     load = float(problem.compliance.areas @ p)
     return ContactState(p, q, depth, load, touching, slip, anchor, u)

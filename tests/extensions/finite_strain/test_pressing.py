@@ -112,10 +112,10 @@ def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, stickin
     assert state.load == pytest.approx(0.1, rel=1e-9)
     assert state.depth == pytest.approx(linear.depth, rel=5e-3)
     highest = linear.base_stress(0.0)
-    assert state.inside.base_normal(RADII) == pytest.approx(
+    assert state.base_stress(RADII) == pytest.approx(
         linear.base_stress(RADII), abs=3e-3 * float(highest)
     )
-    assert state.inside.base_shear(RADII) == pytest.approx(
+    assert state.base_shear(RADII) == pytest.approx(
         linear.base_shear(RADII), abs=3e-3 * float(highest)
     )
 
@@ -131,7 +131,7 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> Non
     )
     # The stress at the edge of the flat is singular, and the mesh no finer than the rounding's.
     assert state.load == pytest.approx(linear.load, rel=5e-3)
-    per_load = state.inside.base_normal(RADII) / state.load
+    per_load = state.base_stress(RADII) / state.load
     expected = linear.base_stress(RADII) / linear.load
     assert per_load == pytest.approx(expected, abs=1e-3 * float(expected[0]))
 
@@ -141,7 +141,7 @@ def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]) -> None:
         elements = state.inside.pressing.elements
         forces = elements.forces(state.inside.pressed.x)
         assert np.sum(forces[elements.base + elements.n]) == pytest.approx(state.load, rel=1e-9)
-        assert state.inside.base_spectrum(np.zeros(1))[0] == pytest.approx(state.load, rel=1e-5)
+        assert state.base_spectrum(np.zeros(1))[0] == pytest.approx(state.load, rel=1e-5)
 
 
 def test_the_departure_of_the_base_stress_grows_linearly_at_first(pressed_rods) -> None:
@@ -151,7 +151,7 @@ def test_the_departure_of_the_base_stress_grows_linearly_at_first(pressed_rods) 
     )
     k = np.array([1500.0])
     light, medium, heavy = (
-        state.inside.base_spectrum(k)[0] / state.load for state in (hardly, once, twice)
+        state.base_spectrum(k)[0] / state.load for state in (hardly, once, twice)
     )
     assert abs(medium / light - 1) > 1e-4
     assert (heavy / light - 1) / (medium / light - 1) == pytest.approx(2.0, rel=0.25)
@@ -164,7 +164,7 @@ def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods: tuple[Conta
 
 def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]) -> None:
     deepest = pressed_rods[-1]
-    r, depression, outward = deepest.inside.surface
+    r, depression, outward = deepest.inside.displacements
     moved = (r + outward) * 1e3
     above = (deepest.depth - depression) * 1e3
     _, gap = RodFace(0.25, 0.05).nearest(moved, above)
@@ -183,7 +183,7 @@ def test_a_mesh_of_the_state_carries_stress_and_displacement(pressed_rods) -> No
         middle = mesh.points[mesh.triangles[:, [start, end]]].mean(axis=1)
         assert mesh.points[mesh.triangles[:, 3 + side]] == pytest.approx(middle)
     near = (mesh.points[:, 1] < 1e-12) & (mesh.points[:, 0] < 2e-3)
-    expected = -state.inside.base_normal(mesh.points[near, 0])
+    expected = -state.base_stress(mesh.points[near, 0])
     assert mesh.stress[near, 1] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
     assert mesh.displacement[:, 1].min() == pytest.approx(-state.depth, rel=1e-6)
 
@@ -193,8 +193,8 @@ def test_a_sticking_sphere_moves_nothing_outward_and_a_sliding_one_does() -> Non
     depths = (Depth(20e-6), Depth(20.5e-6))
     slides, deeper = solve_finite_strain(FILM, SPHERE, depths, refinement=0.5)
     (sticks,) = solve_finite_strain(FILM, SPHERE, (Depth(20e-6),), sticking=True, refinement=0.5)
-    assert np.max(np.abs(sticks.inside.outward(r))) < 1e-12
-    assert np.max(np.abs(slides.inside.outward(r))) > 1e-7
+    assert np.max(np.abs(sticks.surface_outward(r))) < 1e-12
+    assert np.max(np.abs(slides.surface_outward(r))) > 1e-7
     assert sticks.load > slides.load
     assert sticks.work is None
     work = (slides.load + deeper.load) / 2 * (deeper.depth - slides.depth)
