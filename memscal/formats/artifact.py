@@ -1,12 +1,12 @@
 """memscal-artifact: the apparatus function with all that it rests on, as HDF5."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats import groups
+from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import (
@@ -41,14 +41,16 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
     reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
-    of_scan = records.RECONVOLUTION.read_in(reading)
+    reconvolution = records.RECONVOLUTION.read_in(reading)
     return ApparatusData(
         plane=ApparatusField(**read_record(records.FIELD, file, _PLANE))
         if file.has(_PLANE)
         else None,
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
         transfer=apparatus.TransferFunction(**transfer),
-        reconvolution=apparatus.Reconvolution(**read_record(of_scan, file, "/entry/reconvolution")),
+        reconvolution=apparatus.Reconvolution(
+            **read_record(reconvolution, file, "/entry/reconvolution")
+        ),
         parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file, "/entry/quality"),
@@ -64,9 +66,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     )
 
 
-def write_artifact(
-    data: ApparatusData, path: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
+def write_artifact(data: ApparatusData, path: FilePath, *, overwrite: bool = False) -> None:
     """Write an apparatus function as a memscal-artifact file; the same data, the same bytes."""
     write_tree(artifact_tree(data), path, overwrite=overwrite)
 
@@ -74,13 +74,13 @@ def write_artifact(
 def artifact_tree(data: ApparatusData) -> Group:
     """Return what a memscal-artifact file holds; its root states the content digest."""
     sensor = data.sensor.name
-    of_scan = records.RECONVOLUTION.read_in(data.reading)
+    reconvolution = records.RECONVOLUTION.read_in(data.reading)
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
         "transfer_function": write_record(records.TRANSFER, data.transfer),
-        "reconvolution": write_record(of_scan, data.reconvolution),
+        "reconvolution": write_record(reconvolution, data.reconvolution),
         "parameters": groups.parameter_group(data.parameters, data.budget),
         "quality": groups.quality_group(data.checks),
         "sample": groups.sample_group(data.film),
@@ -112,8 +112,8 @@ def _changes_group(data: ApparatusData) -> Group:
     names, changes = zip(*data.kernel_changes.items(), strict=True)
     group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})
     radii = si(data.radial_profile.r, "length", ("r",))
-    beside = {"names": to_json("inputs", list(names)), **group.children, "r": radii}
-    return replace(group, children=beside)
+    listed = to_json("inputs", list(names))
+    return replace(group, children={"names": listed, **group.children, "r": radii})
 
 
 def _read_changes(file: SafeFile) -> dict[str, FloatArray]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError, MemscalError, OutputError
-from memscal.formats.files import atomic_write_bytes
+from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_bytes
 from memscal.formats.values import require_schema, require_unaltered
@@ -24,7 +24,7 @@ from memscal.model.arrays import FloatArray
 
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"
 
-CacheFolder = str | os.PathLike[str] | None
+CacheFolder = FilePath | None
 """A folder in which calculated contacts are kept; ``None`` keeps none."""
 
 #: A folder grows no further than this.
@@ -92,19 +92,19 @@ def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] |
     return arrays
 
 
-def clear_contact_tables(folder: str | os.PathLike[str]) -> int:
+def clear_contact_tables(folder: FilePath) -> int:
     """Remove all tables from a folder, and nothing else; return how many there were."""
     return sum(_removed(path) for path, _ in _entries(folder))
 
 
-def _path(folder: str | os.PathLike[str], key: str) -> Path:
+def _path(folder: FilePath, key: str) -> Path:
     name = f"{key}.h5"
     if not _ENTRY.fullmatch(name):
         raise FormatError(f"{key!r} is not the key of a contact table.")
     return Path(folder) / name
 
 
-def _entries(folder: str | os.PathLike[str]) -> list[tuple[Path, os.stat_result]]:
+def _entries(folder: FilePath) -> list[tuple[Path, os.stat_result]]:
     """Return the tables of a folder, the one used longest ago first."""
     entries = []
     with contextlib.suppress(OSError), os.scandir(folder) as items:
@@ -115,7 +115,7 @@ def _entries(folder: str | os.PathLike[str]) -> list[tuple[Path, os.stat_result]
     return sorted(entries, key=lambda entry: (entry[1].st_mtime_ns, entry[0].name))
 
 
-def _prune(folder: str | os.PathLike[str]) -> None:
+def _prune(folder: FilePath) -> None:
     entries = _entries(folder)
     size = sum(status.st_size for _, status in entries)
     # What was written last stays, however large it is.

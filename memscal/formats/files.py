@@ -17,6 +17,9 @@ from typing import Any, Self
 from memscal.errors import InputError, OutputError, UnsafeFileError
 from memscal.model.sizes import MOST_FILE_BYTES, too_large
 
+FilePath = str | os.PathLike[str]
+"""The path of a file."""
+
 fcntl: Any
 try:
     import fcntl
@@ -38,10 +41,10 @@ _NO_HARD_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, er
 
 
 def ensure_writable(
-    path: str | os.PathLike[str],
+    path: FilePath,
     *,
     overwrite: bool = False,
-    inputs: Iterable[str | os.PathLike[str]] = (),
+    inputs: Iterable[FilePath] = (),
 ) -> None:
     """Prove that an output can be written, by writing beside it: permissions show no full disk."""
     with _Transaction() as proof:
@@ -49,7 +52,7 @@ def ensure_writable(
 
 
 def atomic_write_bytes(
-    path: str | os.PathLike[str], data: bytes | memoryview, *, overwrite: bool = False
+    path: FilePath, data: bytes | memoryview, *, overwrite: bool = False
 ) -> None:
     """Write a file whole or not at all: beside the target, flushed, then renamed in one step."""
     target = _checked_target(path, overwrite=overwrite)
@@ -58,7 +61,7 @@ def atomic_write_bytes(
 
 
 @contextlib.contextmanager
-def together(folder: str | os.PathLike[str] | None = None) -> Iterator[None]:
+def together(folder: FilePath | None = None) -> Iterator[None]:
     """Have all files that are written in a block take their names at its end, or none of them.
 
     A folder is made for them if it does not exist; it goes if they fail.
@@ -181,9 +184,7 @@ def _given_back(file: _File) -> bool:
     return True
 
 
-def _checked_target(
-    path: str | os.PathLike[str], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str]] = ()
-) -> Path:
+def _checked_target(path: FilePath, *, overwrite: bool, inputs: Iterable[FilePath] = ()) -> Path:
     """Follow symbolic links to the real target and refuse what must not be replaced."""
     shown = os.fspath(path)
     if not shown or "\0" in shown:
@@ -314,12 +315,12 @@ def _output_error(target: Path, error: OSError) -> OutputError:
     return OutputError(problem, why=_UNTOUCHED, cure=cure)
 
 
-def read_bytes(path: str | os.PathLike[str], *, limit: int = MOST_FILE_BYTES) -> bytes:
+def read_bytes(path: FilePath, *, limit: int = MOST_FILE_BYTES) -> bytes:
     """Read a regular file of bounded size, once, without ever waiting for another program."""
     return b"".join(read_pieces(path, limit=limit))
 
 
-def read_pieces(path: str | os.PathLike[str], *, limit: int) -> Iterator[bytes]:
+def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
     """Yield the same in pieces of up to 1 MiB; a file that grows meanwhile meets the limit, too."""
     shown = os.fspath(path)
     try:

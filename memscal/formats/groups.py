@@ -165,8 +165,8 @@ def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, 
         elif isinstance(value, str):
             texts[name] = value
         else:
-            of_messages = quantity.dimension == "messages"
-            notes[name] = [item.text for item in value] if of_messages else value
+            messages = quantity.dimension == "messages"
+            notes[name] = [item.text for item in value] if messages else value
     return texts | notes
 
 
@@ -196,9 +196,10 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
     stated = parameters.units or ("",) * len(parameters.names)
-    pairs = zip(parameters.names, stated, strict=True)
-    of = parameters.reading
-    dimensions = {name: parameter_dimension(name, unit, of) for name, unit in pairs}
+    dimensions = {
+        name: parameter_dimension(name, unit, parameters.reading)
+        for name, unit in zip(parameters.names, stated, strict=True)
+    }
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
         why = "The group of the parameters holds something else of that name."
@@ -223,20 +224,29 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     if not names or len(set(names)) != len(names):
         problem = f"{file.where(path)}/names is missing or names a parameter twice."
         raise FormatError(problem, why="It lists the parameters, in the order of their covariance.")
-    for name in names:  # their units are entered
-        estimated_quantity(name).read_in(reading)
-    pairs = [any_scalar(file, f"{path}/{name}") for name in names]
-    scale = np.array([_unit_scale(file, f"{path}/{name}") for name in names])
+    values = []
+    units = []
+    scales = []
+    for name in names:
+        estimated_quantity(name).read_in(reading)  # enters its unit
+        at = f"{path}/{name}"
+        value, si_unit = any_scalar(file, at)
+        values.append(value)
+        units.append(si_unit)
+        stored = units_of(file, at) or "1"
+        where = file.where(at)
+        scales.append(to_si(1.0, stored, dimension_of(stored, where), where))
     covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)
     if covariance.shape != (len(names), len(names)):
         raise FormatError(
             f"{file.where(path)}/covariance has shape {covariance.shape} for {len(names)} names."
         )
+    scale = np.array(scales)
     return ParameterSet(
         names=names,
-        values=np.array([value for value, _ in pairs]),
+        values=np.array(values),
         covariance=covariance * scale[:, None] * scale[None, :],
-        units=tuple(unit for _, unit in pairs),
+        units=tuple(units),
         reading=reading,
     )
 
@@ -259,16 +269,12 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
 
 def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
     """Read the uncertainty budget, in SI units; empty where there is none."""
-    groups = {name: f"{path}/{name}" for name in text_list(file, f"{path}/names")}
-    return {
-        name: {s: any_scalar(file, f"{group}/{s}")[0] for s in text_list(file, f"{group}/names")}
-        for name, group in groups.items()
-    }
-
-
-def _unit_scale(file: SafeFile, path: str) -> float:
-    unit = units_of(file, path) or "1"
-    return float(to_si(1.0, unit, dimension_of(unit, file.where(path)), file.where(path)))
+    budget = {}
+    for quantity in text_list(file, f"{path}/names"):
+        group = f"{path}/{quantity}"
+        sources = text_list(file, f"{group}/names")
+        budget[quantity] = {name: any_scalar(file, f"{group}/{name}")[0] for name in sources}
+    return budget
 
 
 _ROUND: dict[str, type[RoundIndenter]] = {shape.shape: shape for shape in (Rod, Sphere)}
@@ -296,9 +302,11 @@ _NOWHERE = {"depends_on": "."}
 def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
     stated = {"lubrication": lubrication, "lubricant": lubricant}
-    contact = write_record(records.SAMPLE, stated).children
-    of = {} if film is None else {"film": write_record(records.FILM, film)}
-    return Group("NXsample", {**of, **contact, **_NOWHERE})
+    children: dict[str, Node] = {}
+    if film is not None:
+        children["film"] = write_record(records.FILM, film)
+    children |= write_record(records.SAMPLE, stated).children
+    return Group("NXsample", {**children, **_NOWHERE})
 
 
 def indenter_group(
@@ -365,9 +373,11 @@ def read_instrument(file: SafeFile, path: str) -> dict[str, Any]:
 
 def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
+    children = dict(write_record(records.TIMES, of).children)
     user = write_record(records.USER, of.user)
-    times = write_record(records.TIMES, of).children
-    return {**times, **({"user": user} if user.children else {})}
+    if user.children:
+        children["user"] = user
+    return children
 
 
 def read_circumstances(file: SafeFile) -> dict[str, Any]:
@@ -382,14 +392,19 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
     film = profile.film
     indenter = profile.indenter
-    of = {"film": write_record(records.FILM, film)} if film else {}
-    of |= {"indenter": indenter_group(indenter)} if indenter else {}
+    contact: dict[str, Node] = {}
+    if film:
+        contact["film"] = write_record(records.FILM, film)
+    if indenter:
+        contact["indenter"] = indenter_group(indenter)
+    solution: dict[str, Node] = {}
     numerics = write_record(records.NUMERICS, profile)
-    made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
-    made |= write_record(records.PROFILE_NOTES, profile).children
+    if numerics.children:
+        solution["numerics"] = numerics
+    solution |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
-    parameters = write_record(records.CONTACT, profile, **of)
-    return data, parameters, write_record(records.SOLVER, profile, **made)
+    parameters = write_record(records.CONTACT, profile, **contact)
+    return data, parameters, write_record(records.SOLVER, profile, **solution)
 
 
 def _form(form: IdealReference | StressField) -> Group:
@@ -409,7 +424,7 @@ def read_field(file: SafeFile, path: str) -> StressField:
     y, x = axes if isinstance(axes, tuple) and len(axes) == 2 else ("y", "x")
     signal = (file.attribute(path, "signal") if path else None) or "sigma_zz"
     at = f"{path}/{signal}"
-    unit = units_of(file, f"{path}/{signal}") or "1"
+    unit = units_of(file, at) or "1"
     if not file.has(at):
         why = "The file is no memscal-reference, and should hold a field there."
         raise FormatError(f"{file.where(at)} is missing.", why=why)
@@ -417,11 +432,12 @@ def read_field(file: SafeFile, path: str) -> StressField:
     with suppress(UnitError):
         values = to_si(values, unit, "stress", file.where(at))
         unit = "Pa"
-    places = [require_array(file, f"{path}/{name}", "length", ndim=1) for name in (x, y)]
     load = require_scalar(file, f"{path}/load", "force") if file.has(f"{path}/load") else None
+    along_x = require_array(file, f"{path}/{x}", "length", ndim=1)
+    along_y = require_array(file, f"{path}/{y}", "length", ndim=1)
     with placed(file.where(path or "/")):
         return StressField(
-            x=places[0], y=places[1], values=values, unit=unit, load=load, source=file.source
+            x=along_x, y=along_y, values=values, unit=unit, load=load, source=file.source
         )
 
 

@@ -1,6 +1,5 @@
 """Contents of a file, and its checks step by step: for ``memscal inspect`` and ``check``."""
 
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +8,7 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
+from memscal.formats.files import FilePath
 from memscal.formats.groups import estimated_record, listed, origins, read_quality
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -91,7 +91,7 @@ class Finding:
     meaning: str
 
 
-def describe(path: str | os.PathLike[str], *, accept_altered: bool = False) -> dict[str, Any]:
+def describe(path: FilePath, *, accept_altered: bool = False) -> dict[str, Any]:
     """Return what a file of memscal holds, in its units and in plain values for JSON."""
     with open_hdf5(path, accept_altered=accept_altered) as file:
         schema = _schema(file)
@@ -107,13 +107,13 @@ def describe(path: str | os.PathLike[str], *, accept_altered: bool = False) -> d
         arrays = []
         provenance = []
         for at, layout in _layout(file, schema):
-            for path_of_quantity, quantity in listed(layout, file, at):
+            for place, quantity in listed(layout, file, at):
                 if quantity.origin:
-                    provenance.append((path_of_quantity, quantity))
+                    provenance.append((place, quantity))
                 elif quantity.axes:
-                    arrays.append(_array_row(file, path_of_quantity))
+                    arrays.append(_array_row(file, place))
                 elif not quantity.key.endswith("_errors"):
-                    quantities.append(_quantity_row(file, path_of_quantity, quantity.key))
+                    quantities.append(_quantity_row(file, place, quantity.key))
         content["quantities"] = quantities
         content["arrays"] = arrays
         content["checks"] = [
@@ -130,7 +130,7 @@ def describe(path: str | os.PathLike[str], *, accept_altered: bool = False) -> d
         return content
 
 
-def check(path: str | os.PathLike[str]) -> list[Finding]:
+def check(path: FilePath) -> list[Finding]:
     """Check a file step by step (safety, schema, digest, content) up to the first that fails."""
     findings: list[Finding] = []
     step = "safety"

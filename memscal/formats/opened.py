@@ -5,6 +5,7 @@ from os import PathLike
 from typing import Any, TypeAlias
 
 from memscal.errors import InputError
+from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import scan_from
@@ -12,16 +13,15 @@ from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
-Path: TypeAlias = str | PathLike[str]
-Scans: TypeAlias = Scan | Path | Sequence[Scan | Path]
+Scans: TypeAlias = Scan | FilePath | Sequence[Scan | FilePath]
 """One scan or several, each itself or as the path of its file."""
 
-Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStress | Path]
+Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | MeasuredStress | FilePath]
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
 def opened_scan(
-    scan: Scan | Path, most: int | None = None, *, accept_altered: bool = False
+    scan: Scan | FilePath, most: int | None = None, *, accept_altered: bool = False
 ) -> Scan:
     """Return a scan that is given itself or as a path, with ``most`` points in a file."""
     if not isinstance(scan, str | PathLike):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError, placed
-from memscal.formats.files import read_bytes
+from memscal.formats.files import FilePath, read_bytes
 from memscal.formats.groups import profile_groups, read_field, read_profile
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
@@ -30,7 +30,7 @@ _LUMINANCE = (0.299, 0.587, 0.114)
 
 
 def read_reference(
-    path: str | os.PathLike[str], *, pixel_size: float | None = None, accept_altered: bool = False
+    path: FilePath, *, pixel_size: float | None = None, accept_altered: bool = False
 ) -> StressProfile:
     """Read a stress profile or a field from a file, or make that of an ideal reference.
 
@@ -82,7 +82,7 @@ def read_reference(
         return profile_from(file)
 
 
-def ideal_reference(text: str | os.PathLike[str]) -> IdealReference | None:
+def ideal_reference(text: FilePath) -> IdealReference | None:
     """Return the ideal reference that a text names; nothing of a file that exists."""
     match = _NAMED.fullmatch(os.fspath(text).strip())
     if match is None or os.path.exists(text):
@@ -103,7 +103,7 @@ def length(text: str, what: str) -> float:
     return float(to_si(float(match[1]), match[2], "length", what))
 
 
-def _read_pixels(path: str | os.PathLike[str], pixel_size: float | None) -> StressField:
+def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
     """Read a field from a 2-D array or an image."""
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
@@ -153,9 +153,7 @@ def profile_from(file: SafeFile) -> StressProfile:
     return read_profile(file, "/entry/reference", "/entry/parameters", "/entry/process")
 
 
-def write_reference(
-    profile: StressProfile, path: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
+def write_reference(profile: StressProfile, path: FilePath, *, overwrite: bool = False) -> None:
     """Write a stress profile as a memscal-reference file, whole or not at all.
 
     Parameters

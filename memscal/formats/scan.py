@@ -1,13 +1,12 @@
 """memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from memscal.errors import FormatError, OutputError, placed
 from memscal.formats import groups, values
-from memscal.formats.files import ensure_writable, together
+from memscal.formats.files import FilePath, ensure_writable, together
 from memscal.formats.groups import read_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -37,7 +36,7 @@ _SYNTHETIC = (
 )
 
 
-def read_scan(path: str | os.PathLike[str], *, accept_altered: bool = False) -> Scan:
+def read_scan(path: FilePath, *, accept_altered: bool = False) -> Scan:
     """Read a scan from a memscal-scan file.
 
     Parameters
@@ -142,7 +141,7 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]
     return arrays
 
 
-def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def write_scan(scan: Scan, path: FilePath, *, overwrite: bool = False) -> None:
     """Write a scan as a memscal-scan file, whole or not at all.
 
     Parameters
@@ -171,17 +170,16 @@ def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = Fa
 
 
 def _entry(scan: Scan) -> Group:
-    notes: dict[str, Node] = {"notes": writer.note(scan.notes)} if scan.notes else {}
     children: dict[str, Node] = {"title": scan.title} if scan.title else {}
+    children |= groups.circumstances(scan)
+    children["data"] = _data_group(scan)
     loading = scan.load, scan.load_uncertainty, scan.rod_friction
-    children |= {
-        **groups.circumstances(scan),
-        "data": _data_group(scan),
-        "indenter": groups.indenter_group(scan.indenter, *loading),
-        "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
-        "instrument": groups.instrument_group(scan.sensor, scan.load_cell, scan.stage),
-        **notes,
-    }
+    children["indenter"] = groups.indenter_group(scan.indenter, *loading)
+    children["sample"] = groups.sample_group(scan.film, scan.lubrication, scan.lubricant)
+    instruments = scan.sensor, scan.load_cell, scan.stage
+    children["instrument"] = groups.instrument_group(*instruments)
+    if scan.notes:
+        children["notes"] = writer.note(scan.notes)
     if scan.reference is not None:
         children |= groups.reference_groups(scan.reference)
     if scan.synthetic is not None:
@@ -192,8 +190,12 @@ def _entry(scan: Scan) -> Group:
 def _data_group(scan: Scan) -> Group:
     along = scan.direction
     points = scan.kind == "points"
-    axes = _POINTS if points else (_ALONG_Y if along == "y" else _AXES)[scan.kind]
-    data: dict[str, Node] = {"point": writer.index_axis("point", scan.x.size)} if points else {}
+    data: dict[str, Node] = {}
+    axes: tuple[str, ...] = _POINTS
+    if points:
+        data["point"] = writer.index_axis("point", scan.x.size)
+    else:
+        axes = _ALONG_Y[scan.kind] if along == "y" else _AXES[scan.kind]
     data |= _nodes(scan, {"y": scan.y}, axes if points else ("y",))
     if scan.repeat is not None:
         data["repeat"] = writer.Number(scan.repeat, "1", axes)
@@ -210,8 +212,8 @@ def _data_group(scan: Scan) -> Group:
         pairs = zip(_PAIRS, scan.u_zz_correlation.shape, strict=True)
         data |= {axis: writer.index_axis(axis, size) for axis, size in pairs}
         data |= _nodes(scan, {"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
-    optional = {name: getattr(scan, name) for name in LIKE_SIGNAL}
-    data |= _nodes(scan, optional | dict(scan.channels), axes)
+    like_signal = {name: getattr(scan, name) for name in LIKE_SIGNAL}
+    data |= _nodes(scan, like_signal | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
@@ -268,9 +270,7 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
     return truth
 
 
-def ensure_folder_writable(
-    folder: str | os.PathLike[str], names: Iterable[str], *, overwrite: bool
-) -> None:
+def ensure_folder_writable(folder: FilePath, names: Iterable[str], *, overwrite: bool) -> None:
     """Prove that files of these names can be written in a folder, which need not exist yet."""
     target = Path(folder)
     if not target.exists() and not target.is_symlink():
@@ -284,9 +284,7 @@ def ensure_folder_writable(
         ensure_writable(target / name, overwrite=overwrite)
 
 
-def write_scans(
-    scans: Mapping[str, Scan], folder: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
+def write_scans(scans: Mapping[str, Scan], folder: FilePath, *, overwrite: bool = False) -> None:
     """Write scans as memscal-scan files of one folder, all of them or none."""
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)

@@ -1,6 +1,5 @@
 """memscal-stress: the stress that a calibrated sensor measured, load by load, as HDF5."""
 
-import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,6 +9,7 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats import groups, values
+from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -96,7 +96,7 @@ _MOST_SCANS = 10_000
 _PROCESS = "/entry/process"
 
 
-def read_stress(path: str | os.PathLike[str], *, accept_altered: bool = False) -> MeasuredStress:
+def read_stress(path: FilePath, *, accept_altered: bool = False) -> MeasuredStress:
     """Read measured stress from a memscal-stress file.
 
     Parameters
@@ -143,8 +143,10 @@ def stress_from(file: SafeFile) -> MeasuredStress:
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
-    of_scans = zip(paths, numbers, strict=True)
-    profiles = tuple(_read_profile(file, path, scans[i - 1]) for path, i in of_scans)
+    profiles = tuple(
+        _read_profile(file, path, scans[number - 1])
+        for path, number in zip(paths, numbers, strict=True)
+    )
     accepted = accepted_alterations(file.source)
     process = groups.read_process(file, _PROCESS)
     return MeasuredStress(
@@ -159,9 +161,7 @@ def stress_from(file: SafeFile) -> MeasuredStress:
     )
 
 
-def write_stress(
-    measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
+def write_stress(measured: MeasuredStress, path: FilePath, *, overwrite: bool = False) -> None:
     """Write measured stress as a memscal-stress file, whole or not at all."""
     root = writer.file_tree(writer.STRESS_SCHEMA, _entry(measured))
     writer.write_tree(root, path, overwrite=overwrite)
@@ -173,23 +173,25 @@ def profile_paths(file: SafeFile) -> list[str]:
 
 
 def _entry(measured: MeasuredStress) -> Group:
-    groups_of = [_profile_group(profile, measured.scans) for profile in measured.profiles]
-    profiles = {f"profile_{i}": group for i, group in enumerate(groups_of, 1)}
-    numbered = enumerate(measured.scans, 1)
-    scans: dict[str, Node] = {f"scan_{i}": _scan_group(scan) for i, scan in numbered}
+    profiles: dict[str, Node] = {}
+    for i, profile in enumerate(measured.profiles, 1):
+        profiles[f"profile_{i}"] = _profile_group(profile, measured.scans)
+    scans: dict[str, Node] = {}
     sources = {"artifact": measured.artifact}
-    sources |= {f"scan_{i}": scan.source for i, scan in enumerate(measured.scans, 1)}
+    for i, scan in enumerate(measured.scans, 1):
+        scans[f"scan_{i}"] = _scan_group(scan)
+        sources[f"scan_{i}"] = scan.source
     inputs: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     first = measured.scans[0]
     sensor = first.sensor.name
     digest = measured.artifact_digest
-    of_artifact = {"content_sha256": digest} if digest else {}
+    digests = {"content_sha256": digest} if digest else {}
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", list(profiles)),
         **profiles,
         **_parts_of_profiles(measured.profiles),
-        "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **of_artifact),
+        "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **digests),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.
@@ -215,8 +217,8 @@ def _scan_number(file: SafeFile, path: str) -> int:
 
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
     arrays = write_record(records.STRESS_PROFILE, profile)
-    of = profile.scan.reading
-    numbers = dict(write_record(records.STRESS_NUMBERS.read_in(of), _numbers(profile)).children)
+    record = records.STRESS_NUMBERS.read_in(profile.scan.reading)
+    numbers = dict(write_record(record, _numbers(profile)).children)
     # What not every profile has comes last.
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     children: dict[str, Node] = {

@@ -41,11 +41,9 @@ _POWERS = {
     "stress per length": {"MPa/mm": 9},
     "dimensionless": dict.fromkeys(("1", "", *ARBITRARY), 0),
 }
-_CANONICAL = {
-    unit: (dimension, power)
-    for dimension, units in _POWERS.items()
-    for unit, power in units.items()
-}
+_CANONICAL: dict[str, tuple[str, int]] = {}
+for _dimension, _units in _POWERS.items():
+    _CANONICAL |= {unit: (_dimension, power) for unit, power in _units.items()}
 
 # What pint may be asked: names, products and small powers.  Arithmetic such as 9**9**9 is a
 # way to hang a program from inside a file.

@@ -1,7 +1,6 @@
 """The laboratory's file, lab.toml: who calibrates for whom, with what, under which conditions."""
 
 import math
-import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from memscal.errors import FormatError, InputError
-from memscal.formats.files import read_bytes
+from memscal.formats.files import FilePath, read_bytes
 from memscal.formats.units import to_si
 from memscal.model.apparatus import ApparatusData
 from memscal.model.quantities import ESTIMATED
@@ -119,7 +118,7 @@ class LaboratoryFile:
         return added
 
 
-def read_laboratory(path: str | os.PathLike[str]) -> LaboratoryFile:
+def read_laboratory(path: FilePath) -> LaboratoryFile:
     """Read a laboratory's file; a key that is not known is refused, with the nearest that is."""
     name = Path(path).name
     try:
@@ -153,7 +152,8 @@ def missing_keys(
     places += [(f"[[equipment]] {i}", NEEDED["equipment"], item) for i, item in numbered]
     for place, keys, stated in places:
         for key in keys:
-            if (value := stated.get(key)) in (None, ""):
+            value = stated.get(key)
+            if value in (None, ""):
                 yield f"{place} {key}"
             elif isinstance(value, Measured) and value.uncertainty is None:
                 yield f"{place} {key}.uncertainty"

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
-from memscal.formats.files import atomic_write_bytes, read_bytes
+from memscal.formats.files import FilePath, atomic_write_bytes, read_bytes
 from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
 from memscal.formats.units import from_si
 from memscal.model.arrays import FloatArray
@@ -175,7 +175,7 @@ _MAX_NAME = 80
 _MAX_NOTES = 4000
 
 
-def is_mesh(path: str | os.PathLike[str]) -> bool:
+def is_mesh(path: FilePath) -> bool:
     """Return whether a file's name says that it is a mesh and not a table."""
     ending = os.path.splitext(os.fspath(path))[1].lower()
     return ending in _KINDS or ending in _OTHERS
@@ -218,7 +218,7 @@ class Mesh:
         return np.unique(np.concatenate([block.nodes.ravel() for block in self.solid]))
 
 
-def read_mesh(path: str | os.PathLike[str]) -> Mesh:
+def read_mesh(path: FilePath) -> Mesh:
     """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""
     shown = os.fspath(path)
     name = os.path.basename(shown)
@@ -316,7 +316,7 @@ def _unusable(source: SourceFile, content: str) -> FormatError:
     return FormatError(f"{source.file_name} has {content}.", why=why, cure=cure)
 
 
-def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def write_mesh(mesh: FieldMesh, path: FilePath, *, overwrite: bool = False) -> None:
     """Write displacement and stress on a mesh as a VTU file, whole or not at all."""
     # x is the radius and y the height, in mm; stress_Pa is in VTK's order, tension positive.
     _require_meshio()
@@ -338,13 +338,10 @@ def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool
         problem = f"The mesh cannot be written to the temporary folder: {error.strerror}."
         raise OutputError(problem, cure="Free some space there, or set TMPDIR.") from error
     head, grid, body = data.partition(b"<UnstructuredGrid>")
-    atomic_write_bytes(path, head + _comment(mesh) + grid + body, overwrite=overwrite)
-
-
-def _comment(mesh: FieldMesh) -> bytes:
-    """Return what the file is, as XML allows it: a comment may not hold two hyphens."""
     words = (
         f"Written by memscal {__version__}: an axisymmetric section, x = radius and y = height "
         f"in mm, z = hoop direction. {printable(mesh.notes, _MAX_NOTES)}"
     )
-    return f"<!-- {words.replace('--', '- -').replace('--', '- -')} -->\n".encode()
+    # A comment in XML may not hold two hyphens.
+    comment = f"<!-- {words.replace('--', '- -').replace('--', '- -')} -->\n".encode()
+    atomic_write_bytes(path, head + comment + grid + body, overwrite=overwrite)

@@ -1,6 +1,5 @@
 """Import of a stress profile from the mesh of any FEM program."""
 
-import os
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
+from memscal.formats.files import FilePath
 from memscal.formats.tables import reference
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
@@ -181,9 +181,9 @@ class Component:
 def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
     """Return the stress along an axis on the base; ``name:number`` takes a component, from 1."""
     at_points = {name: values.shape[1] for name, values in mesh.point_data.items()}
-    in_cells = {
-        name: values.shape[1] for block in mesh.solid for name, values in block.data.items()
-    }
+    in_cells: dict[str, int] = {}
+    for block in mesh.solid:
+        in_cells |= {name: values.shape[1] for name, values in block.data.items()}
     counts = in_cells | at_points
     name, _, number = field.rpartition(":")
     if field not in counts and name in counts and number.isdecimal():
@@ -250,7 +250,7 @@ _FEWEST_RADII = 3
 
 
 def read_reference_mesh(
-    path: str | os.PathLike[str],
+    path: FilePath,
     *,
     sigma: str,
     r_unit: str,

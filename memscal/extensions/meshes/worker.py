@@ -184,18 +184,12 @@ def _described(mesh: Any, arrays: list[Any]) -> dict[str, Any]:
 
     if any(block.type.startswith("polyhedron") for block in mesh.cells):
         raise ValueError("it has polyhedra for cells: cut them into tetrahedra")
-    return {
-        "points": add(mesh.points),
-        "point_data": fields(mesh.point_data),
-        "cells": [
-            {
-                "dimension": int(block.dim),
-                "nodes": add(block.data),
-                "data": fields({name: of_blocks[i] for name, of_blocks in mesh.cell_data.items()}),
-            }
-            for i, block in enumerate(mesh.cells)
-        ],
-    }
+    cells = []
+    for i, block in enumerate(mesh.cells):
+        data = fields({name: blocks[i] for name, blocks in mesh.cell_data.items()})
+        cells.append({"dimension": int(block.dim), "nodes": add(block.data), "data": data})
+    points = add(mesh.points)
+    return {"points": points, "point_data": fields(mesh.point_data), "cells": cells}
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from memscal.errors import FormatError, MemscalError, UnsafeFileError, placed
-from memscal.formats.files import read_bytes
+from memscal.formats.files import FilePath, read_bytes
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
 from memscal.model.notation import printable
@@ -51,7 +51,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 @contextlib.contextmanager
-def open_hdf5(path: str | os.PathLike[str], *, accept_altered: bool = False) -> Iterator[SafeFile]:
+def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator[SafeFile]:
     """Open an HDF5 file safely, for the time of a ``with`` block."""
     data = read_bytes(path, limit=MOST_HDF5_BYTES)
     name = os.path.basename(os.fspath(path))

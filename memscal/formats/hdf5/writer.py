@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
-from memscal.formats.files import atomic_write_bytes
+from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.limits import most_held
 from memscal.formats.units import from_si
 from memscal.model.notation import printable
@@ -194,7 +193,7 @@ def file_tree(schema: str, entry: Group) -> Group:
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
 
 
-def write_tree(root: Group, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def write_tree(root: Group, path: FilePath, *, overwrite: bool = False) -> None:
     """Write a tree as one HDF5 file, whole or not at all."""
     atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite)
 

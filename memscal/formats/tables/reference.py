@@ -1,6 +1,5 @@
 """References from samples of a calculated stress, checked; and from tables."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.formats.files import FilePath
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.text_table import Wanted
 from memscal.model.arrays import FloatArray
@@ -168,7 +168,7 @@ _SAME = 1e-9
 
 
 def read_reference_table(
-    path: str | os.PathLike[str],
+    path: FilePath,
     *,
     r: Column,
     sigma: Column,

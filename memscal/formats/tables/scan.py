@@ -491,9 +491,11 @@ def _mixed_loads(
         return []
     line = np.zeros(loads.size, dtype=np.intp) if repeat is None else repeat
     order = np.argsort(line, kind="stable")
-    of_lines = np.split(loads[order], np.flatnonzero(np.diff(line[order])) + 1)
-    stated = [v[np.isfinite(v)] for v in of_lines]
-    mixed = [v for v in stated if v.size and np.ptp(v) > _MIXED * np.median(v)]
+    line_by_line = np.split(loads[order], np.flatnonzero(np.diff(line[order])) + 1)
+    stated = [values[np.isfinite(values)] for values in line_by_line]
+    mixed = [
+        values for values in stated if values.size and np.ptp(values) > _MIXED * np.median(values)
+    ]
     if not mixed:
         return []
     text = (

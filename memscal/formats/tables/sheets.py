@@ -115,34 +115,35 @@ def _inflated(data: bytes, name: str) -> io.BytesIO:
     tags = {True: 0, False: 0}
     with zipfile.ZipFile(io.BytesIO(data)) as packed, zipfile.ZipFile(plain, "w") as unpacked:
         # Others are pictures and programs.
-        for entry in (e for e in packed.infolist() if e.filename.endswith((".xml", ".rels"))):
+        for entry in packed.infolist():
+            if not entry.filename.endswith((".xml", ".rels")):
+                continue
             pieces = []
             in_sheet = entry.filename.startswith("xl/worksheets/")
             most = MOST_TAGS if in_sheet else MOST_OTHER_TAGS
+            part = "sheets" if in_sheet else "texts and styles"
             with packed.open(entry) as member:
                 while piece := member.read(_PIECE):
                     pieces.append(piece)
                     total += len(piece)
                     tags[in_sheet] += piece.count(b"<")
-                    if total > MOST_FILE_BYTES or tags[in_sheet] > most:
-                        of = f"tags of XML in its {'sheets' if in_sheet else 'texts and styles'}"
-                        size, most, of = (
-                            (tags[in_sheet], most, of)
-                            if tags[in_sheet] > most
-                            else (total, MOST_FILE_BYTES, "bytes when it is unpacked")
-                        )
-                        kind = UnsafeFileError
-                        cure = "Save the sheet as CSV."
-                        raise too_large(name, size, most, of, cure=cure, error=kind)
+                    _limit(name, tags[in_sheet], most, f"tags of XML in its {part}")
+                    _limit(name, total, MOST_FILE_BYTES, "bytes when it is unpacked")
             xml = b"".join(pieces)
             # Entities multiply, and other encodings hide them.
             encoding = re.search(rb"encoding\s*=\s*[\"']([^\"']*)", xml[:200])
             if b"\0" in xml or b"<!" in xml or (encoding and encoding[1].lower() != b"utf-8"):
-                part = f"{name}: {printable(entry.filename, _MAX_NAME)}"
-                problem = f"{part} has declarations or an encoding that no workbook has."
+                where = f"{name}: {printable(entry.filename, _MAX_NAME)}"
+                problem = f"{where} has declarations or an encoding that no workbook has."
                 raise UnsafeFileError(problem, cure="Save the sheet as CSV.")
             unpacked.writestr(entry.filename, xml)
     return plain
+
+
+def _limit(name: str, size: int, most: int, of: str) -> None:
+    if size > most:
+        cure = "Save the sheet as CSV."
+        raise too_large(name, size, most, of, cure=cure, error=UnsafeFileError)
 
 
 def _cell(value: Any) -> str:

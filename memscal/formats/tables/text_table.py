@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError, placed
-from memscal.formats.files import read_pieces
+from memscal.formats.files import FilePath, read_pieces
 from memscal.formats.units import is_common_unit, is_unit, same_unit, to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Profile
@@ -97,9 +97,6 @@ class NamedColumns:
         values = [np.empty(room) for _ in wanted]
         parts = self._parts([*wanted.values()])
         for lines, part in counted(parts, "rows", rows, lambda part: len(part[0])):
-            if count + len(lines) > room:
-                cure = "Import it when it is complete."
-                raise FormatError(f"{self._name} grew while it was read.", cure=cure)
             self._lines_of.append((count, lines))
             for column, numbers in zip(values, part, strict=True):
                 if self._sentinels:
@@ -270,7 +267,7 @@ class TextTable(NamedColumns):
 
     def __init__(
         self,
-        path: str | os.PathLike[str],
+        path: FilePath,
         *,
         delimiter: str | None = None,
         decimal: str | None = None,
@@ -329,7 +326,8 @@ class TextTable(NamedColumns):
             self._header, names = above.pop()
             line, title = above[-1] if above else (0, [])
             units = _units_in(names)
-            if units and line == self._header - 1 and _may_have_units(title, names):
+            whole = _filled(title) >= _filled(names) and not any(map(_is_number, title))
+            if units and line == self._header - 1 and whole:
                 self._unit_row = units
                 self._header = line
                 names = title
@@ -564,11 +562,6 @@ def _units_in(cells: Sequence[str]) -> tuple[str, ...]:
     return units if 2 * _filled(units) >= _filled(bare) else ()
 
 
-def _may_have_units(cells: Sequence[str], below: Sequence[str]) -> bool:
-    """Whether a row may name the columns of which the row below it states the units."""
-    return _filled(cells) >= _filled(below) and not any(map(_is_number, cells))
-
-
 def _is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
@@ -637,7 +630,7 @@ def find_decimal(rows: Rows, delimiter: str = "") -> str:
     return ","
 
 
-def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:
+def read_indenter_table(path: FilePath, *, r_unit: str, z_unit: str) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = TextTable(path)
     units = {1: r_unit, 2: z_unit}
