@@ -92,10 +92,10 @@ def external_family(
         reach=reach,
         **options,
     )
-    numbers: dict[str, Any] = {
-        name: np.array([[getattr(cell, name) for cell in row] for row in grid], dtype=np.float64)
-        for name in ("depth", "contact_radius", "convergence")
-    }
+    numbers: dict[str, Any] = {}
+    for name in ("depth", "contact_radius", "convergence"):
+        rows = [[getattr(cell, name) for cell in row] for row in grid]
+        numbers[name] = np.array(rows, dtype=np.float64)
     return ProfileFamily(
         name="external",
         loading=loading,
@@ -165,7 +165,8 @@ def _checked_friction(profile: StressProfile, reach: float) -> float:
     if profile.friction_coefficient is None:
         problem = f"{_name(profile)} does not say its friction coefficient."
         raise InputError(problem, cure="State it when the table is imported (--friction).")
-    tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
+    size = np.abs(profile.sigma_zz)
+    tail = float(size[-1] / size.max())
     if profile.r[-1] < reach and tail > _DECAYED:
         end = profile.r[-1] * 1e3
         raise InputError(

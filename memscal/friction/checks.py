@@ -113,6 +113,7 @@ def synthetic_messages(measured: MeasuredStress) -> Iterator[Message]:
 
 
 def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Message]:
+    """Say where the definitions of the loading disagree."""
     for lubrication, by_loading in joint.items():
         if not {"incremental", "total"} <= by_loading.keys():
             continue
@@ -142,6 +143,7 @@ def _against_macroscopic(
     joint: Mapping[str, Mapping[str, BoundedEstimate]],
     macroscopic: tuple[float, float | None] | None,
 ) -> Iterator[Message]:
+    """Say how the effective coefficients stand against the macroscopic one."""
     if macroscopic is None:
         return
     value, u = macroscopic
@@ -166,6 +168,7 @@ def _against_macroscopic(
 
 
 def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
+    """Say where contacts have not converged, and what was assumed."""
     for loading, family in families.items():
         worst = float(np.nanmax(family.convergence, initial=0.0))
         if worst > _COARSE:
@@ -176,6 +179,7 @@ def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
 
 
 def _unstated(measured: MeasuredStress) -> list[Message]:
+    """Name the uncertainties that are not stated."""
     unstated: dict[str, float | None] = {}
     for profile in measured.profiles:
         film = profile.scan.film

@@ -28,7 +28,6 @@ from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import Channel, load_points, require_line, sensor_of
 from memscal.friction.results import (
     BoundedEstimate,
-    DryAgainstLubricated,
     FrictionComparison,
     InterfaceComparison,
     LoadComparison,
@@ -52,7 +51,10 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
     """Return the scans, and those of which a stress was measured."""
     scans: list[Scan | MeasuredScan] = []
     for item in contacts:
-        scans += item.scans if isinstance(item, MeasuredStress) else (item,)
+        if isinstance(item, Scan):
+            scans.append(item)
+        else:
+            scans += item.scans
     return scans
 
 
@@ -61,10 +63,11 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
     for scan in scans:
         place = scan.source.file_name if scan.source else "The scan"
         if not isinstance(scan.indenter, Sphere):
+            problem = f"{place} states no sphere (/entry/indenter)."
+            if scan.indenter:
+                problem = f"{place} was made with a rod, not with a sphere."
             raise InputError(
-                f"{place} was made with a rod, not with a sphere."
-                if scan.indenter
-                else f"{place} states no sphere (/entry/indenter).",
+                problem,
                 why="The stress under a rod barely depends on friction, and its contact does not "
                 "grow: a rod scan calibrates a sensor.",
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",
@@ -280,13 +283,12 @@ def _require_macroscopic(
     if uncertainty is not None:
         require_non_negative("uncertainty of the macroscopic coefficient", uncertainty)
     if value is None and (interface or uncertainty is not None):
-        raise InputError(
-            "The macroscopic friction coefficient is not given.",
-            why="Laws of the interface are weighed at it."
-            if interface
-            else "Its uncertainty has no use without it.",
-            cure="Give macroscopic, such as from a measurement of sliding.",
-        )
+        problem = "The macroscopic friction coefficient is not given."
+        why = "Its uncertainty has no use without it."
+        if interface:
+            why = "Laws of the interface are weighed at it."
+        cure = "Give macroscopic, such as from a measurement of sliding."
+        raise InputError(problem, why=why, cure=cure)
 
 
 def _require_few(contacts: Sequence[Scan | MeasuredStress], channels: Sequence[str]) -> None:
@@ -393,26 +395,34 @@ def compare_measured(
     macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
     """Compare measured stress with families by loading, which hold every measured load."""
-    fits = fit_families(measured, apparatus, families)
+    channels = channels_of(measured, apparatus, families)
+    fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     joint_fits = fits
     if shear is not None and shear_families is not None:
-        joint_fits = {}
         common = common_inputs(apparatus, shear)
-        for loading, family in families.items():
-            normal = _channel(measured, apparatus, family, common)
-            tangential = _channel(measured, shear, shear_families[loading], common)
-            joint_fits[loading] = fit_friction(normal, tangential)
+        normal = channels_of(measured, apparatus, families, common)
+        sheared = channels_of(measured, shear, shear_families, common)
+        joint_fits = {loading: fit_friction(normal[loading], sheared[loading]) for loading in fits}
     loads = _loads(measured, fits)
     joint = fit_together(measured, joint_fits, lubricated)
     joint = {lubrication: with_loading(by_loading) for lubrication, by_loading in joint.items()}
+
+    first = next(iter(channels.values()))
+    frictionless = first.at(first.family.values[0])
+    differences = []
+    for pair in lubricated_pairs(measured.profiles):
+        difference = dry_against_lubricated(measured, frictionless, pair)
+        if difference is not None:
+            differences.append(difference)
+
     stated = measured.noise_stated
     checks = (*measured.checks, *comparison_checks(loads, joint, noise_stated=stated))
     return FrictionComparison(
         measured=measured,
-        friction=next(iter(families.values())).values,
+        friction=first.family.values,
         loads=loads,
         joint=joint,
-        dry_against_lubricated=_pairs(measured, next(iter(fits.values())).channel),
+        dry_against_lubricated=tuple(differences),
         macroscopic=macroscopic,
         checks=checks,
         messages=comparison_messages(measured, families, joint, checks, macroscopic),
@@ -420,27 +430,21 @@ def compare_measured(
     )
 
 
-def fit_families(
-    measured: MeasuredStress, apparatus: ApparatusFunction, families: Mapping[str, ProfileFamily]
-) -> dict[str, FrictionFit]:
-    """Hold what one channel measured against each family."""
-    return {
-        loading: fit_friction(_channel(measured, apparatus, family))
-        for loading, family in families.items()
-    }
-
-
-def _channel(
+def channels_of(
     measured: MeasuredStress,
     apparatus: ApparatusFunction,
-    family: ProfileFamily,
+    families: Mapping[str, ProfileFamily],
     common: Sequence[str] = (),
-) -> Channel:
+) -> dict[str, Channel]:
+    """Return what one channel measured with the contacts of each family, by its loading."""
     points = [load_points(profile, apparatus.sensor.channel) for profile in measured.profiles]
     reach = float(max(of_load.radius.max() for of_load in points))
-    sensor = sensor_of(apparatus, family, reach, measured.scans, common)
-    nearest = [int(np.abs(family.loads - profile.load).argmin()) for profile in measured.profiles]
-    return Channel(points, sensor, family.only(nearest))
+    channels = {}
+    for loading, family in families.items():
+        sensor = sensor_of(apparatus, family, reach, measured.scans, common)
+        nearest = [int(np.abs(family.loads - load).argmin()) for load in measured.loads]
+        channels[loading] = Channel(points, sensor, family.only(nearest))
+    return channels
 
 
 def _loads(
@@ -482,19 +486,6 @@ def fit_together(
     return joint
 
 
-def _pairs(measured: MeasuredStress, channel: Channel) -> tuple[DryAgainstLubricated, ...]:
-    """Compare dry with lubricated profiles of one load."""
-    frictionless = channel.at(channel.family.values[0])
-    conversion_share = measured.conversion_constant_uncertainty / measured.conversion_constant
-    found = []
-    for pair in lubricated_pairs(measured.profiles):
-        profiles = [measured.profiles[i] for i in pair]
-        difference = dry_against_lubricated(profiles, frictionless.only(pair), conversion_share)
-        if difference is not None:
-            found.append(difference)
-    return tuple(found)
-
-
 def _compared_by_shear(
     measured: MeasuredStress,
     apparatus: ApparatusFunction,
@@ -506,19 +497,20 @@ def _compared_by_shear(
     """Compare what a tangential channel alone measured with the calculated shear."""
     notes = _accept_tangential(measured, apparatus, override)
     families = _families(setting, friction, loading, order=1)
-    fits = fit_families(measured, apparatus, families)
-    loads = range(len(measured.profiles))
+    channels = channels_of(measured, apparatus, families)
+    fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
+    overridden = override_messages(measured.overridden)
+    by_shear = {}
+    for loading, fit in fits.items():
+        loads = range(len(measured.profiles))
+        by_shear[loading] = tuple(fit.coefficient([i]) for i in loads)
     return FrictionComparison(
         measured=measured,
         friction=next(iter(families.values())).values,
         loads={},
-        by_shear={name: tuple(fit.coefficient([i]) for i in loads) for name, fit in fits.items()},
+        by_shear=by_shear,
         joint=fit_together(measured, fits),
-        messages=(
-            *override_messages(measured.overridden),
-            *notes,
-            *synthetic_messages(measured),
-        ),
+        messages=(*overridden, *notes, *synthetic_messages(measured)),
         shear=apparatus,
     )
 

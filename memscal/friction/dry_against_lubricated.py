@@ -21,7 +21,7 @@ from memscal.friction.likelihood import (
 )
 from memscal.friction.results import DryAgainstLubricated
 from memscal.model.arrays import FloatArray
-from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 #: Loads that differ by less than this share are one.
 _SAME_LOAD = 0.05
@@ -41,56 +41,58 @@ def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int
 
 
 def dry_against_lubricated(
-    profiles: Sequence[MeasuredProfile],  # dry, lubricated
-    frictionless: Channel,  # their points, and how voltages change with load and place
-    conversion_share: float,  # relative standard uncertainty of A
+    measured: MeasuredStress,
+    frictionless: Channel,  # points of all profiles, and how voltages change with load and place
+    pair: tuple[int, int],  # the dry and the lubricated profile
 ) -> DryAgainstLubricated | None:
     """Compare the dry and the lubricated profile of one load; None of too few places in common."""
     # Errors of A, G and film nearly cancel in the difference: noise, the scatter of the loads, and
     # each scan's own baseline, drift and centre are left.
-    averaged = [_averaged(points) for points in frictionless.points]
+    sensor = frictionless.sensor
+    averaged = [_averaged(frictionless.points[i]) for i in pair]
     places = _common_places(averaged[0].offset, averaged[1].offset)
     if places[0].size < _FEWEST_PLACES:
         return None
-    readings = []
-    for i, points in enumerate(averaged):
-        common = _at_places(points, places[i])
-        predicted = predict(common, frictionless.sensor, frictionless.family, i)
-        readings.append((common, predicted))
-    points, predicted = readings[0]
-    # What the frictionless contact says of other places and loads is taken off both.
-    beyond = [own.u - calculated.signal[0] for own, calculated in readings]
-    noise, correlation = _noise_of_difference(readings)
-    apart = points_at(points.offset, points, beyond[0] - beyond[1], noise)
-    flat = np.column_stack([points.flat, predicted.slope[0] * points.side])
+    dry, lubricated = (_at_places(*each) for each in zip(averaged, places, strict=True))
+    dry_contact = predict(dry, sensor, frictionless.family, pair[0])
+    lubricated_contact = predict(lubricated, sensor, frictionless.family, pair[1])
+
+    # Voltages: what the frictionless contact says of other places and loads is taken off both.
+    voltage = dry.u - dry_contact.signal[0] - (lubricated.u - lubricated_contact.signal[0])
+    noise, correlation = _noise_of_difference((dry, dry_contact), (lubricated, lubricated_contact))
+    by_centre = dry_contact.slope[0] * dry.side
+    flat = np.column_stack([dry.flat, by_centre])
+    apart = points_at(dry.offset, dry, voltage, noise)
     apart = replace(apart, flat=flat, correlation=correlation)
     nothing = np.zeros((1, noise.size))
     standardised = standardise(apart, Predicted(nothing, nothing, nothing, nothing, {}))
     chi_square = float(standardised.statistics.chi_square[0])
-    stress = [_stress_at(profile, common) for profile, common in zip(profiles, places, strict=True)]
-    (dry, dry_variance), (lubricated, lubricated_variance) = stress
-    other, predicted = readings[1]
-    farther = predicted.slope[0] * (points.radius - other.radius)
-    heavier = predicted.by_load[0] * math.log(profiles[0].load / profiles[1].load)
-    moved = (farther + heavier) / frictionless.sensor.conversion_constant
-    difference = dry - lubricated - moved
+
+    # Stresses, at the places and the load of the dry scan.
+    profiles = [measured.profiles[i] for i in pair]
+    conversion_share = measured.conversion_constant_uncertainty / measured.conversion_constant
+    dry_stress, dry_variance = _stress_at(profiles[0], places[0])
+    lubricated_stress, lubricated_variance = _stress_at(profiles[1], places[1])
+    farther = lubricated_contact.slope[0] * (dry.radius - lubricated.radius)
+    heavier = lubricated_contact.by_load[0] * math.log(profiles[0].load / profiles[1].load)
+    moved = (farther + heavier) / sensor.conversion_constant
+    difference = dry_stress - lubricated_stress - moved
     conversion_variance = (conversion_share * difference) ** 2
-    errors = np.sqrt(dry_variance + lubricated_variance + conversion_variance)
-    top = profiles[0].maximum - profiles[1].maximum
+    maximum = profiles[0].maximum - profiles[1].maximum
     random = [random_uncertainty(profile.maximum_budget) for profile in profiles]
-    top_uncertainty = math.hypot(conversion_share * top, *random)
+    maximum_uncertainty = math.hypot(conversion_share * maximum, *random)
     return DryAgainstLubricated(
         load=profiles[0].load,
-        r=points.radius,
+        r=dry.radius,
         difference=difference,
-        difference_errors=errors,
+        difference_errors=np.sqrt(dry_variance + lubricated_variance + conversion_variance),
         chi_square=chi_square,
         degrees=apart.degrees,
         p_value=float(chdtrc(apart.degrees, chi_square)),
-        maximum=top,
-        maximum_uncertainty=top_uncertainty,
-        relative=top / profiles[1].maximum,
-        relative_uncertainty=top_uncertainty / profiles[1].maximum,
+        maximum=maximum,
+        maximum_uncertainty=maximum_uncertainty,
+        relative=maximum / profiles[1].maximum,
+        relative_uncertainty=maximum_uncertainty / profiles[1].maximum,
     )
 
 
@@ -101,7 +103,9 @@ def _averaged(points: LoadPoints) -> LoadPoints:
     places, starts, counts = np.unique(rounded[order], return_index=True, return_counts=True)
 
     def mean(values: FloatArray) -> FloatArray:
-        return np.asarray((np.add.reduceat(values[order], starts, axis=0).T / counts).T)
+        """Mean of the repeats, along the first axis."""
+        sums = np.add.reduceat(values[order], starts, axis=0)
+        return np.asarray((sums.T / counts).T)
 
     noise = np.sqrt(mean(points.noise**2) / counts)
     correlation = None
@@ -128,7 +132,8 @@ def _common_places(
     dry: FloatArray, lubricated: FloatArray
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the indices of places that both scans measured, a quarter of a step apart at most."""
-    nearest = np.searchsorted((lubricated[1:] + lubricated[:-1]) / 2, dry)
+    middles = (lubricated[1:] + lubricated[:-1]) / 2
+    nearest = np.searchsorted(middles, dry)
     step = float(np.median(np.diff(dry))) if dry.size > 1 else 0.0
     close = np.flatnonzero(np.abs(dry - lubricated[nearest]) < _CLOSE * step)
     matched, first = np.unique(nearest[close], return_index=True)
@@ -143,6 +148,7 @@ def _stress_at(profile: MeasuredProfile, places: NDArray[np.intp]) -> tuple[Floa
 
 
 def _at_places(points: LoadPoints, places: NDArray[np.intp]) -> LoadPoints:
+    """Return the points at some places alone."""
     arrays: dict[str, Any] = {
         name: getattr(points, name)[places]
         for name in ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "flat")
@@ -153,7 +159,7 @@ def _at_places(points: LoadPoints, places: NDArray[np.intp]) -> LoadPoints:
 
 
 def _noise_of_difference(
-    readings: Sequence[tuple[LoadPoints, Predicted]],
+    *readings: tuple[LoadPoints, Predicted],
 ) -> tuple[FloatArray, FloatArray | None]:
     """Noise of a difference, in V, without what both scans share, and its correlation if any."""
     variance = np.zeros(())

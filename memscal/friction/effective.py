@@ -36,17 +36,17 @@ class FrictionFit:
 
         Loads that are ``held`` at no friction tell what errors all loads share.
         """
-        first = self.channel.family.values[0]
 
-        def at(value: float) -> Likelihood:
-            return self._at(value, chosen).with_held(self._at(first, held))
+        def likelihood_at(value: float, loads: Sequence[int]) -> Likelihood:
+            """Likelihood of some of the loads at one value."""
+            shear = None if self.shear is None else self.shear.at(value).only(loads)
+            return likelihood(self.channel.at(value).only(loads), shear)
 
-        return self._estimate(self.whole.only(chosen).with_held(self.whole.only(held)), at)
-
-    def _at(self, value: float, chosen: Sequence[int]) -> Likelihood:
-        """Likelihood of some of the loads at one value."""
-        shear = None if self.shear is None else self.shear.at(value).only(chosen)
-        return likelihood(self.channel.at(value).only(chosen), shear)
+        frictionless = likelihood_at(float(self.channel.family.values[0]), held)
+        along = self.whole.only(chosen).with_held(self.whole.only(held))
+        return self._estimate(
+            along, lambda value: likelihood_at(value, chosen).with_held(frictionless)
+        )
 
     def coefficient_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
@@ -54,10 +54,12 @@ class FrictionFit:
         noise = a * random_uncertainty(profile.maximum_budget)
         top = points_at(np.zeros(1), self.channel.points[index], a * profile.maximum, noise)
 
-        def at(channel: Channel) -> Likelihood:
+        def likelihood_of(channel: Channel) -> Likelihood:
+            """Likelihood of the maximum alone."""
             return likelihood(replace(channel.only([index]), points=[top]))
 
-        return self._estimate(at(self.fine), lambda value: at(self.channel.at(value)))
+        along = likelihood_of(self.fine)
+        return self._estimate(along, lambda value: likelihood_of(self.channel.at(value)))
 
     def _estimate(self, along: Likelihood, at: Callable[[float], Likelihood]) -> BoundedEstimate:
         """Return the best coefficient with its interval; its budget by the slope at its value."""
@@ -73,8 +75,8 @@ class FrictionFit:
         )
         budget = {}
         if estimate.value is not None:
-            # The coordinate's derivative by the coefficient, turned over.
-            stretch = family.scale / (1 - bounded(estimate.value, family.scale)) ** 2
+            coordinate = bounded(estimate.value, family.scale)
+            stretch = family.scale / (1 - coordinate) ** 2  # of the coefficient by the coordinate
             shares = at(estimate.value).budget()
             budget = {source: float(stretch * share) for source, share in shares.items()}
         degrees = max(sum(load.degrees for load in along.loads) - 1, 0)
@@ -87,34 +89,37 @@ def fit_friction(channel: Channel, shear: Channel | None = None) -> FrictionFit:
     """Hold the measured loads of a channel, or of two, against calculated contacts."""
     values = fine_values(channel.family)
     fine = channel.at(values)
-    whole = likelihood(fine, None if shear is None else shear.at(values))
-    return FrictionFit(channel, shear, fine, whole)
+    fine_shear = None if shear is None else shear.at(values)
+    return FrictionFit(channel, shear, fine, likelihood(fine, fine_shear))
 
 
 def fine_values(family: ProfileFamily) -> FloatArray:
     """Return values along a family, even in its bounded coordinate, its own among them."""
     nodes = family.coordinates
     even = np.linspace(nodes[0], nodes[-1], _FINE)
-    apart = np.abs(np.subtract.outer(even, nodes)).min(axis=1) > 0.2 * (even[1] - even[0])
+    step = even[1] - even[0]
+    distances = np.abs(np.subtract.outer(even, nodes)).min(axis=1)
+    between = unbounded(even[distances > 0.2 * step], family.scale)
     # The family's own values are kept as they are, not as their coordinates give them back.
-    return np.sort(np.concatenate([family.values, unbounded(even[apart], family.scale)]))
+    return np.sort([*family.values, *between])
 
 
 def random_uncertainty(budget: Mapping[str, float]) -> float:
     """Return what noise, centre and baseline add to a measured maximum."""
-    return math.hypot(*(u for source, u in budget.items() if source not in _SYSTEMATIC))
+    parts = [u for source, u in budget.items() if source not in _SYSTEMATIC]
+    return math.hypot(*parts)
 
 
 def with_loading(by_loading: Mapping[str, BoundedEstimate]) -> dict[str, BoundedEstimate]:
     """Add the standard uncertainty of a rectangle between both loadings, width / sqrt(12)."""
+    counted = dict(by_loading)
     values = [estimate.value for estimate in by_loading.values() if estimate.value is not None]
-    if len(values) < 2:
-        return dict(by_loading)
-    apart = abs(values[0] - values[1]) / math.sqrt(12)
-    return {
-        loading: replace(estimate, budget={**estimate.budget, "loading": apart})
-        for loading, estimate in by_loading.items()
-    }
+    if len(values) == 2:
+        apart = abs(values[0] - values[1]) / math.sqrt(12)
+        for loading, estimate in by_loading.items():
+            budget = {**estimate.budget, "loading": apart}
+            counted[loading] = replace(estimate, budget=budget)
+    return counted
 
 
 def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> LoadComparison:
@@ -128,39 +133,40 @@ def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> L
     variance = np.zeros_like(blurred.signal)
     for column in blurred.columns.values():
         variance += np.sum(column**2, axis=-1)
-    calculated = blurred.signal / sensor.conversion_constant
+    stresses = blurred.signal / sensor.conversion_constant
     errors = np.sqrt(variance) / sensor.conversion_constant
-    p0_max = float(calculated[0, -1])
+    calculated = stresses[:, :-1]
+    calculated_errors = errors[:, :-1]
+    maxima = stresses[:, -1]
     # Measured over calculated maximum: A and G err together.
     on_axis = predict(points_at(np.zeros(1), points), sensor, family, index)
-    changes = [column[0, 0] for column in on_axis.columns.values()]
-    systematic = float(np.linalg.norm(np.concatenate(changes))) / float(on_axis.signal[0, 0])
+    changes = np.concatenate([column[0, 0] for column in on_axis.columns.values()])
+    systematic = float(np.linalg.norm(changes)) / float(on_axis.signal[0, 0])
     random = random_uncertainty(profile.maximum_budget) / profile.maximum
-    ratio = profile.maximum / p0_max
+    ratio = profile.maximum / float(maxima[0])
     # The family's own values are among the fine ones.
     along = fit.whole.only([index])
     nodes = np.searchsorted(along.coordinates, family.coordinates - 1e-12)
     chi_square = along.chi_square[nodes]
     deviance = along.deviance
+    measured = profile.s_zz
     return LoadComparison(
         profile=profile,
         loading=family.loading,
         s_max=profile.maximum,
         s_max_uncertainty=profile.maximum_uncertainty,
-        p0_max=p0_max,
+        p0_max=float(maxima[0]),
         p0_max_uncertainty=float(errors[0, -1]),
         ratio=ratio,
         ratio_uncertainty=math.hypot(systematic, random) * ratio,
-        calculated=calculated[:, :-1],
-        calculated_errors=errors[:, :-1],
-        p_max=calculated[:, -1],
+        calculated=calculated,
+        calculated_errors=calculated_errors,
+        p_max=maxima,
         chi_square=chi_square,
         deviance=deviance[nodes] - deviance.min(),
         p_values=np.asarray(chdtrc(points.degrees, chi_square)),
         degrees=points.degrees,
-        bracketed=bracketed_share(
-            profile.s_zz, profile.s_zz_errors, calculated[:, :-1], errors[:, :-1]
-        ),
+        bracketed=bracketed_share(measured, profile.s_zz_errors, calculated, calculated_errors),
         by_maximum=fit.coefficient_of_maximum(profile, index),
         by_profile=fit.coefficient([index]),
     )

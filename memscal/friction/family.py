@@ -93,7 +93,8 @@ class ProfileFamily(FrozenArrays):
         chosen = np.atleast_1d(np.asarray(values, dtype=np.float64))
         nodes = self.coordinates
         t = bounded(chosen, self.scale)
-        inside = (t >= nodes[0] - _ROUNDING) & (t <= nodes[-1] + _ROUNDING) & ~np.isnan(chosen)
+        inside = (t >= nodes[0] - _ROUNDING) & (t <= nodes[-1] + _ROUNDING)
+        inside &= ~np.isnan(chosen)
         if not inside.all():
             raise InputError(
                 f"A {self.name} family from {self.values[0]:g} to {self.values[-1]:g} does not "
@@ -107,7 +108,8 @@ class ProfileFamily(FrozenArrays):
         numbers: dict[str, Any] = {}
         for name in _NUMBERS:
             columns = getattr(self, name).T
-            numbers[name] = np.stack([np.interp(t, nodes, column) for column in columns], axis=1)
+            interpolated = [np.interp(t, nodes, column) for column in columns]
+            numbers[name] = np.stack(interpolated, axis=1)
         return replace(
             self,
             values=chosen,
@@ -250,6 +252,7 @@ def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
 
 
 def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
+    """Solve the contacts of a path at increasing loads."""
     usual = _RINGS_OF_A_RIGID_CONTACT if path.interface.rigid else _RINGS_OF_A_COMPLIANT_CONTACT
     for rings in (usual, *_OTHER_RINGS):
         try:
@@ -312,7 +315,7 @@ class FamilySetup:
         workers: int = 1,
         order: int = 0,  # one for the shear at the base
     ) -> None:
-        # Refused is what is no sphere, no positive load or reach (m), or no number of workers.
+        """Refuse what is no sphere, no positive load or reach, or no number of workers."""
         require_workers(workers)
         if not isinstance(indenter, Sphere):
             problem = f"Profiles were asked for under a {indenter.shape}, but a sphere is needed."
@@ -391,7 +394,8 @@ class FamilySetup:
             by_length=by_length,
         )
         if sides:
-            slope = (sides[0]["spectra"] - sides[1]["spectra"]) / (ratios[0] - ratios[1])
+            upper, lower = (side["spectra"] for side in sides)
+            slope = (upper - lower) / (ratios[0] - ratios[1])
             expected = film.expected
             changes["poisson_ratio"] = slope * (expected.poisson_ratio_uncertainty or 0.0)
             nominal["spectra"] = spectra + slope * (expected.poisson_ratio - nu)
@@ -409,10 +413,11 @@ class FamilySetup:
         distinct = list(dict.fromkeys(path for group in groups for path in group))
         arrays = solve_paths(distinct, self.wavenumbers.k, workers=self.workers)
         solved = dict(zip(distinct, arrays, strict=True))
-        return [
-            {name: np.stack([solved[path][name] for path in group]) for name in arrays[0]}
-            for group in groups
-        ]
+        stacks = []
+        for group in groups:
+            members = [solved[path] for path in group]
+            stacks.append({name: np.stack([own[name] for own in members]) for name in arrays[0]})
+        return stacks
 
 
 def base_wavenumbers(thickness: float, reach: float) -> Wavenumbers:
@@ -447,4 +452,6 @@ def _by_log_value(spectra: FloatArray, values: FloatArray, scale: float) -> Floa
     from scipy.interpolate import PchipInterpolator
 
     t = bounded(values, scale)
-    return np.asarray((t * (1 - t))[:, None, None] * PchipInterpolator(t, spectra, axis=0)(t, 1))
+    slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
+    stretch = t * (1 - t)
+    return np.asarray(stretch[:, None, None] * slopes)

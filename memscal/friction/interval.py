@@ -11,6 +11,7 @@ from memscal.friction.results import BoundedEstimate, Interval
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_bound
 
+_LEVEL = 0.95
 #: Level of one standard deviation of a normal distribution.
 _ONE_SIGMA = 0.6827
 
@@ -24,7 +25,6 @@ def profile_estimate(
     *,
     reason: Callable[[Interval], str],
     two_sided: bool = False,
-    level: float = 0.95,
     unit: str = "",
 ) -> BoundedEstimate:
     """Return best value and interval of -2 ln p (m,) along the bounded coordinate of a scale."""
@@ -40,6 +40,7 @@ def profile_estimate(
     lowest = float(spline(best))
 
     def interval_of(level: float) -> Interval:
+        """Values whose -2 ln p is no larger than the level allows."""
         top = lowest + float(chdtri(1, 1 - level))
         inside = np.append(coordinates[deviance <= top], best)
         low = _crossing(spline, coordinates, float(inside.min()), -1, top)
@@ -47,7 +48,7 @@ def profile_estimate(
         lower = 0.0 if low is None else float(unbounded(low, scale))
         return Interval(lower, None if high is None else float(unbounded(high, scale)), level)
 
-    interval = interval_of(level)
+    interval = interval_of(_LEVEL)
     value = None
     spread = None
     # Without an upper end there is no value, with ``two_sided`` without both; ``reason`` says why.

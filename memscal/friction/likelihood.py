@@ -107,7 +107,8 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         why = "Contacts are told apart by a chi-square."
         raise InputError(problem, why=why, cure=f"State the electronic noise of u_{channel}.")
     position = (points.x, points.y)[profile.axis]
-    drift = (position - (position.max() + position.min()) / 2) / (np.ptp(position) / 2)
+    middle = (position.max() + position.min()) / 2
+    drift = (position - middle) / (np.ptp(position) / 2)
     return LoadPoints(
         u=points.u,
         offset=position - float(profile.centre[profile.axis]),
@@ -164,6 +165,7 @@ class Sensor:
         """Return the sensor as if A were exact: with the changes of G alone."""
 
         def shape(changes: FloatArray) -> FloatArray:
+            """Changes less the change of A that they bring."""
             relative = self.wavenumbers.integrals(changes) / self.conversion_constant
             return changes - np.multiply.outer(self.transfer, relative)
 
@@ -269,13 +271,14 @@ def stacked(
     points = (normal[0], shear[0])
     predicted = (normal[1], shear[1])
 
-    def joined(pair: Sequence[Any], name: str, axis: int) -> FloatArray:
-        return np.concatenate([getattr(channel, name) for channel in pair], axis=axis)
+    def joined(pair: Sequence[Any], names: Sequence[str], axis: int) -> dict[str, Any]:
+        """Arrays of both channels, one after the other."""
+        arrays = {}
+        for name in names:
+            both = [getattr(channel, name) for channel in pair]
+            arrays[name] = np.concatenate(both, axis=axis)
+        return arrays
 
-    readings: dict[str, Any] = {
-        name: joined(points, name, 0)
-        for name in ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
-    }
     correlations = []
     contacts: dict[tuple[float, int], int] = {}
     numbers = []
@@ -287,10 +290,11 @@ def stacked(
         for place in np.round(channel.offset, 12).tolist():
             numbers.append(contacts.setdefault((place, count[place]), len(contacts)))
             count[place] += 1
+    names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
     together = replace(
         points[0],
-        **readings,
-        flat=block_diag(*(channel.flat for channel in points)),
+        **joined(points, names, axis=0),
+        flat=block_diag(normal[0].flat, shear[0].flat),
         correlation=block_diag(*correlations),
         contacts=np.eye(len(contacts))[numbers],
     )
@@ -299,13 +303,13 @@ def stacked(
         columns[1]["apparatus_shear"] = columns[1].pop("apparatus")
     padded = {}
     for source in dict.fromkeys([*columns[0], *columns[1]]):
-        width = next(own[source].shape[-1] for own in columns if source in own)
-        absent = [np.zeros((*channel.signal.shape, width)) for channel in predicted]
-        pairs = zip(columns, absent, strict=True)
-        padded[source] = np.concatenate([own.get(source, zero) for own, zero in pairs], axis=1)
-    arrays = {
-        name: joined(predicted, name, 1) for name in ("signal", "by_load", "by_coordinate", "slope")
-    }
+        width = next(changes[source].shape[-1] for changes in columns if source in changes)
+        both = []
+        for reading, changes in zip(predicted, columns, strict=True):
+            absent = np.zeros((*reading.signal.shape, width))
+            both.append(changes.get(source, absent))
+        padded[source] = np.concatenate(both, axis=1)
+    arrays = joined(predicted, ("signal", "by_load", "by_coordinate", "slope"), axis=1)
     return together, Predicted(**arrays, columns=padded)
 
 
@@ -363,55 +367,53 @@ class Standardised:
     @cached_property
     def statistics(self) -> Statistics:
         """What the load tells about the parameter and the systematic errors, shape (V,)."""
-        return Statistics(
-            chi_square=np.sum(self.residual**2, axis=-1),
-            projection=(self.residual[:, None] @ self.columns)[:, 0],
-            information=np.swapaxes(self.columns, -1, -2) @ self.columns,
-            log_determinant=self.log_determinant,
-        )
+        transposed = np.swapaxes(self.columns, -1, -2)
+        chi_square = np.sum(self.residual**2, axis=-1)
+        projection = (transposed @ self.residual[..., None])[..., 0]
+        information = transposed @ self.columns
+        return Statistics(chi_square, projection, information, self.log_determinant)
 
-    def held(self, count: int) -> Standardised:
-        """Return the load with its parameter held at the first value, ``count`` times."""
-
-        def first(values: FloatArray) -> FloatArray:
-            return np.broadcast_to(values[:1], (count, *values.shape[1:]))
-
+    def held(self) -> Standardised:
+        """Return the load with its parameter held at the first value."""
         return replace(
             self,
-            residual=first(self.residual),
-            slope=np.zeros((count, self.slope.shape[1])),
-            columns=first(self.columns),
-            log_determinant=first(self.log_determinant),
+            residual=self.residual[:1],
+            slope=np.zeros_like(self.slope[:1]),
+            columns=self.columns[:1],
+            log_determinant=self.log_determinant[:1],
         )
 
 
 def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     """Divide by the noise, and project out what is flat."""
     shape = predicted.signal.shape
+    by_centre = predicted.slope * points.side
     kinds = {
         "noise": np.broadcast_to(points.noise, shape),
         "load_scatter": predicted.by_load * points.load_errors,
-        "position": predicted.slope * points.side * points.x_errors,
+        "position": by_centre * points.x_errors,
     }
     noise = Noise(kinds, points.correlation, points.contacts)
     root = noise.inverse_root()
 
     def whitened(values: FloatArray) -> FloatArray:
+        """Values (V, n, q) in units of the noise."""
         blocks = values.reshape(*root.shape[:-1], values.shape[-1])
         return np.asarray((root @ blocks).reshape(values.shape))
 
     flat = np.broadcast_to(points.flat, (*shape, points.flat.shape[1]))
     if points.free_centre:
-        flat = np.concatenate([flat, (predicted.slope * points.side)[..., None]], axis=-1)
+        flat = np.concatenate([flat, by_centre[..., None]], axis=-1)
     basis, triangle = np.linalg.qr(whitened(flat))
     residual = points.u - predicted.signal
     vectors = [residual[..., None], predicted.by_coordinate[..., None], *predicted.columns.values()]
     scaled = whitened(np.concatenate(vectors, axis=-1))
     projected = scaled - basis @ (np.swapaxes(basis, -1, -2) @ scaled)
-    flat_pivots = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
-    noise_pivots = np.diagonal(root, axis1=-2, axis2=-1)
-    log_flat = 2 * np.log(flat_pivots).sum(axis=-1)
-    log_noise = -2 * np.log(noise_pivots).sum(axis=(-2, -1))
+    # The diagonals of triangular roots give the determinants.
+    pivots = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
+    log_flat = 2 * np.log(pivots).sum(axis=-1)
+    pivots = np.diagonal(root, axis1=-2, axis2=-1)
+    log_noise = -2 * np.log(pivots).sum(axis=(-2, -1))
     return Standardised(
         residual=projected[..., 0],
         slope=projected[..., 1],
@@ -437,7 +439,7 @@ class Likelihood:
 
     def with_held(self, held: Likelihood) -> Likelihood:
         """Add loads whose parameter is held at their first value; all share systematic errors."""
-        loads = [load.held(self.values.size) for load in held.loads]
+        loads = [load.held() for load in held.loads]
         return replace(self, loads=(*self.loads, *loads))
 
     @cached_property

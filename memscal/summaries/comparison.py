@@ -96,6 +96,7 @@ def frame(comparison: FrictionComparison) -> DataFrame:
 
 
 def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, float]:
+    """Return the columns of one estimate in a data frame."""
     value = estimate.value
     u = estimate.standard_uncertainty
     return {
@@ -181,6 +182,7 @@ def _load(comparison: FrictionComparison, index: int) -> dict[str, Any]:
 
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
+    """Return what one load says of each coefficient, by one loading."""
     tested = comparison.measured.noise_stated
     profiles = []
     for i, mu in enumerate(comparison.friction):
@@ -205,6 +207,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
 
 
 def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
+    """Return an estimate with its fit and its profile likelihood."""
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
     fit: dict[str, Any] = {} if tested else {"least": None, "p_value": None}
     return {
@@ -219,6 +222,7 @@ def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
 
 
 def _shortened(values: FloatArray) -> list[float | None]:
+    """Return values with six digits."""
     return [finite(float(f"{value:.6g}")) for value in values]
 
 
@@ -241,6 +245,7 @@ def notes(comparison: FrictionComparison) -> Iterator[Message]:
 
 
 def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
+    """Say where the calculated profiles are too few."""
     friction = comparison.friction
     if friction[0] > 0:
         yield Message(
@@ -260,6 +265,7 @@ def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
 
 
 def _which(lubrication: str, loading: str) -> str:
+    """Name the loads and the loading of a coefficient."""
     words = lubrication or "lubrication not stated"
     return f"{words}, {loading} loading" if loading else words
 
@@ -322,6 +328,7 @@ def tables(comparison: FrictionComparison) -> list[Table]:
 
 
 def _maxima_table(comparison: FrictionComparison) -> Table:
+    """Return measured and calculated maxima of each load."""
     profiles = comparison.measured.profiles
     sphere = profiles[0].scan.indenter
     title = (
@@ -385,6 +392,7 @@ def _readings(comparison: FrictionComparison, loading: str, index: int) -> list[
 
 
 def _fit(estimate: BoundedEstimate, tested: bool) -> tuple[str, ...]:
+    """Return the reduced chi-square and its p value, where they test anything."""
     if not tested:
         return ()
     if estimate.degrees <= 0:
@@ -395,16 +403,18 @@ def _fit(estimate: BoundedEstimate, tested: bool) -> tuple[str, ...]:
 def _likelihood_table(comparison: FrictionComparison, loading: str) -> Table:
     """Return what each load says of each calculated profile."""
     way = f"{loading} loading" if loading else "profiles as given"
-    rows = [
-        [*_labels(i, load.profile), f"{load.degrees}", *(_short(float(d)) for d in load.deviance)]
-        for i, load in enumerate(comparison.loads[loading], start=1)
-    ]
-    head = [*_LABELS, "ν", *(friction_name(float(mu)) for mu in comparison.friction)]
+    rows = []
+    for i, load in enumerate(comparison.loads[loading], start=1):
+        rises = [_short(rise) for rise in load.deviance.tolist()]
+        rows.append([*_labels(i, load.profile), f"{load.degrees}", *rises])
+    names = [friction_name(mu) for mu in comparison.friction.tolist()]
+    head = [*_LABELS, "ν", *names]
     title = f"-2 ln(p/p_max) of each profile by friction coefficient, {way}"
     return Table(title, head, rows, labels=len(_LABELS))
 
 
 def _short(value: float) -> str:
+    """Return a rise of -2 ln p in few characters."""
     if not math.isfinite(value):
         return "-"
     if value >= _LONG:
@@ -413,6 +423,7 @@ def _short(value: float) -> str:
 
 
 def _budget_table(comparison: FrictionComparison) -> Table:
+    """Return the contribution of each source to each coefficient."""
     shown = {}
     for lubrication, loading, joint in _joint(comparison):
         if joint.value is not None and joint.budget:
@@ -431,12 +442,14 @@ def _budget_table(comparison: FrictionComparison) -> Table:
 
 
 def _share(value: float | None) -> str:
+    """Return a contribution with two digits."""
     if value is None:
         return "-"
     return "0" if value == 0 else f"{value:.2g}"
 
 
 def _macroscopic_table(comparison: FrictionComparison) -> Table:
+    """Return the macroscopic coefficient beside each effective one."""
     if comparison.macroscopic is None:
         return Table("", ("", ""), [])
     value, u = comparison.macroscopic
@@ -452,17 +465,14 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
 
 
 def _lubrication_table(comparison: FrictionComparison) -> Table:
+    """Return the differences of dry and lubricated stress."""
     load, maximum, _, relative, *_ = records.DRY_AGAINST_LUBRICATED
-    rows = [
-        [
-            f"{pair.load:.4g}",
-            cell(maximum, pair, unit=""),
-            format_measured(100 * pair.relative, 100 * pair.relative_uncertainty, "%"),
-            f"{pair.chi_square / pair.degrees:.2f}",
-            f"{pair.p_value:.2g}",
-        ]
-        for pair in comparison.dry_against_lubricated
-    ]
+    rows = []
+    for pair in comparison.dry_against_lubricated:
+        on_axis = cell(maximum, pair, unit="")
+        share = format_measured(100 * pair.relative, 100 * pair.relative_uncertainty, "%")
+        reduced = pair.chi_square / pair.degrees
+        rows.append([f"{pair.load:.4g}", on_axis, share, f"{reduced:.2f}", f"{pair.p_value:.2g}"])
     head = [load.heading, maximum.heading, relative.words, "χ²/ν of no difference", "p"]
     return Table("Dry less lubricated stress (± standard uncertainty)", head, rows)
 

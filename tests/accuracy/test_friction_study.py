@@ -22,7 +22,8 @@ import memscal
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction.calculated import amontons_family
-from memscal.friction.compare import compare_measured, fit_families, fit_together
+from memscal.friction.compare import channels_of, compare_measured, fit_together
+from memscal.friction.effective import fit_friction
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import FrictionComparison
 
@@ -50,7 +51,8 @@ class Outcome:
     def apart(self) -> Any:
         """The same with the lubricated loads by themselves."""
         measured = self.comparison.measured
-        fits = fit_families(measured, self.apparatus, families())
+        channels = channels_of(measured, self.apparatus, families())
+        fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
         return fit_together(measured, fits)["dry"]["incremental"]
 
     @property

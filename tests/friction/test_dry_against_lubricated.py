@@ -48,10 +48,13 @@ def compared(
         moved = after - before
         wet = replace(there, u=wet.u + moved[0])
     frictionless = laboratory.family.at(0.0).only([LOAD, LOAD])
+    measured: Any = SimpleNamespace(
+        profiles=(profile(dry, "dry"), profile(wet, "lubricated")),
+        conversion_constant=CONVERSION,
+        conversion_constant_uncertainty=0.01 * CONVERSION,
+    )
     return dry_against_lubricated(
-        (profile(dry, "dry"), profile(wet, "lubricated")),
-        Channel((dry, wet), laboratory.sensor, frictionless),
-        conversion_share=0.01,
+        measured, Channel((dry, wet), laboratory.sensor, frictionless), (0, 1)
     )
 
 

@@ -107,9 +107,12 @@ def slipping_family(friction: float, uncertainty: float | None, **contacts: Any)
     if uncertainty is None:
         return made
     # Only its stresses count: without uncertainties it takes a third of the time.
-    names = ("young_modulus", "thickness", "poisson_ratio")
-    exact: Any = dict.fromkeys((f"{name}_uncertainty" for name in names), None)
-    contacts["film"] = replace(contacts["film"], **exact)
+    contacts["film"] = replace(
+        contacts["film"],
+        young_modulus_uncertainty=None,
+        thickness_uncertainty=None,
+        poisson_ratio_uncertainty=None,
+    )
     more = elasto_plastic_family(friction=friction + uncertainty, **contacts)
     changes = {**made.changes, "macroscopic_friction": more.spectra - made.spectra}
     return replace(made, changes=changes)
@@ -124,7 +127,9 @@ def family_at_loads(
     loads = np.array([profile.load for profile in profiles])
 
     def apart(family: ProfileFamily) -> FloatArray:
-        return np.asarray(np.abs(np.log(np.divide.outer(loads, family.loads))))
+        """Distances of logarithms of the loads, (profiles, loads of the family)."""
+        ratios = np.divide.outer(loads, family.loads)
+        return np.asarray(np.abs(np.log(ratios)))
 
     if calculated is None or np.any(apart(calculated).min(axis=1) > _NEAR):
         distinct: list[float] = []

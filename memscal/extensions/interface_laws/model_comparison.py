@@ -83,7 +83,8 @@ def weigh_slip_length(
     name = "effective Amontons, one coefficient"
     laws = [one_of_all(name, curve(rigid), friction_prior, degrees)]
     if len(rigid.points) > 1:
-        curves = [curve(rigid.only([i]), fine=_FINER) for i in range(len(rigid.points))]
+        loads = range(len(rigid.points))
+        curves = [curve(rigid.only([i]), fine=_FINER) for i in loads]
         name = "effective Amontons, one for each load"
         laws.append(one_of_each(name, curves, friction_prior, degrees))
     along = curve(slipping, also=np.geomspace(*_SLIP_LENGTHS_CALCULATED, _LENGTHS))
@@ -122,6 +123,7 @@ def weigh_normal_compliance(channel: Channel) -> LawComparison:
 
 
 def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
+    """Weigh the last law against each of the others."""
     *others, last = laws
     factors = []
     for law in others:
@@ -205,6 +207,7 @@ def _messages(
     uncertainty: float | None,
     dry: Sequence[MeasuredProfile],
 ) -> Iterator[Message]:
+    """Say what was assumed, and what the comparison cannot tell."""
     if any(not profile.lubrication for profile in dry):
         text = "Scans that do not state their lubrication were taken as dry."
         yield Message("lubrication_unstated", text)
@@ -269,9 +272,10 @@ def curve(channel: Channel, *, also: Iterable[float] = (), fine: int = _FINE) ->
     pairs = zip(rough, close, strict=True)
     statistics = Statistics(*(np.concatenate(pair)[order] for pair in pairs))
     t = both[order]
-    middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
+    middles = (t[1:] + t[:-1]) / 2
+    ends = np.array([t[0], *middles, t[-1]])
     values = unbounded(t, family.scale)
-    edges = unbounded(middles, family.scale)
+    edges = unbounded(ends, family.scale)
     return LawCurve(values, t, edges, statistics, *log_likelihood(statistics))
 
 
@@ -317,6 +321,7 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
 
 
 def _p_value(degrees: int, least: float) -> float:
+    """Return the chance of a larger chi-square."""
     return float(chdtrc(degrees, least)) if degrees > 0 else 1.0
 
 
@@ -327,12 +332,12 @@ def _best_of_each(loads: Sequence[Statistics]) -> tuple[list[int], float, float]
     for _ in range(_SWEEPS):
         before = top
         for j, load in enumerate(loads):
-            others = [
-                Statistics(*(array[node] for array in other))
-                for other, node in zip(loads, chosen, strict=True)
-                if other is not load
-            ]
-            logs, chi_square = log_likelihood(added([load, *others]))
+            several = [load]
+            for i, other in enumerate(loads):
+                if i != j:
+                    node = chosen[i]
+                    several.append(Statistics(*(array[node] for array in other)))
+            logs, chi_square = log_likelihood(added(several))
             chosen[j] = int(np.argmax(logs))
             top = float(logs[chosen[j]])
             least = float(chi_square[chosen[j]])
@@ -356,12 +361,16 @@ def implied_friction(
     values = unbounded(t, rigid.family.scale)
     curves = _maxima(rigid, values)
     maxima = _maxima(slipping, lengths)
-    implied = [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
+    implied = np.empty((order.size, lengths.size))
+    for (i, j), _ in np.ndenumerate(implied):
+        load = order[i]
+        implied[i, j] = _read(values, curves[:, load], float(maxima[j, load]))
     family = slipping.family
-    pressures = (family.loads / (np.pi * family.at(length.best).contact_radii[0] ** 2))[order]
+    areas = np.pi * family.at(length.best).contact_radii[0] ** 2
+    pressures = (family.loads / areas)[order]
     with np.errstate(divide="ignore"):
         stiffnesses = friction * pressures[:, None] / lengths
-    return ImpliedFriction(family.loads[order], np.array(implied), pressures, stiffnesses)
+    return ImpliedFriction(family.loads[order], implied, pressures, stiffnesses)
 
 
 def _maxima(channel: Channel, values: FloatArray) -> FloatArray:
@@ -378,11 +387,11 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
     above = int(np.argmax(curve >= top))
     if above == 0:
         return float(values[0])
-    low = curve[above - 1]
-    high = curve[above]
-    last = values[above] if np.isfinite(values[above]) else values[above - 1]
-    share = (top - low) / (high - low)
-    return float(values[above - 1] + share * (last - values[above - 1]))
+    below = above - 1
+    if math.isinf(values[above]):
+        return float(values[below])
+    share = (top - curve[below]) / (curve[above] - curve[below])
+    return float(values[below] + share * (values[above] - values[below]))
 
 
 def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> BoundedEstimate:
@@ -400,6 +409,7 @@ def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> Bound
 
 
 def _length_reason(what: str, interval: Interval, last: float) -> str:
+    """Say why there is no length, ``last`` being the last one that was calculated."""
     low = interval.low
     high = interval.high
     if low > 0 and high is not None:

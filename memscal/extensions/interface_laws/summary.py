@@ -59,6 +59,7 @@ def tables(comparison: results.InterfaceComparison) -> list[Table]:
 
 
 def _law_table(direction: str, compared: results.LawComparison) -> Table:
+    """Return the evidence of each law."""
     best = max(law.log_evidence for law in compared.laws)
     title = (
         f"Laws of the {compared.lubrication or 'contact'} interface, {direction}: "
@@ -80,6 +81,7 @@ def _best(compared: results.LawComparison, law: results.InterfaceLaw) -> str:
 
 
 def _length_table(direction: str, compared: results.LawComparison) -> Table:
+    """Return the length, and the evidence for the law that yields against each other one."""
     words = "slip length" if direction == "tangential" else "length"
     rows = []
     for factor in compared.factors:
@@ -102,6 +104,7 @@ def _length_table(direction: str, compared: results.LawComparison) -> Table:
 
 
 def _implied_table(implied: results.ImpliedFriction) -> Table:
+    """Return what the slip length means at each load."""
     rows = []
     for load, friction, pressure, stiffness in zip(
         implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
