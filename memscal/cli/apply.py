@@ -7,7 +7,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, accept_altered_option, option, report_options
+from memscal.cli.options import FILE, figure_option, option, report_options, trust_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -24,13 +24,8 @@ Examples:
 @option("-o --output", FILE, metavar="OUT")(
     "File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5."
 )
-@option("--override", is_flag=True)(
-    "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
-)
-@accept_altered_option
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
-    "Draw the profiles of all loads, linear and logarithmic. May be repeated."
-)
+@trust_options
+@figure_option("Draw the profiles of all loads, linear and logarithmic.")
 @report_options
 def command(
     artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
@@ -45,6 +40,7 @@ def command(
     A failed quality check is exit code 1: the result is written all the same.
     """
     from memscal.formats.opened import opened_scans
+    from memscal.measurement.measure_stress import measure_stress
 
     accepted = {name: options[name] for name in ("override", "accept_altered")}
     data = opened_scans(scans, accept_altered=accepted["accept_altered"])
@@ -52,21 +48,14 @@ def command(
     figures = options["figures"]
     report = options["report"]
     out.prove_writable([written, *figures, report], force=force, inputs=[artifact, *scans])
-
-    from memscal.measurement.measure_stress import measure_stress
-
     with out.working("Measuring"):
         stress = measure_stress(data, artifact, **accepted)
-    with out.working("Drawing"):
-        drawn = out.rendered(stress.plot, figures) | out.reported(stress, report)
+    files = out.drawn(stress, figures, report)
     with together():
         stress.save(written, overwrite=force)
-        out.write_files(drawn, force=force)
-        if as_json:
-            out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
-        else:
-            out.emit_result(stress, brief=options["brief"])
+        out.write_files(files, force=force)
+        head = {"output": str(written)}
+        out.emit_result(stress, head, as_json=as_json, brief=options["brief"])
     out.show_messages(stress.messages)
-    for path in (written, *drawn):
-        out.message(f"Written: {path}")
+    out.say_written([written, *files])
     return exit_code_of(stress.checks)

@@ -16,7 +16,7 @@ import click
 from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, Quantity, force_option, json_option, option, options_of
+from memscal.cli.options import FILE, Quantity, option, options_of
 from memscal.formats.files import together
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def _drawn(calibration: Calibration, draws: int, seed: int) -> Any:
 
 
 def _chosen_method(
-    method: str | None, options: tuple[str, ...], seed: int | None, channel: str = "zz"
+    method: str | None, options: tuple[str, ...], seed: int | None, channel: str
 ) -> Method:
     """Set up the method, by default the channel's; a wrong name or option is a usage error."""
     from memscal.deconvolution.division import create_regulariser
@@ -70,13 +70,13 @@ def _chosen_method(
 
 def _correlation(text: str) -> tuple[tuple[str, str], float]:
     """Read INPUT,INPUT=R."""
-    pair, equals, value = text.partition("=")
+    pair, _, value = text.partition("=")
     first, comma, second = (word.strip() for word in pair.partition(","))
     try:
         coefficient = float(value)
     except ValueError:
         coefficient = math.nan
-    if not (equals and comma and math.isfinite(coefficient)):
+    if not (comma and math.isfinite(coefficient)):
         raise click.UsageError(f"--correlation {text!r} is not of the form INPUT,INPUT=R.")
     return (first, second), coefficient
 
@@ -94,8 +94,8 @@ def _check_kinds(values: dict[str, Any], usual: Method) -> None:
     """Refuse text where the method's default is a number, or a fraction where it is a count."""
     for name, value in values.items():
         default = getattr(usual, name, None)
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if isinstance(default, float) and not (number and math.isfinite(value)):
+        number = type(value) in (int, float) and math.isfinite(value)
+        if isinstance(default, float) and not number:
             problem = f"--option {name}={value}: {name} is a number, such as {default}."
             raise click.UsageError(problem)
         if type(default) is int and type(value) is not int:
@@ -194,13 +194,15 @@ def calibration_settings(
     **others: Any,
 ) -> dict[str, Any]:
     """Return the options of :func:`memscal.calibrate` that options of the command line ask for."""
-    regulariser = _chosen_method(method, options, seed, others["channel"])
-    pairs = dict(_correlation(text) for text in correlations)
     accepted = others["accept_altered"]
-    stress = None if reference is None else _read_reference(reference, pixel_size, accepted)
-    other = None if alternative is None else _read_reference(alternative, None, accepted)
-    chosen = {"reference": stress, "alternative": other, "method": regulariser, "seed": seed or 0}
-    return chosen | {"correlations": pairs, **others}
+    return {
+        "method": _chosen_method(method, options, seed, others["channel"]),
+        "correlations": dict(_correlation(text) for text in correlations),
+        "reference": reference and _read_reference(reference, pixel_size, accepted),
+        "alternative": alternative and _read_reference(alternative, None, accepted),
+        "seed": seed or 0,
+        **others,
+    }
 
 
 @click.command("calibrate", epilog=EXAMPLES)
@@ -213,12 +215,10 @@ def calibration_settings(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
     "film of a stated law that is not linear; the stated thickness is its prior."
 )
-@json_option
+@common.json_option
 @common.brief_option
 @common.report_option
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
-    "Draw scan, apparatus function and transfer function. May be repeated."
-)
+@common.figure_option("Draw scan, apparatus function and transfer function.")
 @option("--sweep sweeping", is_flag=True)(
     "Show how the results depend on the noise amplitude, over two decades and eight seeds."
 )
@@ -232,7 +232,7 @@ def calibration_settings(
 @option("--compact", is_flag=True)(
     "Leave G over the plane out of the artifact where it is round, which halves its size."
 )
-@force_option
+@common.force_option
 @option("--dry-run", is_flag=True)(
     "Read and check every input, print what would be done, and write nothing."
 )
@@ -270,12 +270,10 @@ def command(
     channel = settings["channel"]
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or out.beside(scans[0], ending)
-    outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, settings)
-    seed = settings["seed"]
-    inputs = [path for path in (*scans, reference, alternative) if path is not None]
-    out.prove_writable(outputs, force=force, inputs=inputs)
+    outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
+    out.prove_writable(outputs, force=force, inputs=[*scans, reference, alternative])
     if dry_run:
         _rehearse(data, settings, outputs, as_json)
         return DONE
@@ -287,26 +285,20 @@ def command(
     further: dict[str, Result] = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
-            further["sweep"] = calibration.sweep(seed=seed)
+            further["sweep"] = calibration.sweep(seed=settings["seed"])
     if draws is not None:
-        further["monte_carlo"] = _drawn(calibration, draws, seed)
-    with out.working("Drawing"):
-        contents = out.reported(calibration, report) | out.rendered(calibration.plot, figures)
-        if sweep_figure is not None:
-            contents |= out.rendered(further["sweep"].plot, [sweep_figure])
+        further["monte_carlo"] = _drawn(calibration, draws, settings["seed"])
+    files = out.drawn(calibration, figures, report)
+    if sweep_figure is not None:
+        files |= out.drawn(further["sweep"], [sweep_figure])
     apparatus = calibration.apparatus.compact() if compact else calibration.apparatus
     with together():
         apparatus.save(output, overwrite=force)
-        out.write_files(contents, force=force)
-        if as_json:
-            files = {"schema_version": "1", "artifact": str(output)}
-            values = {name: result.to_dict() for name, result in further.items()}
-            out.emit_json(files | calibration.to_dict() | values)
-        else:
-            out.emit_result(calibration, *further.values(), brief=brief)
+        out.write_files(files, force=force)
+        head = {"artifact": str(output)}
+        out.emit_result(calibration, head, as_json=as_json, brief=brief, further=further)
     out.show_messages(apparatus.process.messages)
-    for path in outputs:
-        out.message(f"Written: {path}")
+    out.say_written(outputs)
     then = f" {output.name} was written and is marked so."
     return exit_code_of(apparatus.checks, then=then)
 

@@ -1,23 +1,38 @@
 """``memscal compare``: measured against calculated stress, and the friction that explains it."""
 
+from __future__ import annotations
+
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from memscal.cli import output as out
-from memscal.cli.options import FILE, Quantity, accept_altered_option, option, report_options
+from memscal.cli.options import (
+    FILE,
+    Quantity,
+    figure_option,
+    option,
+    report_options,
+    trust_options,
+)
 from memscal.formats.files import together
+
+if TYPE_CHECKING:
+    from memscal.apparatus import ApparatusFunction
+    from memscal.friction.results import FrictionComparison
 
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
     """Return the stems of all figures' names, without matplotlib; a test compares both."""
     tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
-    of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
-    stems = [*of_each, "maxima", "effective-friction", "likelihood"]
+    stems = []
+    for tail in tails:
+        stems += [f"profiles{tail}", f"friction-set{tail}"]
+    stems += ["maxima", "effective-friction", "likelihood"]
     return [*stems, "interface"] if interface else stems
 
 
@@ -95,18 +110,13 @@ Examples:
     "Also explain the profiles by an interface that yields before it slips, at the "
     "macroscopic friction, and report which of the two explanations is more likely."
 )
-@option("--override", is_flag=True)(
-    "Compare although sensor, channel or film of artifact and scan differ; recorded."
-)
-@accept_altered_option
+@trust_options
 @option("--cache", FILE, metavar="FOLDER")(
     "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
     "the user's cache folder]"
 )
 @option("--no-cache", is_flag=True)("Calculate all contacts, and store none.")
-@option("--figure single", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
-    "Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated."
-)
+@figure_option("Draw profiles, residuals, maxima and friction coefficients on one page.")
 @option("--figures folder", FILE, metavar="FOLDER")(
     "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
     "coefficients, maxima, effective friction, likelihood, interface."
@@ -132,40 +142,28 @@ def command(
 
     from memscal.apparatus import load_apparatus
     from memscal.cli.failures import exit_code_of
-    from memscal.errors import InputError
     from memscal.formats.opened import opened_contacts
     from memscal.formats.reference import read_reference
     from memscal.friction.compare import compare, scans_of
     from memscal.summaries.comparison import file_json, notes
 
     accepted = {"accept_altered": options["accept_altered"]}
-    channel = options["channel"]
     apparatus = load_apparatus(artifact, **accepted)
-    given = apparatus.sensor.channel
-    if given != channel and (apparatus.order or channel != "zz"):
-        problem = f"The artifact {artifact} is of channel {given}, not of {channel}."
-        cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
-        raise InputError(problem, cure=cure)
+    channel = options["channel"]
+    _require_channel(apparatus, artifact, channel)
     data = opened_contacts(scans, **accepted)
     references = [read_reference(path, **accepted) for path in options["references"]]
-    single = options["single"]
-    folder = options["folder"]
-    interface = options["interface"]
-    named = {}
-    if folder is not None:
-        stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
-        named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
     shear = options["shear"] and load_apparatus(options["shear"], **accepted)
-    inputs = [artifact, *scans, *options["references"], *filter(None, [options["shear"]])]
-    figures = [*single, *named.values()]
+    page_figures = options["figures"]
     report = options["report"]
-    outputs = [*figures, report]
+    folder = options["folder"]
+    named = _named_figures(options, (scan.lubrication for scan in scans_of(data)))
+    outputs = [*page_figures, *named.values(), report]
     if folder is not None and not folder.is_dir():
-        if folder.exists():
-            raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
-        outputs = [*single, folder, report]  # the folder is made at the end
+        outputs = [*page_figures, folder, report]  # the folder is made at the end
+    inputs = [artifact, *scans, *options["references"], options["shear"]]
     out.prove_writable(outputs, force=force, inputs=inputs)
-
+    settings = {name: options[name] for name in _SETTINGS}
     with out.working("Comparing with calculated contacts"):
         comparison = compare(
             data,
@@ -173,36 +171,59 @@ def command(
             friction=_frictions(options),
             loading=options["loadings"] or ("incremental", "total"),
             references=references or None,
-            lubricated=options["lubricated"],
             shear=shear,
-            macroscopic=options["macroscopic"],
-            macroscopic_uncertainty=options["macroscopic_uncertainty"],
-            interface=interface,
-            override=options["override"],
             cache=cache,
             workers=min(2, os.cpu_count() or 1),
+            **settings,
         )
-    with out.working("Drawing"):
-        ready = out.rendered(comparison.plot, single) | out.reported(comparison, report)
-        if named:
-            from memscal.figures.friction import comparison_figures
-
-            for stem, draw in comparison_figures(comparison).items():
-                ready |= out.rendered(draw, [named[stem]])
+    files = out.drawn(comparison, page_figures, report)
+    if named:
+        files |= _drawn(comparison, named)
     with together(folder):
-        out.write_files(ready, force=force)
+        out.write_files(files, force=force)
         if as_json:
-            files: dict[str, Any] = {"artifact": file_json(apparatus.source)}
+            read: dict[str, Any] = {"artifact": file_json(apparatus.source)}
             if channel == "zz":
-                files["references"] = [file_json(profile.source) for profile in references]
-                files["figures"] = [str(path) for path in figures]
-            out.emit_json(comparison.to_dict() | files)
+                read["references"] = [file_json(profile.source) for profile in references]
+                read["figures"] = [str(path) for path in (*page_figures, *named.values())]
+            out.emit_json(comparison.to_dict() | read)
         else:
-            out.emit_result(comparison, brief=options["brief"])
+            out.emit_result(comparison, {}, as_json=False, brief=options["brief"])
     out.show_messages(notes(comparison))
-    for path in ready:
-        out.message(f"Written: {path}")
+    out.say_written(files)
     return exit_code_of(comparison.checks)
+
+
+def _require_channel(apparatus: ApparatusFunction, path: Path, channel: str) -> None:
+    """Refuse the artifact of another channel."""
+    from memscal.errors import InputError
+
+    given = apparatus.sensor.channel
+    if given != channel and (apparatus.order or channel != "zz"):
+        problem = f"The artifact {path} is of channel {given}, not of {channel}."
+        cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
+        raise InputError(problem, cure=cure)
+
+
+def _named_figures(options: Mapping[str, Any], lubrications: Iterable[str]) -> dict[str, Path]:
+    """Return the files of --figures by their stems."""
+    folder = options["folder"]
+    if folder is None:
+        return {}
+    if folder.exists() and not folder.is_dir():
+        raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
+    stems = figure_stems(lubrications, interface=options["interface"])
+    return {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
+
+
+def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> dict[Path, bytes]:
+    from memscal.figures.friction import comparison_figures
+
+    files: dict[Path, bytes] = {}
+    with out.working("Drawing"):
+        for stem, draw in comparison_figures(comparison).items():
+            files |= out.rendered(draw, [named[stem]])
+    return files
 
 
 def _frictions(options: Mapping[str, Any]) -> list[float] | None:
@@ -210,23 +231,30 @@ def _frictions(options: Mapping[str, Any]) -> list[float] | None:
     return sorted({0.0, *options["friction"], math.inf}) if options["friction"] else None
 
 
-#: Options that the comparison of a shear does not have.
-_NOT_OF_SHEAR = (
-    *("references", "lubricated", "shear", "macroscopic", "interface", "single", "folder"),
-)
+#: Options that are those of :func:`memscal.compare`.
+_SETTINGS = ("lubricated", "macroscopic", "macroscopic_uncertainty", "interface", "override")
+#: Options that the comparison of a shear does not have, and how they are typed.
+_NOT_OF_SHEAR = {
+    "references": "reference",
+    "lubricated": "lubricated",
+    "shear": "shear",
+    "macroscopic": "macroscopic",
+    "interface": "interface",
+    "figures": "figure",
+    "folder": "figures",
+}
 
 
 def _check_usage(options: Mapping[str, Any], scans: Sequence[Path]) -> None:
-    if options["channel"] != "zz":
+    channel = options["channel"]
+    if channel != "zz":
         if len(scans) > 1:
-            raise click.UsageError(f"--channel {options['channel']} takes one STRESS file.")
-        if given := [name for name in _NOT_OF_SHEAR if options[name]]:
-            named = {"references": "reference", "single": "figure", "folder": "figures"}
-            name = named.get(given[0], given[0])
-            raise click.UsageError(f"--{name} has no effect with --channel {options['channel']}.")
-    friction, loadings, macroscopic = (
-        options[name] for name in ("friction", "loadings", "macroscopic")
-    )
+            raise click.UsageError(f"--channel {channel} takes one STRESS file.")
+        for name, typed in _NOT_OF_SHEAR.items():
+            if options[name]:
+                raise click.UsageError(f"--{typed} has no effect with --channel {channel}.")
+    friction = options["friction"]
+    loadings = options["loadings"]
     for name, values in (("friction", friction), ("loading", loadings)):
         twice = [value for value in values if values.count(value) > 1]
         if twice:
@@ -236,10 +264,11 @@ def _check_usage(options: Mapping[str, Any], scans: Sequence[Path]) -> None:
             "--reference brings its own friction coefficients and loading: leave out --friction "
             "and --loading."
         )
-    if options["macroscopic_uncertainty"] is not None and macroscopic is None:
-        raise click.UsageError("--macroscopic-uncertainty needs --macroscopic.")
-    if options["interface"] and macroscopic is None:
-        raise click.UsageError(
-            "--interface needs --macroscopic: the friction coefficient at which an interface that "
-            "yields begins to slip."
-        )
+    if options["macroscopic"] is None:
+        if options["macroscopic_uncertainty"] is not None:
+            raise click.UsageError("--macroscopic-uncertainty needs --macroscopic.")
+        if options["interface"]:
+            raise click.UsageError(
+                "--interface needs --macroscopic: the friction coefficient at which an interface "
+                "that yields begins to slip."
+            )

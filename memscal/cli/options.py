@@ -7,11 +7,12 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from memscal.cli.failures import debug_option
+from memscal.cli.output import FigurePath
 from memscal.extensions import hook
 
 if TYPE_CHECKING:
@@ -110,6 +111,12 @@ def options_of(*options: _Adder) -> _Adder:
     return add
 
 
+def figure_option(about: str) -> _Adder:
+    """Return the option of a figure's files; the text says what is drawn."""
+    adder = option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")
+    return adder(f"{about} May be repeated.")
+
+
 def laboratory_option(subject: str) -> _Adder:
     """Return the option of a laboratory's file."""
     about = "Laboratory's file (lab.toml): sensor, load cell, stage, operator, temperature, times."
@@ -125,8 +132,9 @@ def with_laboratory(path: Path | None, scan: Scan) -> Scan:
 
 def _one_form(ctx: click.Context, param: click.Parameter, given: bool) -> bool:
     """Refuse two forms of the results."""
-    if given and (other := ctx.meta.setdefault("memscal.form", param.opts[0])) != param.opts[0]:
-        raise click.UsageError(f"Give {other} or {param.opts[0]}, not both.")
+    form = param.opts[0]
+    if given and ctx.meta.setdefault("memscal.form", form) != form:
+        raise click.UsageError(f"Give {ctx.meta['memscal.form']} or {form}, not both.")
     return given
 
 
@@ -140,9 +148,13 @@ force_option = option("--force", is_flag=True)("Replace outputs that exist.")
 report_option = option("--report", FILE, metavar="FILE.html")(
     "Write a report as one HTML page, without other files, network or scripts."
 )
+override_option = option("--override", is_flag=True)(
+    "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
+)
 accept_altered_option = option("--accept-altered", is_flag=True)(
     "Use files although their content does not fit their digest: recorded in the output."
 )
+trust_options = options_of(override_option, accept_altered_option)
 output_options = options_of(json_option, force_option, debug_option)
 report_options = options_of(brief_option, report_option, output_options)
 """Those of commands that answer in a few lines and can write a report."""
@@ -227,12 +239,8 @@ def _measured(
     )
 
 
-@overload
-def si(value: float, power: int) -> float: ...
-@overload
-def si(value: float | None, power: int) -> float | None: ...
-def si(value: float | None, power: int) -> float | None:
-    """Return a value times a power of ten, rounded as if it had been typed so."""
+def si(value: float | None, power: int) -> Any:
+    """Return a value, if any, times a power of ten, rounded as if it had been typed so."""
     if value is None or not math.isfinite(value):
         return value
     from decimal import Decimal
@@ -251,10 +259,11 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         )
     from memscal.model.film import ElasticFilm
 
-    numbers: dict[str, Any] = {}
+    numbers = {}
     for name, power in FILM.items():
         spread = f"{name}_uncertainty"
-        numbers |= {name: si(options[name], power), spread: si(options.get(spread), power)}
+        numbers[name] = si(options[name], power)
+        numbers[spread] = si(options.get(spread), power)
     return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 
@@ -274,7 +283,8 @@ def named(names: Iterable[str]) -> str:
 
 
 def _require(subject: str, options: Mapping[str, Any], names: Iterable[str]) -> None:
-    if missing := [name for name in names if options[name] is None]:
+    missing = [name for name in names if options[name] is None]
+    if missing:
         raise click.UsageError(f"{subject} is not fully given: add {named(missing)}.")
 
 

@@ -186,10 +186,29 @@ def emit_tables(*tables: Table, answer: str = "") -> None:
     emit(text_of(answer, tables, _columns(), _in_bold if drawn else as_it_is))
 
 
-def emit_result(result: Result, *further: Result, brief: bool) -> None:
-    """Print the answer of a result, and unless that is enough its tables and those of others."""
-    tables = () if brief else (table for one in (result, *further) for table in one.tables())
-    emit_tables(*tables, answer=result.answer())
+def emit_result(
+    result: Result,
+    head: Mapping[str, Any],
+    *,
+    as_json: bool,
+    brief: bool = False,
+    further: Mapping[str, Result] | None = None,
+) -> None:
+    """Print the answer of a result, and unless that is enough its tables and those of others.
+
+    Or one JSON object: the head, the result, and the further results by their names.
+    """
+    others = further or {}
+    if as_json:
+        values = {name: other.to_dict() for name, other in others.items()}
+        emit_json({"schema_version": "1", **head, **result.to_dict(), **values})
+    elif brief:
+        emit_tables(answer=result.answer())
+    else:
+        tables = result.tables()
+        for other in others.values():
+            tables += other.tables()
+        emit_tables(*tables, answer=result.answer())
 
 
 def _in_bold(text: str, failed: bool) -> str:
@@ -233,10 +252,11 @@ def beside(path: Path, suffix: str) -> Path:
 
 
 def prove_writable(
-    outputs: Iterable[Path | None], *, force: bool, inputs: Sequence[Path] = ()
+    outputs: Iterable[Path | None], *, force: bool, inputs: Iterable[Path | None] = ()
 ) -> None:
     """Refuse outputs that share a name, and prove that each that is asked for can be written."""
     wanted = [output for output in outputs if output is not None]
+    read = [path for path in inputs if path is not None]
     seen: dict[Path, Path] = {}
     for output in wanted:
         real = Path(os.path.realpath(output))
@@ -246,7 +266,7 @@ def prove_writable(
             )
         seen[real] = output
     for output in wanted:
-        ensure_writable(output, overwrite=force, inputs=inputs)
+        ensure_writable(output, overwrite=force, inputs=read)
 
 
 def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, bytes]:
@@ -262,6 +282,21 @@ def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, by
 def reported(result: Result, path: Path | None) -> dict[Path, bytes]:
     """Return a result's page as the bytes of its file, if one is asked for."""
     return {} if path is None else {path: result.report().encode("utf-8")}
+
+
+def drawn(
+    result: Result, figures: Sequence[Path] = (), report: Path | None = None
+) -> dict[Path, bytes]:
+    """Return figure and page of a result as the bytes of their files."""
+    with working("Drawing"):
+        return rendered(result.plot, figures) | reported(result, report)
+
+
+def say_written(paths: Iterable[Path | None]) -> None:
+    """Name the files that were written, where there are any."""
+    for path in paths:
+        if path is not None:
+            message(f"Written: {path}")
 
 
 def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:

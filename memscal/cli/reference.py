@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +12,16 @@ import click
 from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, PAPER_FILM, Quantity, indenter_from, option, options_of, si
+from memscal.cli.options import (
+    FILE,
+    PAPER_FILM,
+    Quantity,
+    figure_option,
+    indenter_from,
+    option,
+    options_of,
+    si,
+)
 from memscal.extensions import hook
 from memscal.formats.files import together
 
@@ -27,7 +36,12 @@ _RADIUS = {"rod": 0.25, "sphere": 128.8}
 SHAPES = ("rod", "sphere", "cone", "profile")
 
 # What each shape is described by; every other of these options belongs to another shape.
-_DESCRIBED_BY = dict(zip(SHAPES, ("radius", "radius", "inclination", "profile_table"), strict=True))
+_DESCRIBED_BY = {
+    "rod": "radius",
+    "sphere": "radius",
+    "cone": "inclination",
+    "profile": "profile_table",
+}
 _ASPERITIES = (Quantity("um"), Quantity("1/mm^2"), Quantity("um"))
 
 interface_options = options_of(
@@ -47,7 +61,7 @@ interface_options = options_of(
 """The options of a rough interface."""
 
 
-def indenter_of(shape: str, options: Mapping[str, Any]) -> Indenter:
+def _indenter(shape: str, options: Mapping[str, Any]) -> Indenter:
     """Return the indenter that the options describe."""
     needed = _DESCRIBED_BY[shape]
     for name in sorted(set(_DESCRIBED_BY.values()) - {needed}):
@@ -72,13 +86,13 @@ def interface_of(options: Mapping[str, Any]) -> Interface:
     """Return the interface that the options describe."""
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
-    rough = options["greenwood_tripp"]
+    asperities = options["greenwood_tripp"]
     exponential = options["exponential"]
-    if rough and exponential:
+    if asperities and exponential:
         raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
     normal: GreenwoodTripp | ExponentialCompliance | None = None
-    if rough:
-        height, density, radius = map(si, rough, (-6, 6, -6))
+    if asperities:
+        height, density, radius = map(si, asperities, (-6, 6, -6))
         normal = GreenwoodTripp(roughness=height, asperity_density=density, asperity_radius=radius)
     if exponential:
         decay, pressure = map(si, exponential, (-6, 6))
@@ -142,9 +156,7 @@ Examples:
 @option("-o --output", FILE, metavar="OUT")(
     "Reference file to write (memscal-reference); for one load or depth."
 )
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
-    "Figure of the contacts (.png, .svg or .pdf). May be repeated."
-)
+@figure_option("Draw the contacts.")
 @option("--mesh", FILE, metavar="FILE.vtu")(
     "Displacement and stress in the film, for ParaView (needs meshio); for finite elements "
     "and one load or depth."
@@ -157,17 +169,14 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
     rod of radius 0.25 mm, a sphere of radius 128.8 mm. Without --film-law the film is linear.
     """
     _check_usage(options)
-    outputs = (options["output"], options["mesh"], *options["figures"])
-    files = [path for path in outputs if path is not None]
-    table = options["profile_table"]
-    out.prove_writable(files, force=force, inputs=[table] if table else [])
+    files = [options["output"], options["mesh"], *options["figures"]]
+    out.prove_writable(files, force=force, inputs=[options["profile_table"]])
     contacts = _pressed(indenter, options)
     with together():
         _write(contacts, options, force=force)
         messages = _print(contacts, options, as_json=as_json)
     out.show_messages(messages)
-    for path in files:
-        out.message(f"Written: {path}")
+    out.say_written(files)
     return DONE
 
 
@@ -205,39 +214,46 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
     from memscal.mechanics.indent import indent
 
     film = common.film_from(options)
-    body = indenter_of(indenter, options)
-
+    body = _indenter(indenter, options)
+    linear = film.law == "linear"
     friction = options["friction"]
     if friction is None:
         # A film that slides is drawn out from under a rod, and is not solved to any depth.
-        friction = math.inf if indenter == "rod" and film.law != "linear" else 0.0
-    names = ("loading", "backend", "rings")
-    settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
-    settings |= {"interface": interface_of(options), "film_radius": si(options["film_radius"], -3)}
-    settings["strain"] = "linear" if film.law == "linear" else "finite"
+        friction = math.inf if indenter == "rod" and not linear else 0.0
+    depths = [si(depth, -6) for depth in options["depths"]]
+    loads = None if depths else list(options["loads"] or (1.0,))
     with out.working("Pressing"):
-        if depths := [si(depth, -6) for depth in options["depths"]]:
-            return indent(film, body, depth=depths, **settings)
-        return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)
+        return indent(
+            film,
+            body,
+            load=loads,
+            depth=depths or None,
+            friction=friction,
+            loading=options["loading"],
+            backend=options["backend"],
+            rings=options["rings"],
+            interface=interface_of(options),
+            film_radius=si(options["film_radius"], -3),
+            strain="linear" if linear else "finite",
+        )
 
 
 def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) -> None:
     """Write the files."""
+    from memscal.formats.reference import write_reference
+
     output = options["output"]
     mesh = options["mesh"]
-    figures = options["figures"]
-    drawn: dict[Path, bytes] = {}
-    if figures:
+    figures = {}
+    if options["figures"]:
         from memscal.figures.stress import contact_figure
 
-        drawn = out.rendered(lambda: contact_figure(contacts), figures)
+        figures = out.rendered(partial(contact_figure, contacts), options["figures"])
     if mesh is not None:
         hook("write_mesh")(contacts[0].mesh(), mesh, overwrite=force)
     if output is not None:
-        from memscal.formats.reference import write_reference
-
         write_reference(contacts[0].profile(), output, overwrite=force)
-    out.write_files(drawn, force=force)
+    out.write_files(figures, force=force)
 
 
 def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> list[Message]:

@@ -1,15 +1,27 @@
 """``memscal restore``: a scan and a calibrated sensor to the stress at the base of the film."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, Quantity, accept_altered_option, option, report_options
+from memscal.cli.options import (
+    FILE,
+    Quantity,
+    figure_option,
+    option,
+    report_options,
+    trust_options,
+)
 from memscal.formats.files import together
+
+if TYPE_CHECKING:
+    from memscal.measurement.restoration import Restoration
 
 EXAMPLES = """\b
 Examples:
@@ -32,13 +44,8 @@ Examples:
     "friction, to be shown beside the result."
 )
 @option("--load", Quantity("N"))("Which load of a scan of several is restored, in N.")
-@option("--override", is_flag=True)(
-    "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
-)
-@accept_altered_option
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
-    "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
-)
+@trust_options
+@figure_option("Draw the restored, the measured and the calculated stress, and residuals.")
 @report_options
 def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: Any) -> int:
     """Restore the stress at the base of a film from a SCAN with a calibrated sensor (ARTIFACT).
@@ -52,43 +59,43 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
     from memscal.apparatus import load_apparatus
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan
+    from memscal.measurement.restore import restore
 
-    output, expected, figures, report = (
-        options[name] for name in ("output", "expected", "figures", "report")
-    )
+    output = options["output"]
+    expected = options["expected"]
+    figures = options["figures"]
+    report = options["report"]
     accepted = {"accept_altered": options["accept_altered"]}
     apparatus = load_apparatus(artifact, **accepted)
     data = read_scan(scan, **accepted)
     stress = None if expected is None else read_reference(expected, **accepted)
-    inputs = [path for path in (artifact, scan, expected) if path is not None]
+    inputs = [artifact, scan, expected]
     out.prove_writable([output, *figures, report], force=force, inputs=inputs)
-
-    from memscal.errors import MemscalError
-    from memscal.measurement.restore import restore
-    from memscal.mechanics.press_rod import press_rod
-
     with out.working("Restoring"):
         settings = {name: options[name] for name in ("load", "override")}
         restored = restore(data, apparatus, expected=stress, **settings)
         if stress is None:
-            # The calculated contact is shown beside it; one that has no solution is left out.
-            try:
-                contact = press_rod(*restored.scan.set_up)
-                restored = replace(restored, comparison=restored.compare(contact))
-            except MemscalError as failure:
-                out.note(f"No contact is shown beside the result: {failure.problem}")
-    with out.working("Drawing"):
-        drawn = out.rendered(restored.plot, figures) | out.reported(restored, report)
+            restored = _with_contact(restored)
+    files = out.drawn(restored, figures, report)
     with together():
         if output is not None:
             write_reference(restored.profile(), output, overwrite=force)
-        out.write_files(drawn, force=force)
-        if as_json:
-            written = None if output is None else str(output)
-            out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
-        else:
-            out.emit_result(restored, brief=options["brief"])
+        out.write_files(files, force=force)
+        head = {"output": None if output is None else str(output)}
+        out.emit_result(restored, head, as_json=as_json, brief=options["brief"])
     out.show_messages(restored.messages)
-    for path in (*filter(None, [output]), *drawn):
-        out.message(f"Written: {path}")
+    out.say_written([output, *files])
     return exit_code_of(restored.checks)
+
+
+def _with_contact(restored: Restoration) -> Restoration:
+    """Compare with the calculated contact, to show it; one that has no solution is left out."""
+    from memscal.errors import MemscalError
+    from memscal.mechanics.press_rod import press_rod
+
+    try:
+        contact = press_rod(*restored.scan.set_up)
+        return replace(restored, comparison=restored.compare(contact))
+    except MemscalError as failure:
+        out.note(f"No contact is shown beside the result: {failure.problem}")
+        return restored

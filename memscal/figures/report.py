@@ -125,10 +125,10 @@ def _checks(checks: Sequence[QualityCheck]) -> Table:
 def html_figures(pictures: Sequence[Picture]) -> str:
     """Return figures with their captions, as images that the page holds."""
     figures = [picture.draw() for picture in pictures]
-    images = [_image(figure, "svg") for figure in figures]
+    images = [_image(figure, "svg", 72.0) for figure in figures]
     for i in sorted(range(len(images)), key=lambda i: -len(images[i])):
         if sum(map(len, images)) > _MOST_OF_FIGURES:
-            images[i] = _image(figures[i], "png")
+            images[i] = _image(figures[i], "png", _COARSE)
     return "\n".join(
         f'<figure>\n<img alt="{escape(picture.alt)}" src="{image}">\n'
         f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
@@ -136,9 +136,9 @@ def html_figures(pictures: Sequence[Picture]) -> str:
     )
 
 
-def _image(figure: Figure, form: str) -> str:
+def _image(figure: Figure, form: str, dpi: float) -> str:
     """Return a figure as the address of an image, which holds it."""
-    content = base64.b64encode(render_figure(figure, form, dpi=_COARSE)).decode("ascii")
+    content = base64.b64encode(render_figure(figure, form, dpi=dpi)).decode("ascii")
     return f"data:image/{'svg+xml' if form == 'svg' else form};base64,{content}"
 
 

@@ -126,8 +126,7 @@ def command(
             rows = [(name.replace("_", " "), str(number)) for name, number in counts.items()]
             rows.append(("time", span(seconds)))
             out.emit_tables(Table(f"Batch of {source.name}", ("", ""), rows))
-    for path in (results, *page):
-        out.message(f"Written: {path}")
+    out.say_written([results, *page])
     if problem:
         raise problem
     if not errors + failed:

@@ -6,7 +6,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, option, output_options
+from memscal.cli.options import FILE, figure_option, option, output_options
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -21,9 +21,8 @@ Examples:
 @option("-o --output", FILE, metavar="FILE.html")(
     "Page to write, without other files, network or scripts.  [default: RESULTS/summary.html]"
 )
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
-    "Draw the distributions of A and sigma, failed checks and errors, and the map of the wafer. "
-    "May be repeated."
+@figure_option(
+    "Draw the distributions of A and sigma, failed checks and errors, and the map of the wafer."
 )
 @output_options
 def command(
@@ -40,15 +39,10 @@ def command(
     output = output or results / "summary.html"
     fleet = read_fleet(results)
     out.prove_writable([output, *figures], force=force)
-    with out.working("Drawing"):
-        contents = out.reported(fleet, output) | out.rendered(fleet.plot, figures)
+    files = out.drawn(fleet, figures, output)
     with together():
-        out.write_files(contents, force=force)
-        if as_json:
-            out.emit_json({"schema_version": "1", "page": str(output), **fleet.to_dict()})
-        else:
-            out.emit_tables(*fleet.tables())
+        out.write_files(files, force=force)
+        out.emit_result(fleet, {"page": str(output)}, as_json=as_json)
     out.show_messages(fleet.messages)
-    for path in contents:
-        out.message(f"Written: {path}")
+    out.say_written([output, *figures])
     return DONE

@@ -9,7 +9,7 @@ from click.core import ParameterSource
 from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
+from memscal.cli.options import PAPER_FILM, Quantity, figure_option, option, output_options, si
 from memscal.formats.files import together
 
 _VARIED = ("step", "half-range", "repeats")
@@ -74,9 +74,7 @@ def _target(value: str) -> tuple[str, float]:
 @option("--vary", click.Choice(_VARIED))(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
-@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
-    "Figure of the expected result (.png, .svg or .pdf). May be repeated."
-)
+@figure_option("Draw the expected result.")
 @output_options
 def command(as_json: bool, force: bool, **options: Any) -> int:
     """Predict the uncertainties of a calibration before its scan is made.
@@ -86,7 +84,9 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     and --vary, the smallest scan that reaches the targets is found.
     """
     common.require_one_kernel(options)
-    targets, figures, vary = (options[name] for name in ("targets", "figures", "vary"))
+    targets = options["targets"]
+    figures = options["figures"]
+    vary = options["vary"]
     source = click.get_current_context().get_parameter_source("noise")
     if options["noise_voltage"] is not None and source == ParameterSource.COMMANDLINE:
         raise click.UsageError("--noise and --noise-voltage both state the noise: give one.")
@@ -97,25 +97,27 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
 
     from memscal.extensions.planning.design import design
 
-    settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
-    settings |= {name: options[name] for name in ("load", "repeats", "method")}
-    settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
-    settings |= {"kernel": common.kernel_from(options), "want": dict(targets)}
+    settings: dict[str, Any] = {name: options[name] for name in ("load", "repeats", "method")}
+    for name, power in _SCALED.items():
+        settings[name] = si(options[name], power)
+    settings["rod"] = common.indenter_from("rod", options)
     with out.working("Planning"):
-        planned = design(vary=vary, **settings)
+        planned = design(
+            film=common.film_from(options),
+            kernel=common.kernel_from(options),
+            want=dict(targets),
+            vary=vary,
+            **settings,
+        )
     with out.working("Drawing"):
         drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
     with together():
         out.write_files(drawn, force=force)
-        if as_json:
-            out.emit_json({"schema_version": "1", **planned.to_dict()})
-        else:
-            out.emit_tables(*planned.tables())
+        out.emit_result(planned, {}, as_json=as_json)
     beyond = "G follows from the prior" if planned.method == "bayesian" else "the window hides G"
     out.note(
         f"Beyond the resolved band {beyond}: the uncertainty there does not scatter from scan to "
         "scan, and repeats do not show it."
     )
-    for path in figures:
-        out.message(f"Written: {path}")
+    out.say_written(figures)
     return DONE
