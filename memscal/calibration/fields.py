@@ -1,4 +1,4 @@
-"""Fields of voltage and stress (the paper's Eq. 1): lifted from profiles, or a raster's own."""
+"""Fields of voltage and stress (the paper's Eq. 1), and their grid: lifted, or a raster's own."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     reference = np.abs(estimate.model.reference.values)
     # A shear's transform vanishes at k = 0, too: only what lies beyond its largest counts.
     beyond = np.arange(reference.size) > np.argmax(reference)
-    closed = beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference)
-    last = band.k[int(np.argmax(closed))] if closed.any() else band.k[-1]
+    closed = np.flatnonzero(beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference))
+    last = band.k[closed[0] if closed.size else -1]
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = support / (_COUNTED * np.ceil(support / spacing / _COUNTED))
@@ -95,19 +95,18 @@ class LineFields:
         """Lift the profile of the voltages, by its transform, and the reference."""
         cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
         grid = EvenGrid(cells + 1, choice.spacing)
-        step = choice.spacing / 2
         reference = estimate.model.reference
         if reference.source:
             # The grid does not sample the edge of a source, but its transform.
             k = grid.wavenumber_axis
-            planes = (RadialSpectrum.plane(f, k, k) for f in (spectrum, reference))
-            voltage, stress = (Field(grid, grid.inverse(plane)) for plane in planes)
+            voltage = Field(grid, grid.inverse(RadialSpectrum.plane(spectrum, k, k)))
+            stress = Field(grid, grid.inverse(RadialSpectrum.plane(reference, k, k)))
         else:
             nodes = reference.wavenumbers
             arrays = (a.tobytes() for a in (nodes.k, nodes.weights, reference.scalar.values))
             lifted = _lifted if grid.count < _MOST_KEPT else _lifted.__wrapped__
             stress = lifted(grid, *arrays)
-            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, step))
+            voltage = Field(grid, on_grid(spectrum.scalar.at, grid, choice.spacing / 2))
         return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
 
     @cached_property
@@ -206,9 +205,16 @@ class RasterFields:
             np.add.at(total, (rows, columns), departure / points.load)
             np.add.at(number, (rows, columns), 1.0)
             voltage += total / np.maximum(number, 1.0)
-        both = (Field(grid, voltage), Field(grid, stress))
-        index = (rows, columns)
-        return cls(grid, *both, choice.support, step, estimate.oval_kernel, index, even)
+        return cls(
+            grid,
+            Field(grid, voltage),
+            Field(grid, stress),
+            choice.support,
+            step,
+            estimate.oval_kernel,
+            (rows, columns),
+            even,
+        )
 
     @property
     def confinement(self) -> FloatArray:
@@ -268,7 +274,8 @@ class RasterFields:
         """Return a kernel on its support."""
         step = self.grid.x[1] - self.grid.x[0]
         # Odd, so that the kernel's zero stays a point of the lattice.
-        least, finer = (int(np.ceil(step / (each * self.step))) | 1 for each in (2.0, 2.0 / 3))
+        least = int(np.ceil(step / (2.0 * self.step))) | 1
+        finer = int(np.ceil(step / (2.0 / 3 * self.step))) | 1
         refinement = max(min(5, finer), least)
         fine, values = self.grid.refined(kernel, refinement)
         if profile is not None:
