@@ -58,15 +58,6 @@ def seed() -> int:
     return value
 
 
-@pytest.fixture(scope="session")
-def pango() -> None:
-    """Skip where the system lacks the library by which WeasyPrint makes a PDF."""
-    try:
-        import weasyprint  # noqa: F401 (to load the library)
-    except OSError as error:
-        pytest.skip(f"Pango, by which WeasyPrint makes a PDF, is not installed: {error}")
-
-
 @pytest.fixture(scope="session", autouse=True)
 def _every_file_is_valid(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Validate the files that tests write against our application definitions."""

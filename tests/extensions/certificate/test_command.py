@@ -19,12 +19,11 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     return ("scan.apparatus.h5", "--lab", "lab.toml")
 
 
-@pytest.mark.usefixtures("pango")
-def test_one_certificate_is_written_in_all_its_forms(run: Run, inputs):
-    outputs = ("-o", "c.html", "-o", "c.pdf", "-o", "c.xml")
-    made = run("certificate", *inputs, *outputs).exits(0, "Written: c.html, c.pdf, c.xml")
+def test_one_certificate_is_written_in_both_forms_of_text(run: Run, inputs):
+    outputs = ("-o", "c.html", "-o", "c.xml")
+    made = run("certificate", *inputs, *outputs).exits(0, "Written: c.html, c.xml")
     assert "conversion constant  conforms" in made.out
-    begins = {"c.html": b"<!DOCTYPE html>", "c.pdf": b"%PDF-1.7", "c.xml": b"<?xml"}
+    begins = {"c.html": b"<!DOCTYPE html>", "c.xml": b"<?xml"}
     assert [n for n, begin in begins.items() if not Path(n).read_bytes().startswith(begin)] == []
     run("certificate", *inputs, "-o", "c.xml").exits(4, "c.xml")
     made = run("certificate", *inputs, "-o", "c.xml", "--force", "--json").exits(0).json
