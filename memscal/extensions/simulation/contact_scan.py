@@ -1,6 +1,6 @@
 """Synthetic line scans of contacts of a sphere, each pressed anew with a load of its own."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -54,28 +54,16 @@ def simulate_contacts(
     seed: int = 0,
 ) -> Scan:
     """Simulate a line scan of contacts of a sphere; ``load_scale``: all true loads over stated."""
-    # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
     loads = checked_loads(load)
-    if np.unique(loads).size != loads.size:
-        problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
-        raise InputError(problem, cure="Give each load once, and the number of its repeats.")
-    require_range("spacing", spacing, 1e-9, 0.1, "m")
+    _require_row(loads, points, spacing, repeats, seed)
     require_positive("load_scale", load_scale)
-    if points < 2 or repeats < 1 or seed < 0:
-        raise InputError(
-            f"There are {points} contacts in a row and {repeats} rows at each load, from the seed "
-            f"{seed}.",
-            cure="Give two contacts and one row at least, and a seed that is not negative.",
-        )
     sensor = simulated_sensor(kernel, conversion_constant, shear)
-    interface = interface or Interface()
-    law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
-    true_loads = load_scale * loads
-    states, spread = _pressed(
-        lambda at: indent(film.expected, sphere, load=at, strain="linear", **law),
-        true_loads,
-        disturbances.load_scatter,
-    )
+    law: dict[str, Any] = {
+        "friction": friction,
+        "loading": loading,
+        "interface": interface or Interface(),
+    }
+    states, spread = _pressed(film, sphere, load_scale * loads, law, disturbances.load_scatter)
 
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)
@@ -90,48 +78,33 @@ def simulate_contacts(
     ratio = 1 + disturbances.load_scatter * load_errors
 
     def blurred(kernel: RadialKernel, order: int) -> FloatArray:
-        rows = []
-        for j, away, over_nominal in zip(row, distance, ratio, strict=True):
-            stresses = blurred_stress(states[j], kernel, away, order=order)
-            rows.append(_at_load(stresses, spread, over_nominal))
-        return np.stack(rows)
+        rows = zip(row, distance, ratio, strict=True)
+        return np.stack(
+            [
+                _at_load(blurred_stress(states[j], kernel, away, order=order), spread, over_nominal)
+                for j, away, over_nominal in rows
+            ]
+        )
 
-    nominal = [contacts[len(contacts) // 2] for contacts in states]
-    nominal_stress = blurred_stress(nominal, sensor.kernel, np.hypot(x - centre_x, centre_y))
-    stated = np.broadcast_to(loads[row, None], noise.shape)
-    load_errors_stated = disturbances.load_scatter
-    if disturbances.record_loads:
-        load_errors_stated = disturbances.load_reading
-        stated = stated * ratio * (1 + disturbances.load_reading * reading_errors)
+    middle = [contacts[len(contacts) // 2] for contacts in states]
+    undisturbed = blurred_stress(middle, sensor.kernel, np.hypot(x - centre_x, centre_y))
     shape = x.shape if row.size == 1 else noise.shape
-    stated = stated.reshape(shape)
+    nominal = np.broadcast_to(loads[row, None], noise.shape)
+    stated, uncertainty = _stated_loads(nominal, ratio, reading_errors, disturbances)
     position_error = disturbances.position_error
-    truth = {
-        **described_film(film),
-        "indenter_radius": sphere.radius,
-        "friction": float(friction),
-        "loading": loading,
-        **_described_interface(interface),
-        "load_scale": float(load_scale),
-        **{f"load_{j}": float(value) for j, value in enumerate(true_loads, 1)},
-        "load_scatter": disturbances.load_scatter,
-        "position_error": position_error,
-        "centre": centre_x,
-        "centre_y": centre_y,
-    }
     return simulated_scan(
         sensor,
         sensor.stresses(blurred, offset, distance),
-        float(nominal_stress.max()),
+        float(undisturbed.max()),
         noise.reshape(shape),
         disturbances,
         seed,
         x=x,
         loads=loads,
-        truth=truth,
+        truth=_truth(film, sphere, law, load_scale, loads, disturbances),
         x_errors=np.full(points, position_error) if position_error > 0 else None,
-        normal_load=stated,
-        normal_load_errors=load_errors_stated * stated if load_errors_stated > 0 else None,
+        normal_load=stated.reshape(shape),
+        normal_load_errors=(uncertainty * stated).reshape(shape) if uncertainty > 0 else None,
         indenter=sphere,
         film=film,
         lubrication=lubrication,
@@ -140,14 +113,29 @@ def simulate_contacts(
     )
 
 
+def _require_row(loads: FloatArray, points: int, spacing: float, repeats: int, seed: int) -> None:
+    """Refuse a row of contacts that is none."""
+    if np.unique(loads).size != loads.size:
+        problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
+        raise InputError(problem, cure="Give each load once, and the number of its repeats.")
+    require_range("spacing", spacing, 1e-9, 0.1, "m")
+    if points < 2 or repeats < 1 or seed < 0:
+        raise InputError(
+            f"There are {points} contacts in a row and {repeats} rows at each load, from the seed "
+            f"{seed}.",
+            cure="Give two contacts and one row at least, and a seed that is not negative.",
+        )
+
+
 def _pressed(
-    solve: Callable[[FloatArray], list[Contact]], loads: FloatArray, scatter: float
+    film: ElasticFilm, sphere: Sphere, loads: FloatArray, law: dict[str, Any], scatter: float
 ) -> tuple[list[list[Contact]], float]:
     """Return one contact at each load (N), or three where loads scatter, and their step in ln P."""
     spread = max(_SPREAD * scatter, _LEAST_SPREAD) if scatter > 0 else 0.0
     around = np.exp(spread * np.arange(-1, 2)) if scatter > 0 else np.ones(1)
     path, place = np.unique(np.multiply.outer(loads, around), return_inverse=True)
-    solved = solve(path)
+    # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
+    solved = indent(film.expected, sphere, load=path, strain="linear", **law)
     rows = np.reshape(place, (loads.size, around.size))
     return [[solved[i] for i in row] for row in rows], spread
 
@@ -169,13 +157,46 @@ def described_film(film: ElasticFilm) -> dict[str, float]:
     return {name: float(getattr(film.expected, name)) for name in names}
 
 
+def _stated_loads(
+    nominal: FloatArray, ratio: FloatArray, errors: FloatArray, disturbances: Disturbances
+) -> tuple[FloatArray, float]:
+    """Return the load that is stated for each contact (N), and its relative uncertainty."""
+    if not disturbances.record_loads:
+        return nominal, disturbances.load_scatter
+    return nominal * ratio * (1 + disturbances.load_reading * errors), disturbances.load_reading
+
+
+def _truth(
+    film: ElasticFilm,
+    sphere: Sphere,
+    law: dict[str, Any],
+    load_scale: float,
+    loads: FloatArray,
+    disturbances: Disturbances,
+) -> dict[str, float | str]:
+    """Return what was pressed on what, where and how, by the names of a truth."""
+    return {
+        **described_film(film),
+        "indenter_radius": sphere.radius,
+        "friction": float(law["friction"]),
+        "loading": law["loading"],
+        **_described_interface(law["interface"]),
+        "load_scale": float(load_scale),
+        **{f"load_{j}": float(load_scale * load) for j, load in enumerate(loads, 1)},
+        "load_scatter": disturbances.load_scatter,
+        "position_error": disturbances.position_error,
+        "centre": disturbances.centre[0],
+        "centre_y": disturbances.centre[1],
+    }
+
+
 def _described_interface(interface: Interface) -> dict[str, float | str]:
-    """Return the compliance of the interface, by the names of a truth; nothing if it is rigid."""
-    law: dict[str, float | str] = {}
+    """Return what yields of the interface, by the names of a truth; nothing if it is rigid."""
+    if interface.rigid:
+        return {}
+    described: dict[str, float | str] = {}
     if interface.slip_length > 0:
-        law["slip_length"] = interface.slip_length
-    if interface.normal_law is not None and interface.normal is not None:
-        law |= {name: float(value) for name, value in asdict(interface.normal).items()}
-    if law:
-        law["interface"] = interface.description
-    return law
+        described["slip_length"] = interface.slip_length
+    if interface.normal_law is not None:
+        described |= asdict(interface.normal_law)
+    return described | {"interface": interface.description}

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -51,24 +52,26 @@ def drawn(
         return value + (uncertainty or 0.0) * float(rng.standard_normal())
 
     film = stated.film
-    rod = stated.rod
-    sphere = stated.sphere
     modulus = around(film.young_modulus, film.young_modulus_uncertainty)
     # A Poisson's ratio above 0.5 is reflected at 0.5.
     ratio = 0.5 - abs(0.5 - around(film.poisson_ratio, film.poisson_ratio_uncertainty))
     thickness = around(film.thickness, film.thickness_uncertainty)
+    true_film = replace(
+        film,
+        young_modulus=modulus,
+        poisson_ratio=ratio,
+        thickness=thickness,
+        poisson_ratio_uncertainty=None,
+    )
+    rod_radius = around(stated.rod.radius, stated.rod.radius_uncertainty)
+    sphere_radius = around(stated.sphere.radius, stated.sphere.radius_uncertainty)
+    rod_load_scale = around(1.0, load_uncertainty)
     return Reality(
-        film=replace(
-            film,
-            young_modulus=modulus,
-            poisson_ratio=ratio,
-            thickness=thickness,
-            poisson_ratio_uncertainty=None,
-        ),
-        rod=replace(rod, radius=around(rod.radius, rod.radius_uncertainty)),
-        sphere=replace(sphere, radius=around(sphere.radius, sphere.radius_uncertainty)),
-        rod_load_scale=(of_rod := around(1.0, load_uncertainty)),
-        load_scale=of_rod if one_load_cell else around(1.0, load_uncertainty),
+        film=true_film,
+        rod=replace(stated.rod, radius=rod_radius),
+        sphere=replace(stated.sphere, radius=sphere_radius),
+        rod_load_scale=rod_load_scale,
+        load_scale=rod_load_scale if one_load_cell else around(1.0, load_uncertainty),
     )
 
 
@@ -182,14 +185,9 @@ def simulate_experiment(
     inputs_seed, rod_seed, dry_seed, lubricated_seed = (
         int(stream.generate_state(1)[0]) for stream in np.random.SeedSequence(seed).spawn(4)
     )
-    true = Reality(film=film, rod=rod, sphere=sphere)
-    if disturbances.draw_inputs:
-        load_uncertainty = disturbances.load_uncertainty or 0.0
-        true = drawn(true, load_uncertainty, inputs_seed, one_load_cell=disturbances.one_load_cell)
-    thickness = disturbances.thickness_factor * true.film.thickness
-    true_film = replace(true.film, thickness=thickness)
+    true = _true(Reality(film=film, rod=rod, sphere=sphere), disturbances, inputs_seed)
     calibration = simulate(
-        film=true_film,
+        film=true.film,
         rod=true.rod,
         rod_friction=rod_friction,
         kernel=kernel,
@@ -202,52 +200,62 @@ def simulate_experiment(
         seed=rod_seed,
     )
     gain = disturbances.gain
-    contacts: dict[str, Any] = {
-        "film": true_film,
-        "sphere": true.sphere,
-        "kernel": kernel,
-        "conversion_constant": gain * conversion_constant,
-        "shear": None if shear is None else (shear[0], gain * shear[1]),
-        "loading": loading,
-        "points": points,
-        "spacing": spacing,
-        "repeats": repeats,
-        "disturbances": disturbances,
-        "load_scale": true.load_scale,
-    }
-    dry = simulate_contacts(
-        load=loads, friction=friction, interface=interface, seed=dry_seed, **contacts
+    contacts = partial(
+        simulate_contacts,
+        film=true.film,
+        sphere=true.sphere,
+        kernel=kernel,
+        conversion_constant=gain * conversion_constant,
+        shear=None if shear is None else (shear[0], gain * shear[1]),
+        loading=loading,
+        points=points,
+        spacing=spacing,
+        repeats=repeats,
+        disturbances=disturbances,
+        load_scale=true.load_scale,
     )
-    lubricated = simulate_contacts(
+    dry = contacts(load=loads, friction=friction, interface=interface, seed=dry_seed)
+    lubricated = contacts(
         load=lubricated_loads,
         interface=Interface(normal=None if interface is None else interface.normal),
         lubrication="lubricated",
         lubricant="glycerol",
         seed=lubricated_seed,
-        **contacts,
     )
-    common = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
+    truth = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
     if shear is not None:
-        common["conversion_constant_xz"] = shear[1]
-    rod_truth = {
-        **described_film(true_film),
-        "indenter_radius": true.rod.radius,
-        "load_scale": true.rod_load_scale,
-        "load_1": calibration.stated_load,
-        **common,
-        "gain": 1.0,
-    }
-    uncertainty = calibration.load_uncertainty
-    if uncertainty is not None:
-        uncertainty *= rod_load / calibration.stated_load
-    nominal = replace(calibration, load=rod_load, load_uncertainty=uncertainty)
+        truth["conversion_constant_xz"] = shear[1]
+    rod_truth = {**_rod_truth(true, rod_load), **truth, "gain": 1.0}
+    nominal = replace(calibration, load=rod_load)
+    if disturbances.load_uncertainty is not None:
+        nominal = replace(nominal, load_uncertainty=disturbances.load_uncertainty * rod_load)
     cell = LoadCell(name="a simulated load cell" if disturbances.one_load_cell else "")
     stated = {"film": film if disturbances.state_law else without_law(film), "load_cell": cell}
     return Experiment(
         rod=_as_stated(nominal, rod_truth, indenter=rod, **stated),
-        dry=_as_stated(dry, common, indenter=sphere, **stated),
-        lubricated=_as_stated(lubricated, common, indenter=sphere, **stated),
+        dry=_as_stated(dry, truth, indenter=sphere, **stated),
+        lubricated=_as_stated(lubricated, truth, indenter=sphere, **stated),
     )
+
+
+def _rod_truth(true: Reality, rod_load: float) -> dict[str, float]:
+    """Return what was pressed in the rod scan, by the names of a truth."""
+    return {
+        **described_film(true.film),
+        "indenter_radius": true.rod.radius,
+        "load_scale": true.rod_load_scale,
+        "load_1": true.rod_load_scale * rod_load,
+    }
+
+
+def _true(stated: Reality, disturbances: Disturbances, seed: int) -> Reality:
+    """Return the true film, indenters and loads: drawn if asked for, the film as thick as it is."""
+    true = stated
+    if disturbances.draw_inputs:
+        uncertainty = disturbances.load_uncertainty or 0.0
+        true = drawn(stated, uncertainty, seed, one_load_cell=disturbances.one_load_cell)
+    thickness = disturbances.thickness_factor * true.film.thickness
+    return replace(true, film=replace(true.film, thickness=thickness))
 
 
 def _as_stated(scan: Scan, truth: Mapping[str, float], **stated: Any) -> Scan:
