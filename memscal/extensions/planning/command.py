@@ -1,6 +1,7 @@
 """``memscal design``: the uncertainties to expect of a scan that is not made yet."""
 
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import click
@@ -12,7 +13,6 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import PAPER_FILM, Quantity, figure_option, option, output_options, si
 from memscal.formats.files import together
 
-_VARIED = ("step", "half-range", "repeats")
 #: Options in other units than SI, by the power of ten.
 _IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
 _SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
@@ -71,12 +71,19 @@ def _target(value: str) -> tuple[str, float]:
     "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
     "uncertainty, or resolved=4 at least, in rad/mm. Repeated: all are to be reached."
 )
-@option("--vary", click.Choice(_VARIED))(
+@option("--vary", click.Choice(("step", "half-range", "repeats")))(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
 @figure_option("Draw the expected result.")
 @output_options
-def command(as_json: bool, force: bool, **options: Any) -> int:
+def command(
+    targets: tuple[tuple[str, float], ...],
+    figures: tuple[Path, ...],
+    vary: str | None,
+    as_json: bool,
+    force: bool,
+    **options: Any,
+) -> int:
     """Predict the uncertainties of a calibration before its scan is made.
 
     They follow, without simulation, from the Fisher information of the planned scan, the prior of
@@ -84,16 +91,13 @@ def command(as_json: bool, force: bool, **options: Any) -> int:
     and --vary, the smallest scan that reaches the targets is found.
     """
     common.require_one_kernel(options)
-    targets = options["targets"]
-    figures = options["figures"]
-    vary = options["vary"]
     source = click.get_current_context().get_parameter_source("noise")
     if options["noise_voltage"] is not None and source == ParameterSource.COMMANDLINE:
         raise click.UsageError("--noise and --noise-voltage both state the noise: give one.")
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     out.prove_writable(figures, force=force)
-    vary = None if vary is None else vary.replace("-", "_")
+    vary = vary and vary.replace("-", "_")
 
     from memscal.extensions.planning.design import design
 

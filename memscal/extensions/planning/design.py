@@ -48,8 +48,6 @@ MOST_POSITIONS = 4096
 _ROUNDING = 1e-6
 #: An apparatus function that takes less than this from every wave that a film passes is a point.
 _A_POINT = 1e-3
-#: What a plan and a simulated scan have in common.
-_OF_SIMULATION = ("film", "rod", "kernel", "conversion_constant", "load")
 #: The film passes nothing beyond exp(-kh) of this.
 _LARGEST_KH = 20.0
 
@@ -140,12 +138,16 @@ class Plan:
     def scan(self) -> Scan:
         """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
-        shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
         half_range = self.step * (count - 1) / 2
-        x = np.linspace(-1.0, 1.0, count) * half_range
-        flat = np.zeros(count)
-        load = self.load
-        require_plausible(Scan(x=x, u_zz=flat, film=self.film, indenter=self.rod, load=load))
+        require_plausible(
+            Scan(
+                x=np.linspace(-1.0, 1.0, count) * half_range,
+                u_zz=np.zeros(count),
+                film=self.film,
+                indenter=self.rod,
+                load=self.load,
+            )
+        )
         undisturbed = Disturbances(
             noise=0.0,
             baseline=0.0,
@@ -153,7 +155,16 @@ class Plan:
             centre=(self.centre, 0.0),
             load_uncertainty=self.load_uncertainty,
         )
-        scan = simulate(points=count, half_range=half_range, disturbances=undisturbed, **shared)
+        scan = simulate(
+            film=self.film,
+            rod=self.rod,
+            kernel=self.kernel,
+            conversion_constant=self.conversion_constant,
+            load=self.load,
+            half_range=half_range,
+            points=count,
+            disturbances=undisturbed,
+        )
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 
@@ -324,7 +335,7 @@ def least_design(
     plan: Plan, targets: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
 ) -> Design:
     """Find the coarsest step, the shortest range or the fewest repeats that reach the targets."""
-    what, fewest, most, planned = _search(plan, vary)
+    what, fewest, most, plan_of = _search(plan, vary)
     tried: dict[int, Design | None] = {}
     # As many as it can take to pass the number that is searched, and to close in on it.
     tell = counter("plans", math.ceil(math.log(most / fewest, _GROWTH) + math.log2(most)))
@@ -333,7 +344,7 @@ def least_design(
         if count not in tried:
             # None where the plan determines nothing, or does not sample G.
             tried[count] = None
-            attempt = planned(count)
+            attempt = plan_of(count)
             with suppress(FitError), hushed():
                 design = evaluate(attempt)
                 samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
@@ -351,9 +362,12 @@ def least_design(
         works = min(max(works + 1, round(_GROWTH * works)), most)
     while works - fails > 1:
         middle = (works + fails) // 2
-        fails, works = (fails, middle) if meets(middle) else (middle, works)
+        if meets(middle):
+            works = middle
+        else:
+            fails = middle
     least = tried[works]
-    assert least is not None
+    assert least is not None  # it meets the targets
     return least
 
 
@@ -375,8 +389,9 @@ def _search(plan: Plan, vary: str) -> tuple[str, int, int, Callable[[int], Plan]
 
 
 def _reached(design: Design, name: str) -> float:
-    of_band = name == "resolved_wavenumber"
-    return design.resolved_wavenumber if of_band else design.relative_uncertainty(name)
+    if name == "resolved_wavenumber":
+        return design.resolved_wavenumber
+    return design.relative_uncertainty(name)
 
 
 def _met(design: Design, name: str, value: float) -> bool:
@@ -396,19 +411,25 @@ def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) 
         cure = "Plan more repeats, less noise, a larger load or a larger half range."
         return FitError(f"No {what} makes a scan that can be calibrated with.", cure=cure)
     name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
-    sign = -1 if name == "resolved_wavenumber" else 1
-    best = min(tried, key=lambda design: sign * _reached(design, name))
-    goal, reached = (_in_words(name, value) for value in (targets[name], _reached(best, name)))
-    length = best.plan.step if what == "step" else best.plan.half_range
-    of_length = f"a {what} of {length * 1e3:.4g} mm"
-    count = f"{best.plan.repeats} repeats" if what == "repeats" else of_length
-    out_of_reach = f"is out of reach by the {what} alone: the best is {reached}"
-    problem = f"{goal[0].upper()}{goal[1:]} {out_of_reach}, with {count}."
+    by_reached = partial(_reached, name=name)
+    best = (
+        max(tried, key=by_reached) if name == "resolved_wavenumber" else min(tried, key=by_reached)
+    )
+    goal = _in_words(name, targets[name])
+    reached = _in_words(name, _reached(best, name))
+    count = f"{best.plan.repeats} repeats"
+    if what != "repeats":
+        length = best.plan.step if what == "step" else best.plan.half_range
+        count = f"a {what} of {length * 1e3:.4g} mm"
+    problem = (
+        f"{goal[0].upper()}{goal[1:]} is out of reach by the {what} alone: the best is {reached}, "
+        f"with {count}."
+    )
     if name == "resolved_wavenumber":
-        sampled = np.pi / best.plan.step
-        step = best.plan.step * 1e3
+        step = best.plan.step
+        sampled = np.pi / step
         if best.resolved_wavenumber >= 0.99 * sampled:
-            why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
+            why = f"A step of {step * 1e3:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
             return FitError(problem, why=why, cure="Plan a finer step.")
         return FitError(
             problem,
