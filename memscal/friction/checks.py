@@ -25,12 +25,12 @@ def comparison_checks(
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     # A noise that was estimated from the scatter about a contact is as large as the misfit.
     checks: list[QualityCheck] = []
-    for i, of_load in enumerate(zip(*loads.values(), strict=True), start=1):
-        profile = of_load[0].profile
-        outside = 1 - max(load.bracketed for load in of_load)
+    for i, by_loading in enumerate(zip(*loads.values(), strict=True), start=1):
+        profile = by_loading[0].profile
+        outside = 1 - max(load.bracketed for load in by_loading)
         size = np.format_float_positional(profile.load, precision=3, trim="-")
-        place = f"the {profile.lubrication} load" if profile.lubrication else "the load"
-        place = f"{place} of {size} N"
+        kind = f"{profile.lubrication} load".strip()
+        place = f"the {kind} of {size} N"
         explained = (
             f"Reduced chi-square of {place} against the friction coefficient that explains it "
             "best. A failure means that no calculated contact does: noise or scatter larger than "
@@ -41,18 +41,20 @@ def comparison_checks(
             "give, by more than 1.96 standard uncertainties. A failure means that friction alone "
             "does not explain the stress."
         )
-        readings = (load.by_profile for load in of_load)
+        readings = (load.by_profile for load in by_loading)
         if noise_stated:
             checks.append(_reduced(f"profile_chi_square_{i}", readings, explained))
         checks.append(check(f"bracketing_{i}", outside, _OUTSIDE, bracketed))
-    for lubrication, by_loading in joint.items() if noise_stated else ():
-        tail, kind = (f"_{lubrication}", f"{lubrication} ") if lubrication else ("", "")
-        together = (
-            f"Reduced chi-square of all {kind}loads against one friction coefficient. A failure "
-            "while the single loads pass means that friction changes with the load: look at the "
-            "coefficient of each load, or at laws of the interface."
-        )
-        checks.append(_reduced(f"joint_chi_square{tail}", by_loading.values(), together))
+    if noise_stated:
+        for lubrication, estimates in joint.items():
+            name = f"joint_chi_square_{lubrication}".removesuffix("_")
+            kind = f"{lubrication} loads".strip()
+            together = (
+                f"Reduced chi-square of all {kind} against one friction coefficient. A failure "
+                "while the single loads pass means that friction changes with the load: look at "
+                "the coefficient of each load, or at laws of the interface."
+            )
+            checks.append(_reduced(name, estimates.values(), together))
     if "lubricated" in joint:
         checks.append(frictionless_check(joint["lubricated"]))
     return tuple(checks)
@@ -119,22 +121,22 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
             continue
         first = by_loading["incremental"]
         second = by_loading["total"]
-        of = f"the {lubrication} loads" if lubrication else "the loads"
+        loads = f"{lubrication} loads".strip()
+        difference = ""
         if first.value is None or second.value is None:
             # A bound and a value agree where the intervals have values in common.
-            one = first.interval
-            other = second.interval
-            disagree = one.upper < other.low or other.upper < one.low
-            by = ""
+            above = first.interval.low > second.interval.upper
+            below = first.interval.upper < second.interval.low
+            disagree = above or below
         else:
             apart = abs(first.value - second.value)
-            errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
-            disagree = bool(errors) and apart > max(errors)
-            by = f" by {apart:.2g}, more than one standard uncertainty"
+            largest = max(first.standard_uncertainty or 0.0, second.standard_uncertainty or 0.0)
+            disagree = 0 < largest < apart
+            difference = f" by {apart:.2g}, more than one standard uncertainty"
         if disagree:
             yield Message(
                 "loading",
-                f"The definitions of the loading disagree for {of}{by}: {first} by "
+                f"The definitions of the loading disagree for the {loads}{difference}: {first} by "
                 f"incremental loading, {second} by total loading.",
             )
 

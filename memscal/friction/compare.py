@@ -162,8 +162,8 @@ def compare(
     loading : str or sequence of str
         ``"incremental"``, ``"total"``, or both: see :func:`memscal.indent`.
     references : sequence of StressProfile, optional
-        Profiles that were calculated elsewhere, in place of ours: each with its load and friction
-        coefficient.  ``friction`` and ``loading`` are theirs then.
+        Profiles that were calculated elsewhere, in place of memscal's: each with its load and
+        friction coefficient, which take the place of ``friction`` and ``loading``.
     lubricated : str, optional
         ``"frictionless"``: lubricated loads have no friction, and are fitted together with the dry
         ones, which cancels most of what A, G and film leave uncertain; ``"apart"``: each kind by
@@ -321,8 +321,8 @@ def _readings(
         return
     for profile in item.profiles:
         points = [profile.points[channel] for channel in channels if channel in profile.points]
-        count = sum(of_channel.u.size for of_channel in points)
-        correlated = any(of_channel.correlation is not None for of_channel in points)
+        count = sum(readings.u.size for readings in points)
+        correlated = any(readings.correlation is not None for readings in points)
         yield profile.label, count, len(points) > 1 or correlated
 
 
@@ -438,7 +438,7 @@ def channels_of(
 ) -> dict[str, Channel]:
     """Return what one channel measured with the contacts of each family, by its loading."""
     points = [load_points(profile, apparatus.sensor.channel) for profile in measured.profiles]
-    reach = float(max(of_load.radius.max() for of_load in points))
+    reach = max(float(readings.radius.max()) for readings in points)
     channels = {}
     for loading, family in families.items():
         sensor = sensor_of(apparatus, family, reach, measured.scans, common)
@@ -453,13 +453,13 @@ def _loads(
     """Compare each load by each loading; what the other would have given counts as uncertainty."""
     loads: dict[str, list[LoadComparison]] = {loading: [] for loading in fits}
     for i, profile in enumerate(measured.profiles):
-        compared = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
-        maxima = with_loading({loading: load.by_maximum for loading, load in compared.items()})
-        profiles = with_loading({loading: load.by_profile for loading, load in compared.items()})
-        for loading, load in compared.items():
+        by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
+        maxima = with_loading({loading: load.by_maximum for loading, load in by_loading.items()})
+        profiles = with_loading({loading: load.by_profile for loading, load in by_loading.items()})
+        for loading, load in by_loading.items():
             counted = replace(load, by_maximum=maxima[loading], by_profile=profiles[loading])
             loads[loading].append(counted)
-    return {loading: tuple(of_loading) for loading, of_loading in loads.items()}
+    return {loading: tuple(compared) for loading, compared in loads.items()}
 
 
 def fit_together(

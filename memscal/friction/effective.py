@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from memscal.friction.family import ProfileFamily, bounded, unbounded
+from memscal.friction.family import bounded, unbounded
 from memscal.friction.interval import friction_reason, profile_estimate
 from memscal.friction.likelihood import Channel, Likelihood, likelihood, points_at, predict
 from memscal.friction.results import BoundedEstimate, LoadComparison
@@ -87,21 +87,17 @@ class FrictionFit:
 
 def fit_friction(channel: Channel, shear: Channel | None = None) -> FrictionFit:
     """Hold the measured loads of a channel, or of two, against calculated contacts."""
-    values = fine_values(channel.family)
-    fine = channel.at(values)
-    fine_shear = None if shear is None else shear.at(values)
-    return FrictionFit(channel, shear, fine, likelihood(fine, fine_shear))
-
-
-def fine_values(family: ProfileFamily) -> FloatArray:
-    """Return values along a family, even in its bounded coordinate, its own among them."""
+    family = channel.family
     nodes = family.coordinates
     even = np.linspace(nodes[0], nodes[-1], _FINE)
     step = even[1] - even[0]
     distances = np.abs(np.subtract.outer(even, nodes)).min(axis=1)
     between = unbounded(even[distances > 0.2 * step], family.scale)
     # The family's own values are kept as they are, not as their coordinates give them back.
-    return np.sort([*family.values, *between])
+    values = np.sort([*family.values, *between])
+    fine = channel.at(values)
+    fine_shear = None if shear is None else shear.at(values)
+    return FrictionFit(channel, shear, fine, likelihood(fine, fine_shear))
 
 
 def random_uncertainty(budget: Mapping[str, float]) -> float:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -380,7 +381,12 @@ class FamilySetup:
         if film.poisson_ratio_uncertainty:
             step = max(film.poisson_ratio_uncertainty, _SMALLEST_STEP)
             ratios = [min(nu + step, 0.5), max(nu - step, 0.0)]  # one-sided if incompressible
-        nominal, *sides = self._solved(paths, ratios)
+        groups = [list(paths)]
+        for ratio in ratios:
+            changed = replace(film, poisson_ratio=ratio)
+            whole = ratio == nu
+            groups.append([replace(path, film=changed, derivatives=whole) for path in paths])
+        nominal, *sides = self._solved(groups)
         spectra = nominal["spectra"]
         by_length = np.zeros_like(spectra)
         if lengths is not None:
@@ -401,16 +407,9 @@ class FamilySetup:
             nominal["spectra"] = spectra + slope * (expected.poisson_ratio - nu)
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 
-    def _solved(
-        self, paths: Sequence[LoadingPath], ratios: Sequence[float]
-    ) -> list[dict[str, FloatArray]]:
-        """Solve the paths, and those of other Poisson's ratios, each path once."""
-        groups = [list(paths)]
-        for nu in ratios:
-            film = replace(self.film, poisson_ratio=nu)
-            nominal = nu == self.film.poisson_ratio
-            groups.append([replace(path, film=film, derivatives=nominal) for path in paths])
-        distinct = list(dict.fromkeys(path for group in groups for path in group))
+    def _solved(self, groups: Sequence[Sequence[LoadingPath]]) -> list[dict[str, FloatArray]]:
+        """Solve groups of paths, each path once; stack the arrays of each group."""
+        distinct = list(dict.fromkeys(chain.from_iterable(groups)))
         arrays = solve_paths(distinct, self.wavenumbers.k, workers=self.workers)
         solved = dict(zip(distinct, arrays, strict=True))
         stacks = []

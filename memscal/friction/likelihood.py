@@ -373,16 +373,6 @@ class Standardised:
         information = transposed @ self.columns
         return Statistics(chi_square, projection, information, self.log_determinant)
 
-    def held(self) -> Standardised:
-        """Return the load with its parameter held at the first value."""
-        return replace(
-            self,
-            residual=self.residual[:1],
-            slope=np.zeros_like(self.slope[:1]),
-            columns=self.columns[:1],
-            log_determinant=self.log_determinant[:1],
-        )
-
 
 def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     """Divide by the noise, and project out what is flat."""
@@ -439,8 +429,17 @@ class Likelihood:
 
     def with_held(self, held: Likelihood) -> Likelihood:
         """Add loads whose parameter is held at their first value; all share systematic errors."""
-        loads = [load.held() for load in held.loads]
-        return replace(self, loads=(*self.loads, *loads))
+        loads = list(self.loads)
+        for load in held.loads:
+            first = replace(
+                load,
+                residual=load.residual[:1],
+                slope=np.zeros_like(load.slope[:1]),
+                columns=load.columns[:1],
+                log_determinant=load.log_determinant[:1],
+            )
+            loads.append(first)
+        return replace(self, loads=tuple(loads))
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -487,7 +486,7 @@ class Likelihood:
             gain = (load.slope[0] - load.columns[0] @ response) / information
             for name, share in load.noise.shares(gain).items():
                 kinds.setdefault(name, []).append(share)
-        shares = {name: math.hypot(*of_loads) for name, of_loads in kinds.items()}
+        shares = {name: math.hypot(*each) for name, each in kinds.items()}
         widths = self.loads[0].widths
         parts = np.split(response / information, np.cumsum([*widths.values()])[:-1])
         for source, part in zip(widths, parts, strict=True):

@@ -111,7 +111,7 @@ def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, fl
 
 
 #: Sources of uncertainty that scans of one sensor on one film do not share.
-_OF_ONE_SCAN = {"noise", "load_scatter", "position"}
+_SCAN_SOURCES = {"noise", "load_scatter", "position"}
 
 
 def correlated(comparison: FrictionComparison) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def correlated(comparison: FrictionComparison) -> dict[str, Any]:
             uncertainties.append(estimate.standard_uncertainty)
             budget = {}
             for source, u in estimate.budget.items():
-                budget[source, lubrication if source in _OF_ONE_SCAN else ""] = u
+                budget[source, lubrication if source in _SCAN_SOURCES else ""] = u
             budgets.append(budget)
     if not names:
         problem = "No friction coefficient of all loads has a standard uncertainty."

@@ -16,7 +16,7 @@ from helpers.paper import FILM, SPHERE
 
 import memscal
 from memscal.friction.calculated import amontons_family
-from memscal.friction.effective import fine_values
+from memscal.friction.effective import fit_friction
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import likelihood
 from memscal.mechanics.solver import refinement
@@ -87,9 +87,9 @@ def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path: Path
 def test_a_whole_profile_likelihood_costs_less_than_its_values_separately() -> None:
     laboratory = Laboratory.of()
     points = laboratory.measured(0.2, seed=1)
-    values = fine_values(laboratory.family)
     channel = laboratory.channel(points)
-    members = channel.at(values)
+    members = fit_friction(channel).fine
+    values = members.family.values
     single = [channel.at(value) for value in values]
 
     def together() -> None:

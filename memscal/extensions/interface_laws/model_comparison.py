@@ -158,7 +158,7 @@ def compare_interface(
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)
-    wet = [profile for profile in profiles if profile.lubrication == "lubricated"]
+    lubricated = [profile for profile in profiles if profile.lubrication == "lubricated"]
     dry = [profile for profile in profiles if profile.lubrication != "lubricated"]
     scan = profiles[0].scan
     contacts: dict[str, Any] = {
@@ -180,9 +180,9 @@ def compare_interface(
             macroscopic=macroscopic,
             lubrication=dry[0].lubrication,
         )
-    if wet:
-        family = family_at_loads(wet, None, partial(normal_compliance_family, **contacts))
-        normal = weigh_normal_compliance(_channel(wet, apparatus, family))
+    if lubricated:
+        family = family_at_loads(lubricated, None, partial(normal_compliance_family, **contacts))
+        normal = weigh_normal_compliance(_channel(lubricated, apparatus, family))
     messages = tuple(_messages(tangential, normal, macroscopic_uncertainty, dry))
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
 
@@ -194,9 +194,10 @@ def _channel(
     reach = max(float(profile.r[-1]) for profile in profiles)
     points = []
     for profile, load in zip(profiles, family.loads, strict=True):
-        of_load = load_points(profile)
+        stated = load_points(profile)
         # Loads count from that of the calculated contact.
-        points.append(replace(of_load, log_load=of_load.log_load + math.log(profile.load / load)))
+        log_load = stated.log_load + math.log(profile.load / load)
+        points.append(replace(stated, log_load=log_load))
     scans = [profile.scan for profile in profiles]
     return Channel(points, sensor_of(apparatus, family, reach, scans), family)
 
@@ -412,7 +413,7 @@ def _length_reason(what: str, interval: Interval, last: float) -> str:
     """Say why there is no length, ``last`` being the last one that was calculated."""
     low = interval.low
     high = interval.high
-    if low > 0 and high is not None:
+    if interval.two_sided:
         return ""
     largest = f"the largest that was calculated, {last / _UM:.3g} um,"
     end = "one that bears no shear" if math.isinf(last) else largest
