@@ -103,6 +103,14 @@ def test_a_wrong_cell_far_down_is_named_by_its_row(tmp_path: Path):
         import_table(table, x="x", u="u")
 
 
+def test_a_column_that_no_row_has_is_missing_throughout(tmp_path: Path):
+    path = tmp_path / "t.txt"
+    path.write_text("x u n m\n" + "1 2 3\n" * 20_000)
+    found = TextTable(path).columns({"u": Wanted("u"), "m": Wanted("m")})
+    assert (found["u"].sum(), found["m"].size) == (40_000, 20_000)
+    assert np.isnan(found["m"]).all()
+
+
 IMPORT = """
 import resource, sys
 from memscal.formats.scan import write_scan

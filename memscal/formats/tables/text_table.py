@@ -464,7 +464,7 @@ class TextTable(NamedColumns):
         yield places, self._columns_of(rows, places, indices, wanted)
         for block in self._blocks:
             numbers = self._bare_numbers(block)
-            if numbers is not None:
+            if numbers is not None and max(indices) < self._columns:
                 yield range(self._line, self._line + len(numbers)), [*numbers.T[indices]]
                 self._line += len(numbers)
                 continue
@@ -477,7 +477,7 @@ class TextTable(NamedColumns):
 
     def _bare_numbers(self, block: bytes) -> FloatArray | None:
         """Return a block of bare numbers in full rows, in a fifth of the time that cells take."""
-        if block.isspace() or (self._comma_alone and b"." in block):
+        if not block.isascii() or block.isspace() or (self._comma_alone and b"." in block):
             return None
         lines = block.replace(b",", b".") if self._comma_alone else block
         delimiter = None if self._delimiter == " " else self._delimiter
