@@ -136,26 +136,25 @@ def average_over_circles(
     circles = np.maximum(r, 1e-6 * reach)[:, None]
     points = np.stack([circles * np.cos(directions), circles * np.sin(directions)], axis=-1)
     distinct, index = np.unique(np.round(places / reach, 7), axis=0, return_inverse=True)
-    number = np.bincount(index.ravel())
+    sums = [np.bincount(index.ravel(), values) for values in columns.values()]
+    at_places = np.stack(sums, axis=1) / np.bincount(index.ravel())[:, None]
     try:
-        nodes = {name: np.bincount(index.ravel(), v) / number for name, v in columns.items()}
-        fields = {n: LinearNDInterpolator(distinct * reach, v)(points) for n, v in nodes.items()}
+        fields = LinearNDInterpolator(distinct * reach, at_places)(points)
     except QhullError as error:
         cure = "Name the axis across the film (vertical; --vertical)."
         raise InputError("The nodes on the base of the film lie on one line.", cure=cure) from error
     # Circles of which less than half as much is inside as of others are left out: the corners.
-    share = np.isfinite(next(iter(fields.values()))).sum(axis=1)
+    share = np.isfinite(fields[..., 0]).sum(axis=1)
     kept = share >= max(1, share.max() / 2)
-    means = {name: np.nansum(values[kept], axis=1) / share[kept] for name, values in fields.items()}
-    first = next(iter(columns))
-    spread = np.nanmax(np.abs(fields[first][kept] - means[first][:, None]))
-    peak = float(np.abs(means[first]).max())
+    means = np.nansum(fields[kept], axis=1) / share[kept, None]
+    spread = np.nanmax(np.abs(fields[kept, :, 0] - means[:, :1]))
+    peak = float(np.abs(means[:, 0]).max())
     note = (
         f"Means over {kept.sum()} circles about the axis, interpolated linearly between "
         f"{distinct.shape[0]} places in the base; on a circle the normal stress differs from its "
         f"mean by up to {spread / peak if peak else 0:.2g} of the maximum."
     )
-    return {"r": r[kept], **means}, note
+    return {"r": r[kept], **dict(zip(columns, means.T, strict=True))}, note
 
 
 # VTK's order of a symmetric tensor, and that of axisymmetric elements in FEM programs.
