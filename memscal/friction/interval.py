@@ -46,7 +46,8 @@ def profile_estimate(
         low = _crossing(spline, coordinates, float(inside.min()), -1, top)
         high = _crossing(spline, coordinates, float(inside.max()), 1, top)
         lower = 0.0 if low is None else float(unbounded(low, scale))
-        return Interval(lower, None if high is None else float(unbounded(high, scale)), level)
+        upper = None if high is None else float(unbounded(high, scale))
+        return Interval(lower, upper, level)
 
     interval = interval_of(_LEVEL)
     value = None

@@ -141,10 +141,16 @@ class BoundedEstimate:
 def _rounded(value: float, low: float, high: float) -> str:
     """Return a value and its interval, with the digits that follow from its closer end."""
     # Two digits of the distance to it if that begins with 1 or 2, one otherwise; zero is no end.
-    sides = [side for side in (value - low if low > 0 else 0.0, high - value) if side > 0]
-    places = max(0, -math.floor(math.log10(min(sides) / 3))) if sides else 3
-    ends = (f"{end:.{places}f}" if end > 0 else "0" for end in (low, high))
-    return f"{value:.{places}f} [{', '.join(ends)}]"
+    distances = []
+    if 0 < low < value:
+        distances.append(value - low)
+    if high > value:
+        distances.append(high - value)
+    places = 3
+    if distances:
+        places = max(0, -math.floor(math.log10(min(distances) / 3)))
+    lower = f"{low:.{places}f}" if low > 0 else "0"
+    return f"{value:.{places}f} [{lower}, {high:.{places}f}]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,11 +245,11 @@ class DryAgainstLubricated:
 
 def joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
     """Return the coefficients of all loads together, by lubrication and loading."""
-    return "; ".join(
-        f"{lubrication or 'not stated'}, {loading or 'given'}: {estimate}"
-        for lubrication, by_loading in joint.items()
-        for loading, estimate in by_loading.items()
-    )
+    texts = []
+    for lubrication, by_loading in joint.items():
+        for loading, estimate in by_loading.items():
+            texts.append(f"{lubrication or 'not stated'}, {loading or 'given'}: {estimate}")
+    return "; ".join(texts)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -425,11 +425,12 @@ def _short(value: float) -> str:
 def _budget_table(comparison: FrictionComparison) -> Table:
     """Return the contribution of each source to each coefficient."""
     shown = {}
+    sources: dict[str, None] = {}
     for lubrication, loading, joint in _joint(comparison):
         if joint.value is not None and joint.budget:
             name = f"{lubrication or 'lubrication not stated'}, {loading}".removesuffix(", ")
             shown[name] = joint
-    sources = dict.fromkeys(source for joint in shown.values() for source in joint.budget)
+            sources |= dict.fromkeys(joint.budget)
     rows = []
     for source in sources:
         shares = [_share(joint.budget.get(source)) for joint in shown.values()]
