@@ -200,11 +200,14 @@ def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
     varied = []
     for name in ("young_modulus", "poisson_ratio", "thickness", "radius"):
         holder: Any = indenter if name == "radius" else film
-        if ends := more_and_less(holder, name):
-            *records, share = ends
-            pairs = [(film, new) if name == "radius" else (new, indenter) for new in records]
-            more, less = (again(*pair) for pair in pairs)
-            varied.append((more, less, share))
+        ends = more_and_less(holder, name)
+        if not ends:
+            continue
+        more, less, share = ends
+        if name == "radius":
+            varied.append((again(film, more), again(film, less), share))
+        else:
+            varied.append((again(more, indenter), again(less, indenter), share))
     return varied
 
 

@@ -20,7 +20,7 @@ integrated with nodes that crowd there, others by a plain Gauss rule; both to ab
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -172,7 +172,11 @@ def _near_integrals(
     end = ends[element]
     at = x[point]
     cut = np.clip(at, start, end)
-    v, weights = _crowded()
+    # Nodes on (0, 1) that crowd towards 0.
+    nodes, weights = np.polynomial.legendre.leggauss(_NEAR_ORDER)
+    u = (nodes + 1) / 2
+    v = u**_CROWDING
+    weights = weights / 2 * _CROWDING * u ** (_CROWDING - 1)
     totals = [(np.zeros(point.size), np.zeros(point.size)) for _ in range(2)]
     for side in (start, end):
         outside = np.flatnonzero(side != cut)
@@ -185,11 +189,3 @@ def _near_integrals(
             total[0][outside] += np.sum(kernel * measure * (1 - rising), axis=1)
             total[1][outside] += np.sum(kernel * measure * rising, axis=1)
     return totals
-
-
-@lru_cache(maxsize=1)
-def _crowded() -> tuple[FloatArray, FloatArray]:
-    """Return nodes on (0, 1) that crowd towards 0, and their weights."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NEAR_ORDER)
-    u = (nodes + 1) / 2
-    return u**_CROWDING, weights / 2 * _CROWDING * u ** (_CROWDING - 1)

@@ -213,7 +213,8 @@ class Pressing:
             pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
             chosen[touches] = pushed[touches]
         chosen[0] = True
-        if (key := chosen.tobytes()) in seen:  # a node that enters and leaves by turns is kept
+        key = chosen.tobytes()
+        if key in seen:  # a node that enters and leaves by turns is kept
             chosen |= touches
         if np.array_equal(chosen, touches):
             return None

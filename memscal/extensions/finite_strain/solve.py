@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import ConvergenceError, DomainError
 from memscal.extensions.finite_strain import film_elements
-from memscal.extensions.finite_strain.film_elements import Finer
+from memscal.extensions.finite_strain.film_elements import FilmSize, Finer
 from memscal.extensions.finite_strain.pressing import (
     NewtonError,
     Path,
@@ -112,10 +113,11 @@ def solve_finite_strain(
     goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
     tell = counter("the loading", 1.0)
-    rest = 1 - _COARSE_WORK
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
     coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(_COARSE_WORK * x)))
-    return tuple(request.solve(refinement, coarse, lambda x: tell(1 - rest + rest * x)))
+    return tuple(
+        request.solve(refinement, coarse, lambda x: tell(_COARSE_WORK + (1 - _COARSE_WORK) * x))
+    )
 
 
 def follow_depths(
@@ -185,39 +187,44 @@ class _Request:
     def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
         size = (self.film.thickness * _MM, self.radius, refinement)
-        face: RodFace | SphereFace
         if isinstance(self.indenter, Rod):
-            rod = self.indenter.radius * _MM
-            face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
-            if self.sticking:
-                finest = _FINEST_STICKING
-                (inner, outer) = _FOLD_STICKING
-                outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
-            else:
-                finest = _FINEST_SLIDING
-                (inner, outer) = _FOLD_SLIDING
-            mesh = film_elements.mesh_below_a_rod(
-                size,
-                rod=rod,
-                fold=(inner * rod, outer * rod),
-                finest=finest * face.edge,
-                finer=self.finer,
-            )
+            face, mesh = self._below_rod(size)
         else:
-            face = SphereFace(self.indenter.radius * _MM)
-            widest = max(map(self._hertz_radius, self.goals))
-            if coarse:  # now it is known
-                widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
-            if widest > min(self.radius / 2, 0.9 * face.radius):
-                raise DomainError(
-                    f"The contact would be up to {widest:.3g} mm wide, but the film's radius is "
-                    f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
-                    why="It must end well within both.",
-                )
-            mesh = film_elements.mesh_below_a_sphere(size, contact=widest)
+            face, mesh = self._below_sphere(size, coarse)
         elements = film_elements.FilmElements(mesh, film_elements.Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
+
+    def _below_rod(self, size: FilmSize) -> tuple[RodFace | SphereFace, Any]:
+        """Return the rod's face, and a mesh that is finest where its edge folds the surface."""
+        rod = self.indenter.radius * _MM
+        face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
+        finest = _FINEST_SLIDING
+        inner, outer = _FOLD_SLIDING
+        if self.sticking:
+            finest = _FINEST_STICKING
+            inner, outer = _FOLD_STICKING
+            outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
+        fold = (inner * rod, outer * rod)
+        return face, film_elements.mesh_below_a_rod(
+            size, rod=rod, fold=fold, finest=finest * face.edge, finer=self.finer
+        )
+
+    def _below_sphere(
+        self, size: FilmSize, coarse: Sequence[Contact]
+    ) -> tuple[RodFace | SphereFace, Any]:
+        """Return the sphere's face, and a mesh that is fine below the contact."""
+        face = SphereFace(self.indenter.radius * _MM)
+        widest = max(map(self._hertz_radius, self.goals))
+        if coarse:  # now it is known
+            widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
+        if widest > min(self.radius / 2, 0.9 * face.radius):
+            raise DomainError(
+                f"The contact would be up to {widest:.3g} mm wide, but the film's radius is "
+                f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
+                why="It must end well within both.",
+            )
+        return face, film_elements.mesh_below_a_sphere(size, contact=widest)
 
     def _depth(self, goal: Target) -> float:
         """Return a rod's depth at a goal, that on a half-space at a load, in mm."""
@@ -261,8 +268,11 @@ class _Request:
         radius = min(float(np.mean(ends)), self.indenter.extent if rod else math.inf)
         energy = elements.energy(pressed.x) / _MM
         # Without friction the energy is the work; a sphere that sticks has no way.
-        by_load = work(states) / _MM if self.path_dependent else energy
-        done = None if pressing.upright else by_load
+        work_done: float | None = energy
+        if self.path_dependent:
+            work_done = work(states) / _MM
+        elif pressing.upright:
+            work_done = None
         return Contact(
             film=self.film,
             indenter=self.indenter,
@@ -280,8 +290,8 @@ class _Request:
             traction=interface_traction(pressing, pressed),
             inside=field,
             elastic_energy=energy,
-            work=done,
-            dissipated_energy=None if done is None else 0.0,
+            work=work_done,
+            dissipated_energy=None if work_done is None else 0.0,
             strain="finite",
         )
 

@@ -62,7 +62,10 @@ class QuarticLine:
         side = np.clip(np.searchsorted(corners, r, side="right") - 1, 0, corners.size - 2)
         along = (r - corners[side]) / (corners[side + 1] - corners[side])
         columns = _DEGREE * side[:, None] + np.arange(_DEGREE + 1)
-        return _sparse(_quartics(along), columns, self.r.size)
+        # The five Lagrange quartics of a side.
+        nodes = np.arange(_DEGREE + 1) / _DEGREE
+        quartics = np.vander(along, _DEGREE + 1) @ np.linalg.inv(np.vander(nodes))
+        return _sparse(quartics, columns, self.r.size)
 
     @cached_property
     def mass(self) -> csr_array:
@@ -106,12 +109,6 @@ def smooth(
     # Mirrored about the axis, so that what is fitted has the right symmetry.
     table = mirrored(r, -1), mirrored(quartic, parity), mirrored(knots, -1)
     return make_lsq_spline(*table, k=_SMOOTH_DEGREE, w=mirrored(weights, 1))
-
-
-def _quartics(along: FloatArray) -> FloatArray:
-    """Return the five Lagrange quartics of a side, shape (n, 5), at ``along`` from 0 to 1."""
-    nodes = np.arange(_DEGREE + 1) / _DEGREE
-    return np.vander(along, _DEGREE + 1) @ np.linalg.inv(np.vander(nodes))
 
 
 # Exact for what is polynomial: two gradients and r.  It is so also on the axis, where u/r is.
@@ -321,7 +318,8 @@ class ElementFilm:
                 solution = system.solve(unknowns, hats[:, batch].toarray())
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
-                tell(done := done + rings[batch].size)
+                done += rings[batch].size
+                tell(done)
         return SurfaceCompliance(self.r, moved[0, 0], moved[1, 0], moved[0, 1], moved[1, 1])
 
     @property

@@ -25,16 +25,6 @@ _OVERLAP = 1e-3
 _TENSION = 2e-3
 
 
-def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
-    """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
-    # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
-    state = step.take_step(problem, start, Touch(ring), same_contact=True)
-    in_tension = state.pressure.min() < -_PULL * state.pressure.max()
-    if in_tension or _overlaps(problem, state):
-        return step.take_step(problem, start, Touch(ring))
-    return state
-
-
 def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
     gaps = problem.separations(state)[~state.touching]
     return bool(np.any(gaps < -_OVERLAP * abs(state.depth)))
@@ -149,7 +139,13 @@ class _Walk:
     def step_to(self, following: ContactState) -> None:
         before = self.state
         self.work += (before.load + following.load) / 2 * (following.depth - before.depth)
-        self.dissipated += _dissipation(self.problem, before, following)
+        # The work of friction against the slip.
+        slips = before.touching & (following.pressure > 0) & (following.slip != 0)
+        slipped = np.where(slips, following.anchor - before.anchor, 0.0)
+        # A ring that turns around slips under the shear that it has at the end.
+        mean = (before.shear + following.shear) / 2
+        shear = np.where(before.slip == following.slip, mean, following.shear)
+        self.dissipated -= float(shear @ (self.problem.compliance.products @ slipped))
         self.state = following
         self.steps += 1
 
@@ -165,7 +161,13 @@ def _step_by_step(
     problem: ContactProblem, targets: Sequence[Target], increments: int
 ) -> Iterator[PathPoint]:
     """Follow the path from target to target."""
-    walk = _Walk(problem, problem.virgin())
+    # The first touch, at the ring (or rings) of the lowest height.
+    nothing = np.zeros_like(problem.heights)
+    lowest = float(problem.heights.min())
+    touching = problem.heights <= lowest
+    slip = np.zeros_like(touching, dtype=np.int8)
+    first = ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
+    walk = _Walk(problem, first)
     # The last state of the path that a target interrupted, and the way it went.
     resume = walk
     upward = True
@@ -243,17 +245,25 @@ def _next_meeting(
         if np.count_nonzero(touching) < 2:
             return None
     onset = replace(state, touching=touching)
+    states = []
+    for ring in np.flatnonzero(edge):
+        goal = Touch(int(ring))
+        # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
+        state = step.take_step(problem, onset, goal, same_contact=True)
+        in_tension = state.pressure.min() < -_PULL * state.pressure.max()
+        if in_tension or _overlaps(problem, state):
+            state = step.take_step(problem, onset, goal)
+        states.append(state)
     # A contact with a hole has two edges: what meets, or parts, first comes next.
-    states = [_meet_at(problem, onset, int(ring)) for ring in np.flatnonzero(edge)]
     nearest = min if rising else max
     return nearest(states, key=lambda following: _reached(following, target), default=None)
 
 
 def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    beside = np.zeros_like(rings)
-    beside[1:] = rings[:-1]
-    beside[:-1] |= rings[1:]
-    return beside
+    neighbours = np.zeros_like(rings)
+    neighbours[1:] = rings[:-1]
+    neighbours[:-1] |= rings[1:]
+    return neighbours
 
 
 def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:
@@ -261,12 +271,3 @@ def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:
     w, u = problem.displacements(state.pressure, state.shear)
     products = problem.compliance.products
     return 0.5 * float(state.pressure @ (products @ w) + state.shear @ (products @ u))
-
-
-def _dissipation(problem: ContactProblem, before: ContactState, after: ContactState) -> float:
-    """Return the work of friction against the slip between two states, in J."""
-    slips = before.touching & (after.pressure > 0) & (after.slip != 0)
-    slipped = np.where(slips, after.anchor - before.anchor, 0.0)
-    # A ring that turns around slips under the shear that it has at the end.
-    shear = np.where(before.slip == after.slip, (before.shear + after.shear) / 2, after.shear)
-    return -float(shear @ (problem.compliance.products @ slipped))

@@ -244,10 +244,10 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     # The pressure ends like a square root: its square falls in proportion to r^2.
     inner = p[last - 1] ** 2
     outer = p[last] ** 2
-    squares = rings[last - 1] ** 2, rings[last] ** 2
     if inner <= outer:
         return float(rings[last])
-    edge = math.sqrt(squares[1] + outer / (inner - outer) * (squares[1] - squares[0]))
+    area = rings[last] ** 2
+    edge = math.sqrt(area + outer / (inner - outer) * (area - rings[last - 1] ** 2))
     return float(min(edge, rings[last + 1]))
 
 
@@ -267,7 +267,8 @@ def _stick_radius(
 def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
     """Return the change of a contact from one on fewer rings."""
     reach = fine.contact_radius + 3 * fine.film.thickness
-    if (radius := request.film_radius) is not None:
+    radius = request.film_radius
+    if radius is not None:
         # In the corner between the base and a free edge the stress is singular.
         reach = min(reach, max(radius - fine.film.thickness, radius / 2))
     return relative_change(fine, coarse, np.linspace(0.0, reach, _REQUEST_SAMPLES))

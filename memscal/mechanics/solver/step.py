@@ -57,14 +57,6 @@ class ContactProblem:
         w, _ = self.displacements(state.pressure, state.shear)
         return self.heights - state.depth + w
 
-    def virgin(self) -> ContactState:
-        """Return the state of the first touch, at the ring (or rings) of the lowest height."""
-        nothing = np.zeros_like(self.heights)
-        lowest = float(self.heights.min())
-        touching = self.heights <= lowest
-        slip = np.zeros_like(self.heights, dtype=np.int8)
-        return ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
-
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
