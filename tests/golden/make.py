@@ -1,6 +1,6 @@
 """The golden outputs: what every command of ``commands.txt`` prints with ``--json``.
 
-``test_golden.py`` compares them, to a tolerance that other processors and libraries keep.
+``test_golden.py`` compares them, to a share of their uncertainty.
 
 During a refactoring on one machine, from the top of the repository::
 
@@ -137,32 +137,50 @@ OF_ONE_KIND = {"value", "some", "maximum"}
 SCALES = {"p_value": 1.0, "chi2": 1.0, "convergence": 1.0}
 """Scales of numbers that may be as small as rounding makes them."""
 
+STATISTICS = {
+    "standard_uncertainty", "relative_uncertainty", "budget", "checks", "draws", "reconvolution",
+    "p_value", "chi2",
+}  # fmt: skip
+"""Keys of what says how well a number is known, and need not be known better than that."""
+
 
 def differences(
-    golden: Any, result: Any, tolerance: float, path: str = "", scale: float = 0.0
+    golden: Any,
+    result: Any,
+    tolerance: float,
+    share: float = 0.0,
+    path: str = "",
+    scale: float = 0.0,
+    uncertainty: float = 0.0,
 ) -> Iterator[str]:
-    """Yield each place where two results differ: numbers by more than a relative tolerance.
+    """Yield each place where two results differ.
 
-    The tolerance is relative to a number or to ``scale``, the largest number beside it: a number
-    that is a difference near zero is no more accurate than what it is a difference of.
+    Numbers may differ by ``tolerance`` of themselves or of ``scale``, the largest number beside
+    them: a number that is a difference near zero is no more accurate than what it is a difference
+    of.  They may differ by ``share`` of their standard uncertainty, too, and statistics by that
+    share of themselves: by no more do processors and libraries change the result of a search.
     """
     if isinstance(golden, dict) and isinstance(result, dict):
         for key in sorted(golden.keys() ^ result.keys()):
             yield f"{path}.{key}: {'missing' if key in golden else 'new'}"
         if "budget" in path.rpartition(".")[2] or golden.keys() & OF_ONE_KIND:
             scale = max(scale, _scale(golden.values()))
+        stated = golden.get("standard_uncertainty") or 0.0
         for key in golden.keys() & result.keys():
+            own = max(tolerance, share) if key in STATISTICS else tolerance
             size = SCALES.get(key, scale)
-            yield from differences(golden[key], result[key], tolerance, f"{path}.{key}", size)
+            own_uncertainty = stated if key == "value" else 0.0
+            items = golden[key], result[key]
+            yield from differences(*items, own, share, f"{path}.{key}", size, own_uncertainty)
     elif isinstance(golden, list) and isinstance(result, list):
         if len(golden) != len(result):
             yield f"{path}: {len(golden)} items expected, {len(result)} found"
         scale = max(scale, _scale(golden))
-        for i, (item, other) in enumerate(zip(golden, result, strict=False)):
-            yield from differences(item, other, tolerance, f"{path}[{i}]", scale)
+        for i, items in enumerate(zip(golden, result, strict=False)):
+            yield from differences(*items, tolerance, share, f"{path}[{i}]", scale)
     elif isinstance(golden, float) and isinstance(result, float):
         size = max(abs(golden), abs(result), scale)
-        if not abs(result - golden) <= tolerance * size:
+        if not abs(result - golden) <= max(tolerance * size, share * uncertainty):
             relative = abs(result - golden) / size
             yield f"{path}: {golden!r} expected, {result!r} found, {relative:.1e} of {size:.3g}"
     elif type(golden) is not type(result) or golden != result:
