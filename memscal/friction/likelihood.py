@@ -163,14 +163,11 @@ class Sensor:
 
     def with_exact_constant(self) -> Sensor:
         """Return the sensor as if A were exact: with the changes of G alone."""
-
-        def shape(changes: FloatArray) -> FloatArray:
-            """Changes less the change of A that they bring."""
+        exact = {}
+        for source, changes in {"": self.changes, **self.shared}.items():
             relative = self.wavenumbers.integrals(changes) / self.conversion_constant
-            return changes - np.multiply.outer(self.transfer, relative)
-
-        shared = {source: shape(change) for source, change in self.shared.items()}
-        return replace(self, changes=shape(self.changes), shared=shared)
+            exact[source] = changes - np.multiply.outer(self.transfer, relative)
+        return replace(self, changes=exact.pop(""), shared=exact)
 
 
 def sensor_of(
