@@ -71,16 +71,28 @@ def run_pytest(session: nox.Session, *arguments: str) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """Test the built wheel: notebooks, studies in reduced form, unit tests and doctests."""
+    """Test the built wheel: unit tests and doctests."""
+    with outside_the_checkout(session, requirements=group("test")):
+        everything = ("tests", "--pyargs", "memscal")
+        run_pytest(session, *IN_PARALLEL, "--durations=20", *(session.posargs or everything))
+
+
+@nox.session
+def studies(session: nox.Session) -> None:
+    """Run the statistical studies, and those against other programs, in reduced form."""
+    with outside_the_checkout(session, requirements=group("test")):
+        run_pytest(session, *IN_PARALLEL, "tests/accuracy", "-m", "accuracy", *session.posargs)
+
+
+@nox.session
+def notebooks(session: nox.Session) -> None:
+    """Execute the notebooks; their stored outputs must be those of the built wheel."""
     with outside_the_checkout(session, requirements=group("test")) as copy:
         executed = shutil.copytree(copy / "notebooks", copy / "executed")
-        everything = sorted(os.fspath(book) for book in executed.glob("*.ipynb"))
-        everything += [os.fspath(copy / "tests"), "--pyargs", "memscal", "--nbmake", "--overwrite"]
-        run_pytest(session, *IN_PARALLEL, "--durations=20", *(session.posargs or everything))
-        if not session.posargs:
-            # The notebooks are stored with outputs, which must be those of this version.
-            compare = ("python", "docs/store_notebooks.py", "--compare", os.fspath(executed))
-            session.run(*compare, env=NOTHING_FROM_OUTSIDE)
+        books = sorted(os.fspath(book) for book in executed.glob("*.ipynb"))
+        run_pytest(session, *IN_PARALLEL, "--nbmake", "--overwrite", *books)
+        compare = ("python", "docs/store_notebooks.py", "--compare", os.fspath(executed))
+        session.run(*compare, env=NOTHING_FROM_OUTSIDE)
 
 
 @nox.session(default=False)
@@ -104,13 +116,6 @@ def robustness(session: nox.Session) -> None:
     with outside_the_checkout(session, requirements=group("test")):
         session.env["MEMSCAL_ROBUSTNESS"] = os.environ.get("MEMSCAL_ROBUSTNESS", "1")
         run_pytest(session, "tests/robustness", *session.posargs)
-
-
-@nox.session(default=False)
-def notebooks(session: nox.Session) -> None:
-    """Execute the notebooks against the built wheel."""
-    with outside_the_checkout(session, requirements=group("test")):
-        run_pytest(session, "--nbmake", "notebooks", *session.posargs)
 
 
 @nox.session(default=False)

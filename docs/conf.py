@@ -36,7 +36,7 @@ exclude_patterns = ["docs/templates"]
 # Absolute, for autosummary looks for it from the source folder, and Sphinx from this one.
 templates_path = [str(Path(__file__).with_name("templates"))]
 
-# Notebooks are shown as they are stored: nox --session tests executes them.
+# Notebooks are shown as they are stored: nox --session notebooks executes them.
 nb_execution_mode = "off"
 nb_output_stderr = "remove"
 nb_render_markdown_format = "myst"  # tables among the outputs
