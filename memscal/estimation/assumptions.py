@@ -219,7 +219,7 @@ def departure_test(estimate: ProfileEstimate) -> tuple[float, str, float]:
     # share of all departures' probability.
     prior = HYPOTHESES[0].estimate
     averaged = estimate.weighed
-    posterior = np.clip(averaged.gaussian_probability, 1e-4, 1 - 1e-4)
+    posterior = np.clip(averaged.probability[0], 1e-4, 1 - 1e-4)
     factor = (1 - posterior) / posterior * prior / (1 - prior)
     kinds: dict[str, float] = {}
     for hypothesis, probability in zip(HYPOTHESES[1:], averaged.probability[1:], strict=True):

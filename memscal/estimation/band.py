@@ -85,4 +85,5 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
         return float(k[max(i - 1, 0)])
     upper = np.log(ratio[i - 1])
     lower = np.log(max(ratio[i], np.finfo(float).tiny))
-    return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
+    share = (upper - np.log(threshold)) / (upper - lower)
+    return float(k[i - 1] + (k[i] - k[i - 1]) * share)

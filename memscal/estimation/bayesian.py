@@ -271,7 +271,7 @@ class Hypothesis:
 
 #: Family (none: the Gaussian), departure from it and its strengths; prior probabilities, shared
 #: evenly within a row, for the estimate and for its uncertainty.
-_PRIOR: tuple[tuple[str, str, tuple[float, ...], float, float], ...] = (
+_PRIOR = (
     ("", "", (0.0,), 0.45, 0.0),
     ("", "edge", (0.4,), 0.20, 0.0),
     ("", "rough edge 0.4", (0.4,), 0.01, 0.015),
@@ -314,11 +314,6 @@ class WeighedFit:
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
     means: FloatArray  # (h, all columns): of each hypothesis; zero where it is unlikely
-
-    @property
-    def gaussian_probability(self) -> float:
-        """Posterior probability that there is no departure, from a prior of 0.45."""
-        return float(self.probability[0])
 
     def of_kind(self, name: str, integrals: FloatArray) -> tuple[float, float]:
         """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
@@ -377,11 +372,12 @@ class Weighing:
     @cached_property
     def log_marginal_likelihoods(self) -> tuple[float, float]:
         """Of all hypotheses by either prior, up to a constant of the scan."""
-        estimate, uncertainty = (
-            float(np.logaddexp.reduce(self.log_marginals[prior > 0] + np.log(prior[prior > 0])))
-            for prior in _PRIORS
-        )
-        return estimate, uncertainty
+        sums = []
+        for prior in _PRIORS:
+            possible = prior > 0
+            terms = self.log_marginals[possible] + np.log(prior[possible])
+            sums.append(float(np.logaddexp.reduce(terms)))
+        return sums[0], sums[1]
 
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""
@@ -463,12 +459,13 @@ def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasi
     chosen = np.concatenate([np.arange(basis.flat), *columns])
     rings = tuple(compress(basis.rings, used))
     families = tuple(compress(basis.families, used[len(basis.rings) :]))
-    return replace(basis, rings=rings, families=families), replace(
+    averaged = replace(
         weighed,
         mean=weighed.mean[chosen],
         covariance=weighed.covariance[np.ix_(chosen, chosen)],
         gain=weighed.gain[chosen],
     )
+    return replace(basis, rings=rings, families=families), averaged
 
 
 def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:

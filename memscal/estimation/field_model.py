@@ -112,11 +112,10 @@ class FieldModel(ForwardModel):
         """Voltages of kernels with cos or sin of m times the angle: (n, both), in V."""
         geometry = self.geometry(centres)
         angle = m * np.arctan2(self._plane.ky, self._plane.kx)
-        spectra = [
-            *(np.cos(angle) * kernel for kernel in self._on_cells(cosines.T)),
-            *(np.sin(angle) * kernel for kernel in self._on_cells(sines.T)),
-        ]
-        columns = [self._read(geometry, (-1j) ** m * spectrum) for spectrum in spectra]
+        even = np.cos(angle) * self._on_cells(cosines.T)
+        odd = np.sin(angle) * self._on_cells(sines.T)
+        spectra = (-1j) ** m * np.vstack([even, odd])
+        columns = [self._read(geometry, spectrum) for spectrum in spectra]
         return np.stack(columns, axis=1)
 
     def _on_cells(self, kernels: FloatArray) -> FloatArray:

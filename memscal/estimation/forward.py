@@ -198,8 +198,7 @@ class ForwardModel:
     def reach(self) -> float:
         """Beyond the distances of all points from any centre, in m."""
         # Rounded up, so that parts of one raster share their tables.
-        span = np.hypot(np.ptp(self.points.x), np.ptp(self.points.y))
-        return float(1.25e-3 * np.ceil(1e3 * span))
+        return float(1.25e-3 * np.ceil(1e3 * self.points.span))
 
     @cached_property
     def _measures(self) -> list[FloatArray]:

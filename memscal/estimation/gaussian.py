@@ -131,8 +131,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     widths = _smoothing_length(model) * np.array(_STARTING_WIDTHS)
     if model.reference.source:
         # A source may be far narrower than G.
-        widest = 0.25 * np.hypot(np.ptp(points.x), np.ptp(points.y))
-        widths = np.geomspace(0.5 * points.step, widest, _SOURCE_WIDTHS)
+        widths = np.geomspace(0.5 * points.step, 0.25 * points.span, _SOURCE_WIDTHS)
     kernels = np.stack([gaussian_transfer(model.k, width) for width in widths])
     # Profiles per newton of every width, on a table for quick trials.
     spectra = (model.reference.values * kernels).T

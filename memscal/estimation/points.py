@@ -9,7 +9,7 @@ the voltage falls where the indenter stands at larger x than the sensor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -154,6 +154,11 @@ class ScanPoints:
             values[self.scan == scan] = getattr(places, name)
         return values
 
+    @property
+    def span(self) -> float:
+        """Diagonal of the rectangle that holds all points, in m."""
+        return float(np.hypot(np.ptp(self.x), np.ptp(self.y)))
+
     @cached_property
     def step(self) -> float:
         """Typical distance of neighbouring positions, in m; of several scans the smallest."""
@@ -175,12 +180,10 @@ class ScanPoints:
 
     def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
-        columns: dict[str, Any] = {
-            item.name: value[chosen]
-            for item in fields(self)
-            if item.name not in ("free", "decorrelation")
-            and isinstance(value := getattr(self, item.name), np.ndarray)
-        }
+        columns: dict[str, Any] = {}
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray) and name != "free":
+                columns[name] = value[chosen]
         return replace(self, **columns, decorrelation=None)
 
     def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:

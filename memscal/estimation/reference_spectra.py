@@ -67,16 +67,12 @@ def reference_spectra(
     if wavenumbers is None:
         last = max(_last_wavenumber(stress, points) for stress, points in pairs)
         # Fields are lifted to squares that reach one span from the centre, to their corners.
-        wavenumbers = Wavenumbers.covering(last, 1.5 * max(_span(points) for points in data))
+        wavenumbers = Wavenumbers.covering(last, 1.5 * max(points.span for points in data))
     return tuple(_spectrum(stress, wavenumbers, points) for stress, points in pairs)
 
 
-def _span(points: ScanPoints) -> float:
-    return float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
-
-
 def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) -> RadialSpectrum:
-    values = _per_newton(stress, wavenumbers.k, _span(points), points.order)
+    values = _per_newton(stress, wavenumbers.k, points.span, points.order)
     if isinstance(stress, Contact) or stress.form is None:
         return RadialSpectrum(wavenumbers, values, points.order)
     if stress.ideal is not None and stress.ideal.shape == "slit":
@@ -294,10 +290,11 @@ def _relative_difference(
 ) -> FloatArray:
     """Difference of two rods per newton over the scan's own, kept for scans of other voltages."""
     law = law_at_once(set_up)
-    upper, lower, own = (
-        _base_spectrum(press_rod(*rod.under(law)), nodes, order) / (rod.load / set_up.load)
-        for rod in (more, less, set_up)
-    )
+    spectra = []
+    for rod in (more, less, set_up):
+        spectrum = _base_spectrum(press_rod(*rod.under(law)), nodes, order)
+        spectra.append(spectrum * set_up.load / rod.load)
+    upper, lower, own = spectra
     return relative(upper - lower, own)
 
 

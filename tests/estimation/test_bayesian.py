@@ -86,7 +86,7 @@ def test_more_noise_means_less_departure_from_the_gaussian() -> None:
     probabilities = []
     for noise in (0.002, 0.01, 0.05):
         scans = [simulated(noise=noise, seed=seed, kernel=TAILS) for seed in range(8)]
-        gaussian = [estimated(scan).weighed.gaussian_probability for scan in scans]
+        gaussian = [estimated(scan).weighed.probability[0] for scan in scans]
         probabilities.append(np.median(gaussian))
     assert probabilities == sorted(probabilities)
 

@@ -125,7 +125,7 @@ def test_stated_noise_is_the_least_that_the_evidence_takes() -> None:
     for seed in range(4):
         scan = simulated(noise=0.01, kernel=TAILS, seed=seed)
         scans = [replace(scan, u_zz_errors=scan.u_zz_errors * factor) for factor in (0.5, 1, 10)]
-        under, stated, over = (estimated(s).weighed.gaussian_probability for s in scans)
+        under, stated, over = (estimated(s).weighed.probability[0] for s in scans)
         # Within a third of what the scan itself says, and within 0.01 of the prior.
         assert 0.3 * stated < under < 1.001 * stated
         assert stated < over == pytest.approx(HYPOTHESES[0].estimate, abs=0.01)
