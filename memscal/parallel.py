@@ -134,19 +134,19 @@ def shared(
     tasks = deque["Future[list[Any]]"]()
     if executor is not None:
         workers = getattr(executor, "_max_workers", None) or _WORKERS
-    chunk = _LARGEST_CHUNK
-    small = list[int]()
+    size = _LARGEST_CHUNK
+    first = list[int]()
     if isinstance(items, Sized):
-        chunk = max(2, min(chunk, len(items) // (4 * workers)))
-        workers = min(workers, -(-len(items) // chunk))
+        size = max(2, min(size, len(items) // (4 * workers)))
+        workers = min(workers, -(-len(items) // size))
     else:  # the first tasks are small, for there may be no more
-        small = sorted([1, 2, 4, 8] * workers)
+        first = sorted([1, 2, 4, 8] * workers)
     failed: list[BaseException] = []
-    chunks = _chunks(source, chain(small, repeat(chunk)), failed)
+    chunks = _chunks(source, chain(first, repeat(size)), failed)
+    if executor is None and workers < 2:
+        yield from map(function, source)
+        return
     with ExitStack() as stack:
-        if executor is None and workers < 2:
-            yield from map(function, source)
-            return
         stack.enter_context(workers_that_last())
         pool = executor or stack.enter_context(worker_pool(workers))
         try:

@@ -131,7 +131,9 @@ def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
 def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
     """Print the truth of scans, one column for each."""
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
-    names = dict.fromkeys(name for truth in sorted(truths, key=len, reverse=True) for name in truth)
+    names: dict[str, None] = {}
+    for truth in sorted(truths, key=len, reverse=True):
+        names |= dict.fromkeys(truth)
     rows: list[Sequence[str]] = [
         ("kind", *(scan.kind for scan in scans.values())),
         ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
