@@ -255,8 +255,3 @@ def on_grid(
     reach = np.max(grid.radius)
     table = np.linspace(0.0, reach, int(np.ceil(reach / step)) + 4)
     return radial_spline(table, profile(table))(grid.radius)
-
-
-def cut(field: FloatArray, grid: EvenGrid, r: FloatArray) -> FloatArray:
-    """Cut an even field along its axis: the inverse of :func:`on_grid`, at radii ``r`` (m)."""
-    return radial_spline(grid.axis, field[0])(r)

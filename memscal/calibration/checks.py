@@ -234,7 +234,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
         "as a straight line; a failure means that what is left of it may bias A."
     )
-    change = 2 * np.abs(estimate.drift[1:]).max() / estimate.largest_signal
+    last = 1 + int(estimate.points.free[0].sum())
+    change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     checks.append(check("baseline_drift", change, 0.05, meaning))
     if not source:
         meaning = (

@@ -301,7 +301,7 @@ def _of_division(
     variance = taper**2 * variance - 2 * g * with_a + g**2 * (by_a**2 @ noise)
     rest = np.sum((changed(inputs) - np.outer(g, by_a @ inputs)) ** 2, axis=1)
     root = np.eye(count + 1)
-    root[:-1, :-1] = square_root(estimate.covariance)
+    root[:-1, :-1] = square_root(estimate.weighed.covariance)
     sums = grid.cell_area * division.every * (sums @ root)
     for some in _chunks(count + 1):
         rest += np.sum((hidden @ root[:, some] - np.outer(g, sums[some])) ** 2, axis=1)

@@ -10,8 +10,8 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 import scipy.fft
 
-from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.axisymmetry.grids import EvenGrid, Lattice, on_grid
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, radial_spline
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field, reconvolve
 from memscal.errors import InputError
@@ -112,33 +112,28 @@ class LineFields:
     @cached_property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return self._padded(self.taper(self._inside.radius))
+        return self.taper(self.grid.radius)
 
     def taper(self, radius: FloatArray) -> FloatArray:
         """Taper at radii, in m."""
         return _taper(radius, self.support * self.grid.spacing)
 
-    @cached_property
-    def _inside(self) -> EvenGrid:
-        return EvenGrid(self.support + 1, self.grid.spacing)
-
-    def _padded(self, values: FloatArray) -> FloatArray:
-        return np.pad(values, (0, self.grid.count - self._inside.count))
-
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero, as far as its support goes."""
-        return self._padded(on_grid(profile, self._inside, self.grid.spacing / 2))
+        inside = EvenGrid(self.support + 1, self.grid.spacing)
+        values = on_grid(profile, inside, self.grid.spacing / 2)
+        return np.pad(values, (0, self.grid.count - inside.count))
 
     def convolved(self, kernel: Field) -> FloatArray:
         """Convolve a kernel with the stress: its values at the measured points."""
         line = self.grid.inverse_on_axis(kernel.transform * self.stress.transform)
-        return cut(line, self.grid, self.radius)
+        return radial_spline(self.grid.axis, line[0])(self.radius)
 
     def on_support(self, kernel: FloatArray, _: ProfileEstimate | None) -> Field:
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
-        inside = slice(0, self._inside.count)
-        return Field(self._inside, kernel[inside, inside])
+        count = self.support + 1
+        return Field(EvenGrid(count, self.grid.spacing), kernel[:count, :count])
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""

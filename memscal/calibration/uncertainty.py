@@ -447,7 +447,7 @@ def _kernel_derivatives(
     by_nuisance = -(division.direct @ division.nuisance)
     by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
     by_state[:, division.places] = by_nuisance
-    spread = division.lost[:, 1:] @ square_root(estimate.covariance)
+    spread = division.lost[:, 1:] @ square_root(estimate.weighed.covariance)
     derivatives = _Derivatives(
         by_voltage=division.direct + by_nuisance @ estimate.weighed.gain[division.places],
         by_state=by_state,

@@ -73,7 +73,7 @@ def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     basis = estimate.basis
     a = estimate.conversion_constant
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
-    variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
+    variance = np.sum((rows @ estimate.weighed.covariance) * rows, axis=1)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 

@@ -80,7 +80,8 @@ class ProfileEstimate:
     def fixed_root(self) -> FloatArray:
         """Square root of what of the posterior's covariance does not scatter between scans."""
         random = self.scattered(self.weighed.gain)
-        return square_root(self.covariance - random @ random.T, np.diag(self.covariance))
+        covariance = self.weighed.covariance
+        return square_root(covariance - random @ random.T, np.diag(covariance))
 
     @cached_property
     def noise_scale(self) -> float:
@@ -93,11 +94,6 @@ class ProfileEstimate:
             scatter = self.raster_noise
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Covariance of all corrections, at the adopted noise."""
-        return self.weighed.covariance
 
     @cached_property
     def gaussian_gain(self) -> VoltageMap:
@@ -145,11 +141,6 @@ class ProfileEstimate:
         first = 2 + int(self.points.free.sum())
         last = self.gaussian.jacobian.shape[1] - self.points.ellipse
         return self.gaussian.drift + self.weighed.mean[first:last]
-
-    @property
-    def drift(self) -> FloatArray:
-        """The first scan's baseline and its change over half the range along x (and y), in V."""
-        return self.drifts[: 1 + int(self.points.free[0].sum())]
 
     def oval_kernel(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
@@ -372,7 +363,7 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
     a = estimate.conversion_constant
     integrals = estimate.basis.integrals
     # Rounding makes the variance of a scan without noise negative.
-    uncertainty = np.sqrt(max(float(integrals @ estimate.covariance @ integrals), 0.0))
+    uncertainty = np.sqrt(max(float(integrals @ estimate.weighed.covariance @ integrals), 0.0))
     if not a > LEAST_SIGNIFICANCE * uncertainty:
         unit = estimate.points.reading
         wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
@@ -410,7 +401,7 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
         )
     centres = 2 + int(estimate.points.free.sum())
     flat = estimate.basis.flat
-    everything = np.arange(len(estimate.covariance))
+    everything = np.arange(len(estimate.weighed.covariance))
     blocks = {
         "the baseline: the scan is too short to show the profile's tail": everything[centres:flat],
         "the width and shape of the apparatus function: the reference is too wide, or the step too "
@@ -422,7 +413,7 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
 
 def _share(estimate: ProfileEstimate, block: IndexArray) -> float:
     """Share of the variance of A that would go if the parameters of a block were known."""
-    covariance = estimate.covariance
+    covariance = estimate.weighed.covariance
     integrals = estimate.basis.integrals
     deviation = np.sqrt(np.maximum(np.diag(covariance)[block], np.finfo(float).tiny))
     with_a = (integrals @ covariance)[block] / deviation
@@ -452,9 +443,9 @@ def constrained_profile(
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
     scale = np.abs(profile).max()
     # A square root of the covariance, from its correlation matrix: amplitudes differ in size.
-    deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
+    deviation = np.sqrt(np.maximum(np.diag(estimate.weighed.covariance), 0.0))
     deviation = np.where(deviation > 0, deviation, 1.0)
-    values, vectors = np.linalg.eigh(estimate.covariance / np.outer(deviation, deviation))
+    values, vectors = np.linalg.eigh(estimate.weighed.covariance / np.outer(deviation, deviation))
     positive = values > 1e-12 * values[-1]
     root = deviation[:, None] * vectors[:, positive] * np.sqrt(values[positive])
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)

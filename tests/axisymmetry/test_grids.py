@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import fftconvolve
 
-from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
+from memscal.axisymmetry.grids import EvenGrid, Lattice, on_grid
+from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
@@ -151,7 +152,7 @@ def test_lifting_then_cutting_gives_the_profile_back(seed: int) -> None:
         return np.exp(-((r[..., None] / widths) ** 2) / 2) @ weights
 
     r = rng.uniform(0.0, 6.4, size=200)
-    back = cut(on_grid(profile, grid, 0.02), grid, r)
+    back = radial_spline(grid.axis, on_grid(profile, grid, 0.02)[0])(r)
     np.testing.assert_allclose(back, profile(r), atol=3e-5 * np.abs(weights).sum())
     whole = Lattice(centred_axis(129, 0.1), centred_axis(129, 0.1))
     lifted = grid.to_image(on_grid(profile, grid, 0.02))

@@ -60,7 +60,7 @@ def test_the_uncertainty_of_the_transfer_function_is_that_of_draws_of_the_poster
     estimate = estimated(simulated(noise=0.005))
     basis = estimate.basis
     k = estimate.model.k
-    values, vectors = np.linalg.eigh(estimate.covariance)
+    values, vectors = np.linalg.eigh(estimate.weighed.covariance)
     rng = np.random.default_rng()
     draws = rng.normal(size=(4000, values.size)) * np.sqrt(np.maximum(values, 0))
     drawn = estimate.kernel[:, None] + basis.kernels(k) @ (draws @ vectors.T).T

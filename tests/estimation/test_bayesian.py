@@ -94,7 +94,7 @@ def test_more_noise_means_less_departure_from_the_gaussian() -> None:
 def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior() -> None:
     """Few places cannot tell 79 coefficients; what they do not tell stays uncertain."""
     scan = simulated(points=15, half_range=5e-3, noise=0.003)
-    assert np.isfinite(estimated(scan).covariance).all()
+    assert np.isfinite(estimated(scan).weighed.covariance).all()
     few = memscal.calibrate(scan, method="bayesian").apparatus
     many = memscal.calibrate(simulated(points=129, noise=0.003), method="bayesian").apparatus
     assert few.radial_uncertainty(0.0) > many.radial_uncertainty(0.0)

@@ -47,7 +47,9 @@ def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> No
     assert spoilt.outlier_weight[20] < 1e-3
     assert np.sum(spoilt.outlier_weight < 0.5) <= 1 + np.sum(clean.outlier_weight < 0.5)
     shift = abs(spoilt.conversion_constant - clean.conversion_constant)
-    assert shift < np.sqrt(spoilt.basis.integrals @ spoilt.covariance @ spoilt.basis.integrals)
+    assert shift < np.sqrt(
+        spoilt.basis.integrals @ spoilt.weighed.covariance @ spoilt.basis.integrals
+    )
 
 
 def test_ten_outliers_are_listed_the_largest_first_and_the_others_counted() -> None:
