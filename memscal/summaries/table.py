@@ -210,9 +210,11 @@ class Table:
             if i == 0 and any(self.head):
                 yield _GAP + _GAP.join("-" * width for _, width in columns)
 
-    def html(self) -> str:
-        """Return the table as HTML, each row headed by its first text, marked rows in bold."""
-        lines = [f"<table>\n<caption>{_cell(self.title)}</caption>"]
+    def html(self, kind: str = "") -> str:
+        """Return the table as HTML of a class, each row headed by its first text, marks in bold."""
+        lines = [f'<table class="{kind}">' if kind else "<table>"]
+        if self.title:
+            lines.append(f"<caption>{_cell(self.title)}</caption>")
         if any(self.head):
             heads = (f'<th scope="col">{_cell(c)}</th>' if c else "<td></td>" for c in self.head)
             lines.append(f"<thead><tr>{''.join(heads)}</tr></thead>")

@@ -1,6 +1,6 @@
 """Contents of a certificate of calibration, once for all its forms."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
@@ -32,10 +32,15 @@ COVERAGE_PROBABILITY = 0.95
 """k of every expanded uncertainty U = k u, and about what a normal distribution has within."""
 
 #: Parameters of the sensor; the others are those of one scan.
-_OF_SENSOR = (
-    *("conversion_constant", "conversion_constant_gaussian", "gaussian_sigma"),
-    *("gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area"),
-    *("ellipticity", "ellipticity_diagonal"),
+_SENSOR_PARAMETERS = (
+    "conversion_constant",
+    "conversion_constant_gaussian",
+    "gaussian_sigma",
+    "gaussian_sigma_deconvolved",
+    "fwhm",
+    "noise_equivalent_area",
+    "ellipticity",
+    "ellipticity_diagonal",
 )
 SYNTHETIC = "SYNTHETIC DATA: NOTHING WAS MEASURED"
 _LEAST_OF_G = 0.01
@@ -64,7 +69,7 @@ class CertifiedValue:
 class Conformity:
     """Whether a value conforms with its tolerance, by a decision rule; -inf or inf: no limit."""
 
-    of: CertifiedValue
+    certified: CertifiedValue
     lower: float
     upper: float
     guard_band: float
@@ -72,7 +77,9 @@ class Conformity:
     @property
     def accepted(self) -> bool:
         """Whether the value lies within the acceptance interval (JCGM 106:2012, 8.3.2)."""
-        return self.lower + self.guard_band <= self.of.value <= self.upper - self.guard_band
+        lowest = self.lower + self.guard_band
+        highest = self.upper - self.guard_band
+        return lowest <= self.certified.value <= highest
 
     @property
     def statement(self) -> str:
@@ -88,10 +95,10 @@ class Conformity:
 
         :math:`p_c = \Phi((T_U - y)/u) - \Phi((T_L - y)/u)`.
         """
-        low, high = np.array([self.lower, self.upper]) - self.of.value
-        if not self.of.uncertainty > 0:
-            return float(low <= 0 <= high)
-        return float(ndtr(high / self.of.uncertainty) - ndtr(low / self.of.uncertainty))
+        low = self.lower - self.certified.value
+        high = self.upper - self.certified.value
+        u = self.certified.uncertainty
+        return float(ndtr(high / u) - ndtr(low / u)) if u > 0 else float(low <= 0 <= high)
 
 
 class CertifiedProfile(NamedTuple):
@@ -132,11 +139,15 @@ class Certificate:
     @property
     def warnings(self) -> list[str]:
         """What must be said first: synthetic data, checks that failed, what was overridden."""
-        overridden = [m.text for m in self.apparatus.process.messages if m.kind == OVERRIDE]
+        warnings = []
+        if self.synthetic:
+            form = "This shows the form of a certificate and certifies nothing."
+            warnings.append(f"{SYNTHETIC}. {form}")
         failed = [c.name.replace("_", " ") for c in self.apparatus.checks if not c.passed]
-        synthetic = f"{SYNTHETIC}. This shows the form of a certificate and certifies nothing."
-        text = f"Quality checks of the calibration that failed: {', '.join(failed)}."
-        return [synthetic] * self.synthetic + [text] * bool(failed) + overridden
+        if failed:
+            warnings.append(f"Quality checks of the calibration that failed: {', '.join(failed)}.")
+        messages = self.apparatus.process.messages
+        return warnings + [m.text for m in messages if m.kind == OVERRIDE]
 
     @property
     def accreditation(self) -> str:
@@ -160,7 +171,8 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
     """Return the contents of a certificate; what is mandatory and missing is all named."""
     apparatus.require_pascals()
     sections, equipment = _completed(apparatus, laboratory)
-    if missing := [*missing_keys(sections, equipment)]:
+    missing = [*missing_keys(sections, equipment)]
+    if missing:
         raise InputError(
             f"The certificate lacks {len(missing)} mandatory fields: {'; '.join(missing)}.",
             why="A certificate states who calibrated what for whom, with what and when (ISO/IEC "
@@ -168,11 +180,11 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
             cure=f"State them in {laboratory.name}, or in the scan (memscal import --lab).",
         )
     parameters = apparatus.parameters
-    parameters = parameters.only([name for name in _OF_SENSOR if name in parameters])
-    values = tuple(
-        CertifiedValue(parameter_quantity(parameters, n), parameters[n], parameters.uncertainty(n))
-        for n in parameters.names
-    )
+    parameters = parameters.only([name for name in _SENSOR_PARAMETERS if name in parameters])
+    values = []
+    for name in parameters.names:
+        quantity = parameter_quantity(parameters, name)
+        values.append(CertifiedValue(quantity, parameters[name], parameters.uncertainty(name)))
     artifact = tree_to_bytes(artifact_tree(apparatus.compact()))
     derived = apparatus.content_digest[:_DIGITS_OF_NUMBER].upper()
     stated = sections["laboratory"]
@@ -182,7 +194,7 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
         sections=sections,
         equipment=equipment,
         apparatus=apparatus,
-        values=values,
+        values=tuple(values),
         covariance=parameters.covariance,
         profile=_profile(apparatus),
         conformity=tuple(_conformity(values, sections.get("decision", {}), laboratory.name)),
@@ -204,56 +216,62 @@ def _completed(
     for key in ("start_time", "end_time"):
         conditions[key] = ""
         with suppress(ValueError):  # a scan may state it in any words
-            date.fromisoformat((text := held.get(key) or getattr(apparatus, key))[:10])
+            text = held.get(key) or getattr(apparatus, key)
+            date.fromisoformat(text[:10])
             conditions[key] = text
-    if (t := sensor.temperature) is not None:
-        conditions["temperature"] = Measured(t, sensor.temperature_uncertainty)
+    if sensor.temperature is not None:
+        stated = Measured(sensor.temperature, sensor.temperature_uncertainty)
+        conditions["temperature"] = stated
     if held["user"].name:
         sections.setdefault("person", {})["operator"] = held["user"].name
     listed = []
     for kind, attribute in KINDS.items():
         part = held[attribute]
         item = {"name": part.name, "serial": part.serial_number, "certificate": part.certificate}
-        listed += [{**item, "date": part.certificate_date, "kind": kind}] * any(item.values())
+        if any(item.values()):
+            listed.append({**item, "date": part.certificate_date, "kind": kind})
     listed += [dict(item) for item in laboratory.equipment if item.get("kind") not in KINDS]
     return sections, tuple(listed)
 
 
 def _conformity(
-    values: tuple[CertifiedValue, ...], decision: Mapping[str, Any], name: str
+    values: Iterable[CertifiedValue], decision: Mapping[str, Any], name: str
 ) -> list[Conformity]:
-    statements = []
-    known = {value.quantity.name: value for value in values}
     factor = decision.get("guard_band", 1.0)
     rule = decision.get("rule")
     if decision and (rule is None or factor < 0):
         cure = f'Write rule = "{RULES[0]}" or "{RULES[1]}", and a guard_band that is not negative.'
         raise InputError(f"{name}: [decision] gives no decision rule.", cure=cure)
+    known = {value.quantity.name: value for value in values}
+    statements = []
     for key, limits in decision.items():
-        where = f"{name}: [decision] {key}"
         if isinstance(limits, Mapping):
+            where = f"{name}: [decision] {key}"
             if key not in known:
                 cure = f"There are {', '.join(known)}."
                 raise InputError(f"{where} is not certified for this sensor.", cure=cure)
-            ends = limits.get("lower", -np.inf), limits.get("upper", np.inf)
-            lower, upper = to_si(ends, limits.get("unit"), known[key].quantity.dimension, where)
-            guard_band = factor * known[key].expanded if rule == RULES[1] else 0.0
+            certified = known[key]
+            ends = (limits.get("lower", -np.inf), limits.get("upper", np.inf))
+            dimension = certified.quantity.dimension
+            lower, upper = map(float, to_si(ends, limits.get("unit"), dimension, where))
+            guard_band = factor * certified.expanded if rule == RULES[1] else 0.0
             if not lower + guard_band < upper - guard_band:
                 raise InputError(
                     f"{where}: no value could be accepted between its limits.",
                     why="The tolerance is not wider than its two guard bands.",
                     cure="Agree on a wider tolerance or a smaller guard_band, or measure better.",
                 )
-            statements.append(Conformity(known[key], float(lower), float(upper), guard_band))
+            statements.append(Conformity(certified, lower, upper, guard_band))
     return statements
 
 
 def _profile(apparatus: ApparatusFunction) -> CertifiedProfile:
     """Return G at even radii up to where its Gaussian has fallen to a hundredth."""
     profile = apparatus.radial_profile
-    reach = profile.r[np.flatnonzero(profile.g_gaussian > _LEAST_OF_G * profile.g_gaussian[0])[-1]]
-    steps = [digit * 10.0**power * MM for power in range(-4, 3) for digit in (1, 2, 5)]
-    step = next(step for step in steps if reach <= _MOST_RADII * step)
+    shown = profile.g_gaussian > _LEAST_OF_G * profile.g_gaussian[0]
+    reach = profile.r[shown][-1]
+    sizes = (MM * np.multiply.outer(10.0 ** np.arange(-4, 3), [1, 2, 5])).ravel()
+    step = sizes[np.searchsorted(sizes, reach / _MOST_RADII)]
     r: FloatArray = step * np.arange(int(reach / step) + 1, dtype=np.float64)
     # A spline is linear in the values that it goes through.
     weights: FloatArray = radial_spline(profile.r, np.eye(profile.r.size))(r)

@@ -62,14 +62,19 @@ def command(
     result = {"number": certificate.number, "issued": certificate.issued}
     if as_json:
         decided = [
-            {"name": of.of.quantity.name, "conforms": of.accepted, "probability": of.probability}
-            for of in certificate.conformity
+            {
+                "name": item.certified.quantity.name,
+                "conforms": item.accepted,
+                "probability": item.probability,
+            }
+            for item in certificate.conformity
         ]
         written = {"schema_version": "1", "outputs": [str(path) for path in outputs]}
         out.emit_json({**written, **result, "conformity": decided})
     else:
-        words = [(of.of.quantity.words, of.statement) for of in certificate.conformity]
-        out.emit_tables(Table("Certificate", ("", ""), [*result.items(), *words]))
+        rows = list(result.items())
+        rows += [(item.certified.quantity.words, item.statement) for item in certificate.conformity]
+        out.emit_tables(Table("Certificate", ("", ""), rows))
     if certificate.synthetic:
         out.note("The data are synthetic: the certificate says so on every page.")
     out.message(f"Written: {', '.join(map(str, outputs))}")

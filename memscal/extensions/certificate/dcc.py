@@ -28,40 +28,20 @@ _SPACES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 Tree = Mapping[str, Any]
 
 
-def certificate_xml(of: Certificate) -> bytes:
+def certificate_xml(certificate: Certificate) -> bytes:
     """Return a certificate as a Digital Calibration Certificate, in UTF-8."""
     for prefix, space in {**_SPACES, "xsi": "http://www.w3.org/2001/XMLSchema-instance"}.items():
         ET.register_namespace(prefix, space)
     root = ET.fromstring(_CONSTANT.read_bytes())
-    sections = of.sections
-    process = of.apparatus.process
-    begin, end = (sections["conditions"][key][:10] for key in ("start_time", "end_time"))
-    t, humidity = (sections["conditions"][key] for key in ("temperature", "humidity"))
-    stated = {
-        f"{section}_{key}": sections[section].get(key) or ""
-        for section in ("laboratory", "customer", "person", "sensor")
-        for key in SECTIONS[section]
-    } | {
-        "release": _release(__version__),
-        "release_of_artifact": _release(process.version),
-        "number": of.number,
-        "begin": begin,
-        "end": end or begin,
-        "issued": of.issued,
-        "accreditation": of.accreditation,
-        "quality": " ".join(of.warnings) or "No check failed.",
-        "method": str(process.configuration.get("method", "not stated")),
-        "temperature": _numbers(t.value - ZERO_CELSIUS),
-        "temperature_expanded": _numbers(COVERAGE_FACTOR * t.uncertainty),
-        "humidity": _numbers(100 * humidity.value),
-        "humidity_expanded": _numbers(100 * COVERAGE_FACTOR * humidity.uncertainty),
-    }
+    texts = _texts(certificate)
     for element in root.iter():
-        element.text = Template((element.text or "").strip()).substitute(stated)
-    variable = {
-        "measuringEquipments": {"measuringEquipment": [*map(_equipment, of.equipment)]},
-        "results": {"result": [_values(of), _profile(of), _artifact(of)]},
-        "measurementMetaData": {"metaData": _conformity(of)},
+        element.text = Template((element.text or "").strip()).substitute(texts)
+    equipment = [_equipment(item) for item in certificate.equipment]
+    results = [_values(certificate), _profile(certificate), _artifact(certificate)]
+    variable: dict[str, Tree] = {
+        "measuringEquipments": {"measuringEquipment": equipment},
+        "results": {"result": results},
+        "measurementMetaData": {"metaData": _conformity(certificate)},
     }
     for name, tree in variable.items():
         (place,) = root.iterfind(f".//dcc:{name}", _SPACES)
@@ -70,6 +50,35 @@ def certificate_xml(of: Certificate) -> bytes:
     ET.indent(root)
     made: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return made
+
+
+def _texts(certificate: Certificate) -> dict[str, str]:
+    """Return what is filled into the constant parts."""
+    sections = certificate.sections
+    process = certificate.apparatus.process
+    conditions = sections["conditions"]
+    begin = conditions["start_time"][:10]
+    t = conditions["temperature"]
+    humidity = conditions["humidity"]
+    texts = {}
+    for section in ("laboratory", "customer", "person", "sensor"):
+        for key in SECTIONS[section]:
+            texts[f"{section}_{key}"] = sections[section].get(key) or ""
+    return texts | {
+        "release": _release(__version__),
+        "release_of_artifact": _release(process.version),
+        "number": certificate.number,
+        "begin": begin,
+        "end": conditions["end_time"][:10] or begin,
+        "issued": certificate.issued,
+        "accreditation": certificate.accreditation,
+        "quality": " ".join(certificate.warnings) or "No check failed.",
+        "method": str(process.configuration.get("method", "not stated")),
+        "temperature": _numbers(t.value - ZERO_CELSIUS),
+        "temperature_expanded": _numbers(COVERAGE_FACTOR * t.uncertainty),
+        "humidity": _numbers(100 * humidity.value),
+        "humidity_expanded": _numbers(100 * COVERAGE_FACTOR * humidity.uncertainty),
+    }
 
 
 def _release(version: str) -> str:
@@ -104,12 +113,11 @@ def _words(text: str) -> Tree:
 
 
 def _equipment(item: Mapping[str, str]) -> Tree:
-    numbers = [
-        ("manufacturer", item["serial"], "Serial number"),
-        ("other", item["certificate"], f"Certificate of {item['date']}"),
-    ]
-    identifications = [{"issuer": i, "value": v, "name": _words(n)} for i, v, n in numbers]
-    return {"name": _words(item["name"]), "identifications": {"identification": identifications}}
+    serial = {"issuer": "manufacturer", "value": item["serial"], "name": _words("Serial number")}
+    words = _words(f"Certificate of {item['date']}")
+    certificate = {"issuer": "other", "value": item["certificate"], "name": words}
+    identifications = {"identification": [serial, certificate]}
+    return {"name": _words(item["name"]), "identifications": identifications}
 
 
 def _real(value: float, unit: str) -> Tree:
@@ -135,26 +143,13 @@ def _listed(
         "si:unitXMLList": " ".join(map(dsi_unit, units)),
     }
     if covariance is not None:
-        n = len(values)
+        u = np.sqrt(np.diag(covariance))
         expanded = {
-            "si:valueExpandedMUXMLList": _numbers(COVERAGE_FACTOR * np.sqrt(np.diag(covariance))),
-            "si:coverageFactorXMLList": _numbers([COVERAGE_FACTOR] * n),
-            "si:coverageProbabilityXMLList": _numbers([COVERAGE_PROBABILITY] * n),
+            "si:valueExpandedMUXMLList": _numbers(COVERAGE_FACTOR * u),
+            "si:coverageFactorXMLList": _numbers(np.full_like(u, COVERAGE_FACTOR)),
+            "si:coverageProbabilityXMLList": _numbers(np.full_like(u, COVERAGE_PROBABILITY)),
         }
-        products = [" ".join(dsi_unit(unit, other) for other in units) for unit in units]
-        if len(units) == 1:
-            products *= n
-        columns = [
-            {"si:covarianceXMLList": {"si:valueXMLList": _numbers(c), "si:unitXMLList": unit}}
-            for c, unit in zip(covariance.T, products, strict=True)
-        ]
-        # The ellipsoid that holds all n values with this probability (JCGM 102:2011, 6.5.2).
-        factor = np.sqrt(chdtri(n, 1 - COVERAGE_PROBABILITY))
-        region = {
-            "si:covarianceMatrixXMLList": {"si:columnXMLList": columns},
-            "si:coverageFactorXMLList": _numbers(factor),
-            "si:coverageProbabilityXMLList": _numbers(COVERAGE_PROBABILITY),
-        }
+        region = _region(covariance, units)
         stated["si:measurementUncertaintyUnivariateXMLList"] = {"si:expandedMUXMLList": expanded}
         stated["si:measurementUncertaintyMultivariateXMLList"] = {
             "si:ellipsoidalRegionMUXMLList": region
@@ -162,59 +157,87 @@ def _listed(
     return {"name": _words(name), "si:realListXMLList": stated}
 
 
-def _values(of: Certificate) -> Tree:
-    scale = np.array([value.quantity.scale for value in of.values])
+def _region(covariance: FloatArray, units: Sequence[str]) -> Tree:
+    """Return a covariance matrix and the ellipsoid that it spans."""
+    n = len(covariance)
+    products = [" ".join(dsi_unit(unit, other) for other in units) for unit in units]
+    if len(units) == 1:
+        products *= n
+    columns = []
+    for column, unit in zip(covariance.T, products, strict=True):
+        listed = {"si:valueXMLList": _numbers(column), "si:unitXMLList": unit}
+        columns.append({"si:covarianceXMLList": listed})
+    # The ellipsoid that holds all n values with this probability (JCGM 102:2011, 6.5.2).
+    factor = np.sqrt(chdtri(n, 1 - COVERAGE_PROBABILITY))
+    return {
+        "si:covarianceMatrixXMLList": {"si:columnXMLList": columns},
+        "si:coverageFactorXMLList": _numbers(factor),
+        "si:coverageProbabilityXMLList": _numbers(COVERAGE_PROBABILITY),
+    }
+
+
+def _values(certificate: Certificate) -> Tree:
+    values = certificate.values
+    quantities = [value.quantity for value in values]
+    scale = np.array([quantity.scale for quantity in quantities])
     joint = _listed(
-        ", ".join(value.quantity.words for value in of.values),
-        np.array([value.value for value in of.values]) / scale,
-        [value.quantity.unit for value in of.values],
-        of.covariance / np.multiply.outer(scale, scale),
-        [value.quantity.name for value in of.values],
+        ", ".join(quantity.words for quantity in quantities),
+        np.array([value.value for value in values]) / scale,
+        [quantity.unit for quantity in quantities],
+        certificate.covariance / np.multiply.outer(scale, scale),
+        [quantity.name for quantity in quantities],
     )
     words = _words("Wavenumber up to which the scan determines G")
-    resolved = _real(of.apparatus.resolved_wavenumber / PER_MM, "rad/mm")
-    quantities = [joint, {"name": words, "si:real": resolved}]
-    return {"name": _words("Values"), "data": {"quantity": quantities}}
+    resolved = _real(certificate.apparatus.resolved_wavenumber / PER_MM, "rad/mm")
+    data = {"quantity": [joint, {"name": words, "si:real": resolved}]}
+    return {"name": _words("Values"), "data": data}
 
 
-def _profile(of: Certificate) -> Tree:
-    r, g = (DIMENSIONS[name] for name in ("length", "per area"))
-    radii = _listed("Radius r", of.profile.r / r.scale, [r.shown])
-    values = of.profile.g / g.scale
-    profile = _listed("G(r)", values, [g.shown], of.profile.covariance / g.scale**2)
-    data = {"list": {"quantity": [radii, profile]}}
+def _profile(certificate: Certificate) -> Tree:
+    r = DIMENSIONS["length"]
+    g = DIMENSIONS["per area"]
+    profile = certificate.profile
+    radii = _listed("Radius r", profile.r / r.scale, [r.shown])
+    values = _listed("G(r)", profile.g / g.scale, [g.shown], profile.covariance / g.scale**2)
+    data = {"list": {"quantity": [radii, values]}}
     return {"name": _words("Apparatus function G(r)"), "data": data}
 
 
-def _artifact(of: Certificate) -> Tree:
-    digest = f"Content digest of the artifact: {of.apparatus.content_digest}."
-    file = {
-        "description": _words(f"The artifact in its compact form. {digest}"),
-        "fileName": f"{of.number.replace('/', '-')}.apparatus.h5",
-        "mimeType": "application/x-hdf5",
-        "dataBase64": base64.b64encode(of.artifact).decode("ascii"),
-    }
-    absent = {"text": _words(f"{digest} It is too large to be held here.")}
-    return {"name": _words("Artifact"), "data": {"byteData": file} if of.artifact else absent}
+def _artifact(certificate: Certificate) -> Tree:
+    digest = f"Content digest of the artifact: {certificate.apparatus.content_digest}."
+    if not certificate.artifact:
+        data: Tree = {"text": _words(f"{digest} It is too large to be held here.")}
+    else:
+        file = {
+            "description": _words(f"The artifact in its compact form. {digest}"),
+            "fileName": f"{certificate.number.replace('/', '-')}.apparatus.h5",
+            "mimeType": "application/x-hdf5",
+            "dataBase64": base64.b64encode(certificate.artifact).decode("ascii"),
+        }
+        data = {"byteData": file}
+    return {"name": _words("Artifact"), "data": data}
 
 
-def _conformity(of: Certificate) -> list[Tree]:
+def _conformity(certificate: Certificate) -> list[Tree]:
     statements: list[Tree] = []
-    for item in of.conformity:
-        unit = item.of.quantity.unit
-        scale = item.of.quantity.scale
-        limits = {"Lower": item.lower, "Upper": item.upper}
-        sizes = {f"{k} tolerance limit": v for k, v in limits.items() if np.isfinite(v)}
-        sizes |= {"Guard band": item.guard_band}
-        named = [{"name": _words(k), "si:real": _real(v / scale, unit)} for k, v in sizes.items()]
-        p = {"name": _words("Conformance probability"), "si:real": _real(item.probability, "1")}
+    for item in certificate.conformity:
+        quantity = item.certified.quantity
+        numbers = {"Lower tolerance limit": item.lower, "Upper tolerance limit": item.upper}
+        numbers["Guard band"] = item.guard_band
+        shown = []
+        for name, number in numbers.items():
+            if np.isfinite(number):
+                real = _real(number / quantity.scale, quantity.unit)
+                shown.append({"name": _words(name), "si:real": real})
+        probability = _real(item.probability, "1")
+        shown.append({"name": _words("Conformance probability"), "si:real": probability})
         statements.append(
             {
-                "name": _words(f"Conformity of the {item.of.quantity.words}"),
+                "name": _words(f"Conformity of the {quantity.words}"),
                 "norm": "JCGM 106:2012",
-                "declaration": _words(f"Decision rule: {of.decision}"),
+                "declaration": _words(f"Decision rule: {certificate.decision}"),
                 "conformity": "pass" if item.accepted else "noPass",
-                "data": {"quantity": [*named, p]},
+                "data": {"quantity": shown},
             }
         )
     return statements

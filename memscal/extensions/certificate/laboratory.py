@@ -3,7 +3,7 @@
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 from difflib import get_close_matches
@@ -144,21 +144,25 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
 
 
 def missing_keys(
-    sections: Mapping[str, Mapping[str, Any]], equipment: tuple[Mapping[str, Any], ...]
+    sections: Mapping[str, Mapping[str, Any]], equipment: Sequence[Mapping[str, Any]]
 ) -> Iterator[str]:
     """Yield each key that a certificate needs and that is not stated, with its section."""
-    places = [(f"[{s}]", NEEDED[s], sections.get(s, {})) for s in NEEDED if s != "equipment"]
-    numbered = enumerate(equipment, 1)
-    places += [(f"[[equipment]] {i}", NEEDED["equipment"], item) for i, item in numbered]
-    for place, keys, stated in places:
-        for key in keys:
-            value = stated.get(key)
-            if value in (None, ""):
-                yield f"{place} {key}"
-            elif isinstance(value, Measured) and value.uncertainty is None:
-                yield f"{place} {key}.uncertainty"
+    for section in NEEDED:
+        if section != "equipment":
+            yield from _missing(f"[{section}]", section, sections.get(section, {}))
+    for i, item in enumerate(equipment, start=1):
+        yield from _missing(f"[[equipment]] {i}", "equipment", item)
     if not any(item.get("kind") == "load cell" for item in equipment):
         yield '[[equipment]] of kind = "load cell" (what gave the load)'
+
+
+def _missing(place: str, section: str, stated: Mapping[str, Any]) -> Iterator[str]:
+    for key in NEEDED[section]:
+        value = stated.get(key)
+        if value in (None, ""):
+            yield f"{place} {key}"
+        elif isinstance(value, Measured) and value.uncertainty is None:
+            yield f"{place} {key}.uncertainty"
 
 
 def _section(where: str, section: str, content: Any) -> dict[str, Any]:
@@ -185,31 +189,41 @@ def _value(where: str, kind: str, value: Any) -> Any:
         pattern, form = _FORMS[kind]
         if isinstance(value, str) and value.isprintable() and re.fullmatch(pattern, value):
             return value.strip()
-    elif kind in ("date", "time"):
-        form = "a date, 2026-11-20" + ", or a time, 2026-11-20T09:30:00+01:00" * (kind == "time")
-        if isinstance(value, date) and (kind == "time" or not isinstance(value, datetime)):
+    elif kind == "date":
+        form = "a date, 2026-11-20"
+        if isinstance(value, date) and not isinstance(value, datetime):
+            return value.isoformat()
+    elif kind == "time":
+        form = "a date, 2026-11-20, or a time, 2026-11-20T09:30:00+01:00"
+        if isinstance(value, date):
             return value.isoformat()
     elif kind == "number":
         form = "a number"
-        if isinstance(value, int | float) and math.isfinite(value) and not isinstance(value, bool):
+        if type(value) in (int, float) and math.isfinite(value):
             return float(value)
     elif kind == "limits":
-        limits = _section(where, kind, value)
         form = "limits, the lower below the upper"
-        ends = limits.get("lower", -math.inf), limits.get("upper", math.inf)
-        if ends[0] < ends[1] and ends != (-math.inf, math.inf):
+        limits = _section(where, kind, value)
+        lower = limits.get("lower", -math.inf)
+        upper = limits.get("upper", math.inf)
+        if lower < upper and (math.isfinite(lower) or math.isfinite(upper)):
             return limits
     else:
-        stated = _section(where, "quantity", value)
         form = "a value with its unit, u not negative"
-        spread = stated.get("uncertainty")
-        if {"value", "unit"} <= set(stated) and (spread is None or spread >= 0):
-            unit = stated["unit"]
-            zero = 0.0
-            if kind == "temperature" and unit in _CELSIUS:
-                unit = "K"
-                zero = ZERO_CELSIUS
-            number = float(to_si(stated["value"], unit, kind, where)) + zero
-            u = None if spread is None else float(to_si(spread, unit, kind, where))
-            return Measured(number, u)
+        stated = _section(where, "quantity", value)
+        if "value" in stated and "unit" in stated and stated.get("uncertainty", 0.0) >= 0:
+            return _measured(where, kind, **stated)
     raise FormatError(f"{where} is {value!r}, but should be {form}.")
+
+
+def _measured(
+    where: str, dimension: str, value: float, unit: str, uncertainty: float | None = None
+) -> Measured:
+    zero = 0.0
+    if dimension == "temperature" and unit in _CELSIUS:
+        unit = "K"
+        zero = ZERO_CELSIUS
+    number = float(to_si(value, unit, dimension, where)) + zero
+    if uncertainty is None:
+        return Measured(number, None)
+    return Measured(number, float(to_si(uncertainty, unit, dimension, where)))

@@ -5,6 +5,7 @@ import hashlib
 import warnings
 from collections.abc import Iterable, Mapping
 from datetime import datetime
+from functools import partial
 from html import escape
 from pathlib import Path
 from string import Template
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from memscal.apparatus import ApparatusFunction
 from memscal.errors import MemscalError
 from memscal.extensions.certificate.certificate import COVERAGE_FACTOR, SYNTHETIC, Certificate
 from memscal.extensions.certificate.laboratory import ZERO_CELSIUS
@@ -25,49 +27,52 @@ from memscal.summaries.declared import total_of
 from memscal.summaries.table import Table
 
 _PAGE = Path(__file__).with_name("certificate.html")
+#: Sources of a smaller share of every value, in percent, are left out of the budget.
+_LEAST_SHARE = 0.005
+_TOTAL = "root sum of squares"
 _FONTS = "'Liberation Sans', Arial, Helvetica, 'DejaVu Sans', sans-serif"
 
 
-def certificate_page(of: Certificate) -> str:
+def certificate_page(certificate: Certificate) -> str:
     """Return a certificate as a self-contained HTML page; what came from files is escaped."""
-    laboratory = of.sections["laboratory"]
-    person = of.sections["person"]
-    t, h = (of.sections["conditions"][key] for key in ("temperature", "humidity"))
-    keys = ("name", "serial", "certificate", "date")
-    heads = ("Instrument", "Serial number", "Certificate", "Date of certificate")
-    alt = "G(r) with its expanded uncertainty as a band; the numbers are in the table beside it."
-    caption = "G(r); band ± U (k = 2)."
+    sections = certificate.sections
+    laboratory = sections["laboratory"]
+    temperature = sections["conditions"]["temperature"]
+    humidity = sections["conditions"]["humidity"]
+    celsius = temperature.value - ZERO_CELSIUS
+    warnings = (f'<p class="note failed">{escape(text)}</p>' for text in certificate.warnings)
     texts = {
-        "number": of.number,
+        "number": certificate.number,
         "created": timestamp(),
-        "mark": SYNTHETIC if of.synthetic else "",
+        "mark": SYNTHETIC if certificate.synthetic else "",
         "laboratory_name": laboratory["name"],
         "laboratory_address": _address(laboratory),
-        "person_name": person["name"],
-        "person_role": person["role"],
-        "accreditation": of.accreditation,
-        "setting": _setting(of),
-        "origin": _origin(of),
-        "celsius": _expanded(t.value - ZERO_CELSIUS, t.uncertainty, 1.0, "°C"),
-        "humidity": _expanded(h.value, h.uncertainty, 0.01, "%"),
-        "sources": _sources(of),
-        "not_counted": _not_counted(of),
-        "resolved": f"{of.apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
+        "person_name": sections["person"]["name"],
+        "person_role": sections["person"]["role"],
+        "accreditation": certificate.accreditation,
+        "setting": _setting(certificate.apparatus),
+        "origin": _origin(certificate.apparatus),
+        "celsius": _expanded(celsius, temperature.uncertainty, 1.0, "°C"),
+        "humidity": _expanded(humidity.value, humidity.uncertainty, 0.01, "%"),
+        "sources": _sources(certificate.apparatus),
+        "not_counted": _not_counted(certificate.apparatus),
+        "resolved": f"{certificate.apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
     }
     blocks = {
         "fonts": _FONTS,
         "laboratory_css": "".join(map(_css, laboratory["name"])),
-        "warnings": "\n".join(f'<p class="note failed">{escape(text)}</p>' for text in of.warnings),
-        "facts": _facts(of),
-        "equipment": _table("", "", heads, [[i[key] for key in keys] for i in of.equipment]),
-        "values": _values(of),
-        "profile": _profile(of),
-        "figure": html_figures([Picture(lambda: radial_figure(of.apparatus), alt, caption)]),
-        "budget": _budget(of),
-        "conformity": _conformity(of),
+        "warnings": "\n".join(warnings),
+        "facts": _facts(certificate),
+        "equipment": _equipment(certificate),
+        "values": _values(certificate),
+        "profile": _profile(certificate),
+        "figure": _figure(certificate),
+        "budget": _budget(certificate),
+        "conformity": _conformity(certificate),
     }
     page = Template(_PAGE.read_text(encoding="utf-8"))
-    return page.substitute({name: escape(text) for name, text in texts.items()} | blocks)
+    escaped = {name: escape(text) for name, text in texts.items()}
+    return page.substitute(escaped | blocks)
 
 
 def _css(character: str) -> str:
@@ -76,21 +81,19 @@ def _css(character: str) -> str:
     return character if plain else f"\\{ord(character):x} "
 
 
-def _table(kind: str, title: str, head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    drawn = Table(title, tuple(head), [tuple(row) for row in rows]).html()
-    drawn = drawn.replace("<caption></caption>\n", "")
-    return drawn.replace("<table>", f'<table class="{kind}">', 1)
-
-
-def _address(of: Mapping[str, Any]) -> str:
-    place = " ".join(of[key] for key in ("post_code", "city") if key in of)
-    lines = (of.get("street"), f"{place}, {of['country']}", of.get("email"), of.get("phone"))
+def _address(contact: Mapping[str, str]) -> str:
+    city = " ".join(contact[key] for key in ("post_code", "city") if key in contact)
+    place = f"{city}, {contact['country']}"
+    lines = (contact.get("street"), place, contact.get("email"), contact.get("phone"))
     return " · ".join(line for line in lines if line)
 
 
-def _facts(of: Certificate) -> str:
-    sensor, customer, conditions = (of.sections[k] for k in ("sensor", "customer", "conditions"))
-    begin, end = (conditions[key][:10] for key in ("start_time", "end_time"))
+def _facts(certificate: Certificate) -> str:
+    sections = certificate.sections
+    sensor = sections["sensor"]
+    customer = sections["customer"]
+    begin = sections["conditions"]["start_time"][:10]
+    end = sections["conditions"]["end_time"][:10]
     rows = {
         "Object": f"MEMS stress sensor under an elastic film: {sensor['name']}",
         "Manufacturer": sensor["manufacturer"],
@@ -98,21 +101,31 @@ def _facts(of: Certificate) -> str:
         "Serial number": sensor["serial"],
         "Customer": f"{customer['name']}, {_address(customer)}",
         "Date of measurement": begin if end in ("", begin) else f"{begin} to {end}",
-        "Date of issue": of.issued,
-        "Measured by": of.sections["person"].get("operator", ""),
+        "Date of issue": certificate.issued,
+        "Measured by": sections["person"].get("operator", ""),
     }
-    return _table("facts", "", ("", ""), [row for row in rows.items() if row[1]])
+    return Table("", ("", ""), [row for row in rows.items() if row[1]]).html("facts")
 
 
-def _setting(of: Certificate) -> str:
-    data = of.apparatus
-    rod = data.indenter
-    film = data.film
-    each = data.reconvolution.load
-    facts = [f"{data.reconvolution.x.size} readings ({data.reading.unit})"]
-    if (loads := data.load if each is None else each) is not None:
-        low, high = (f"{extreme(loads):.4g}" for extreme in (np.min, np.max))
-        facts[0] += f" under a load of {low} N" if low == high else f", loads {low} to {high} N"
+def _equipment(certificate: Certificate) -> str:
+    heads = ("Instrument", "Serial number", "Certificate", "Date of certificate")
+    keys = ("name", "serial", "certificate", "date")
+    rows = [[item[key] for key in keys] for item in certificate.equipment]
+    return Table("", heads, rows).html()
+
+
+def _figure(certificate: Certificate) -> str:
+    alt = "G(r) with its expanded uncertainty as a band; the numbers are in the table beside it."
+    draw = partial(radial_figure, certificate.apparatus)
+    return html_figures([Picture(draw, alt, "G(r); band ± U (k = 2).")])
+
+
+def _setting(apparatus: ApparatusFunction) -> str:
+    """Say by what method, from which readings, and with which film and indenter."""
+    rod = apparatus.indenter
+    film = apparatus.film
+    readings = f"{apparatus.reconvolution.x.size} readings ({apparatus.reading.unit})"
+    facts = [readings + _loads(apparatus)]
     if rod is not None:
         facts.append(f"a {rod.shape} of radius {_expanded(rod.radius, rod.radius_uncertainty, MM)}")
     if film is not None:
@@ -123,23 +136,35 @@ def _setting(of: Certificate) -> str:
             f"a film of thickness {thickness}, Young's modulus {modulus}, Poisson's ratio {ratio}, "
             f"law {film.law or 'not stated'}"
         )
-    method = data.process.configuration.get("method", "not stated")
-    program = f"Program: memscal {data.process.version}."
+    method = apparatus.process.configuration.get("method", "not stated")
+    program = f"Program: memscal {apparatus.process.version}."
     return f"Method {method}, with {'; '.join(facts)} (± U, k = 2). {program}"
 
 
-def _sources(of: Certificate) -> str:
+def _loads(apparatus: ApparatusFunction) -> str:
+    """Return the load of all readings, or the range of their loads; nothing if none is known."""
+    loads: Any = apparatus.reconvolution.load
+    if loads is None:
+        loads = apparatus.load
+    if loads is None:
+        return ""
+    low = f"{np.min(loads):.4g}"
+    high = f"{np.max(loads):.4g}"
+    return f" under a load of {low} N" if low == high else f", loads {low} to {high} N"
+
+
+def _sources(apparatus: ApparatusFunction) -> str:
     """Name the sources that count."""
-    budget = of.apparatus.budget
-    shares = (share for of_value in budget.values() for share in of_value.items())
-    sources = dict.fromkeys(source for source, u in shares if u)
+    sources: dict[str, None] = {}
+    for budget in apparatus.budget.values():
+        sources |= dict.fromkeys(source for source, u in budget.items() if u)
     return ", ".join(source.replace("_", " ") for source in sources) or "no source that is named"
 
 
-def _not_counted(of: Certificate) -> str:
+def _not_counted(apparatus: ApparatusFunction) -> str:
     """Say what the uncertainties do not count, as the calibration said it."""
-    messages = of.apparatus.process.messages
-    return " ".join(m.text for m in messages if m.kind in ("film_law", "uncertainty_unstated"))
+    kinds = ("film_law", "uncertainty_unstated")
+    return " ".join(m.text for m in apparatus.process.messages if m.kind in kinds)
 
 
 def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> str:
@@ -147,85 +172,90 @@ def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> 
     return format_measured(value / scale, u and COVERAGE_FACTOR * u / scale, unit)
 
 
-def _origin(of: Certificate) -> str:
-    data = of.apparatus
-    source = of.apparatus.process.input_scan
+def _origin(apparatus: ApparatusFunction) -> str:
+    source = apparatus.process.input_scan
     scan = f" Scan {source.file_name}, SHA-256 {source.sha256}." if source else ""
-    checks = f"Quality checks of the calibration: {state_of_checks(data.checks)}."
-    return f"{checks} Artifact: content digest {data.content_digest}.{scan}"
+    checks = f"Quality checks of the calibration: {state_of_checks(apparatus.checks)}."
+    return f"{checks} Artifact: content digest {apparatus.content_digest}.{scan}"
 
 
-def _values(of: Certificate) -> str:
+def _values(certificate: Certificate) -> str:
+    count = len(certificate.values)
     rows = []
-    for i, (value, correlations) in enumerate(zip(of.values, of.correlation, strict=True)):
+    for i, value in enumerate(certificate.values):
         quantity = value.quantity
+        symbol = f", {quantity.symbol}" if quantity.symbol else ""
         share = 100 * value.expanded / abs(value.value) if value.value else np.inf
-        rows.append(
-            (
-                f"({i + 1}) {quantity.words}" + (f", {quantity.symbol}" if quantity.symbol else ""),
-                _expanded(value.value, value.uncertainty, quantity.scale, quantity.unit),
-                f"{share:.2g} %" if share < 99 else "–",
-                *(f"{round(r, 2) + 0:.2f}" for r in correlations[:i]),
-                *("1", *[""] * (len(of.values) - i - 1)),
-            )
-        )
-    numbers = [f"({i + 1})" for i in range(len(rows))]
+        row = [f"({i + 1}) {quantity.words}{symbol}"]
+        row.append(_expanded(value.value, value.uncertainty, quantity.scale, quantity.unit))
+        row.append(f"{share:.2g} %" if share < 99 else "–")
+        row += [f"{round(r, 2) + 0:.2f}" for r in certificate.correlation[i, :i]]
+        rows.append([*row, "1", *[""] * (count - i - 1)])
+    numbers = [f"({i + 1})" for i in range(count)]
     head = ("Quantity y", "y ± U (k = 2)", "U / y", *numbers)
     title = f"Right: correlation coefficients of the values {numbers[0]} to {numbers[-1]}"
-    return _table("numbers", title, head, rows)
+    return Table(title, head, rows).html("numbers")
 
 
-def _profile(of: Certificate) -> str:
-    expanded = COVERAGE_FACTOR * np.sqrt(np.diag(of.profile.covariance))
-    rows = [
-        (f"{r / MM:.4g}", format_measured(g / PER_MM2, u / PER_MM2))
-        for r, g, u in zip(of.profile.r, of.profile.g, expanded, strict=True)
-    ]
-    return _table("numbers", "", ("r in mm", "G(r) ± U in 1/mm² (k = 2)"), rows)
+def _profile(certificate: Certificate) -> str:
+    r, g, covariance = certificate.profile
+    expanded = COVERAGE_FACTOR * np.sqrt(np.diag(covariance))
+    rows = []
+    for radius, value, u in zip(r / MM, g / PER_MM2, expanded / PER_MM2, strict=True):
+        rows.append((f"{radius:.4g}", format_measured(value, u)))
+    return Table("", ("r in mm", "G(r) ± U in 1/mm² (k = 2)"), rows).html("numbers")
 
 
-def _budget(of: Certificate) -> str:
-    budget = of.apparatus.budget
-    finite = [value for value in of.values if np.isfinite(value.value) and value.value]
-    columns = [value for value in finite if value.quantity.name in budget]
-    sources = dict.fromkeys(s for value in columns for s in budget[value.quantity.name])
-    shares = {
-        source: [100 * budget[v.quantity.name].get(source, 0.0) / abs(v.value) for v in columns]
-        for source in sources
-    }
-    if not shares:
+def _budget(certificate: Certificate) -> str:
+    """Return shares of each source in percent of the values, those that matter, largest first."""
+    columns = {}
+    for i, value in enumerate(certificate.values, start=1):
+        budget = certificate.apparatus.budget.get(value.quantity.name)
+        if budget is not None and np.isfinite(value.value) and value.value:
+            percent = 100 / abs(value.value)
+            shares = {source: percent * u for source, u in budget.items()}
+            columns[f"({i})"] = {**shares, _TOTAL: percent * total_of(budget)}
+    rows: dict[str, list[float]] = {}
+    for column in columns.values():
+        for source in column:
+            rows[source] = [other.get(source, 0.0) for other in columns.values()]
+    total = rows.pop(_TOTAL, [])
+    if not rows:
         return "<p>The artifact states no budget by source.</p>"
-    largest = {source: max(map(abs, row)) for source, row in shares.items()}
-    order = sorted(sources, key=lambda source: -largest[source])
-    rows = {s.replace("_", " "): shares[s] for s in order if largest[s] >= 0.005}
-    totals = [100 * total_of(budget[v.quantity.name]) / abs(v.value) for v in columns]
-    rows["root sum of squares"] = totals
-    numbers = [f"({of.values.index(value) + 1})" for value in columns]
+    order = sorted(rows, key=lambda source: -max(map(abs, rows[source])))
+    shown = [source for source in order if max(map(abs, rows[source])) >= _LEAST_SHARE]
+    cells = [(source.replace("_", " "), *_two_decimals(rows[source])) for source in shown]
+    cells.append((_TOTAL, *_two_decimals(total)))
     title = "Standard uncertainties u (k = 1) by source, in percent of the value"
-    cells = [(source, *(f"{share:.2f}" for share in row)) for source, row in rows.items()]
-    return _table("numbers", title, ("Source", *numbers), cells)
+    return Table(title, ("Source", *columns), cells).html("numbers")
 
 
-def _conformity(of: Certificate) -> str:
-    if not of.conformity:
+def _two_decimals(numbers: Iterable[float]) -> list[str]:
+    return [f"{number:.2f}" for number in numbers]
+
+
+def _conformity(certificate: Certificate) -> str:
+    if not certificate.conformity:
         return "<p>No statement of conformity was agreed.</p>"
     rows = []
-    for item in of.conformity:
-        quantity = item.of.quantity
+    for item in certificate.conformity:
+        quantity = item.certified.quantity
         w = item.guard_band
-        p = 100 * item.probability
-        numbers = (item.of.value, item.lower, item.upper, item.lower + w, item.upper - w)
-        y, *ends = _alike([number / quantity.scale for number in numbers])
-        rows.append(
-            (
-                f"{quantity.words} in {quantity.unit}" if quantity.unit else quantity.words,
-                *(y, f"{ends[0]} to {ends[1]}", f"{ends[2]} to {ends[3]}"),
-                "above 99.99 %" if p > 99.99 else "below 0.01 %" if p < 0.01 else f"{p:.2f} %",
-                item.statement,
-            )
-        )
+        limits = (item.lower, item.upper, item.lower + w, item.upper - w)
+        numbers = [number / quantity.scale for number in (item.certified.value, *limits)]
+        y, lower, upper, lowest, highest = _alike(numbers)
+        name = f"{quantity.words} in {quantity.unit}" if quantity.unit else quantity.words
+        row = [name, y, f"{lower} to {upper}", f"{lowest} to {highest}"]
+        rows.append([*row, _percent(item.probability), item.statement])
     head = ("Quantity y", "y", "Tolerance", "Acceptance", "Conformance probability", "Statement")
-    return f"<p>Decision rule: {escape(of.decision)}</p>\n" + _table("", "", head, rows)
+    table = Table("", head, rows).html()
+    return f"<p>Decision rule: {escape(certificate.decision)}</p>\n{table}"
+
+
+def _percent(probability: float) -> str:
+    if probability > 0.9999:
+        return "above 99.99 %"
+    return f"{100 * probability:.2f} %" if probability >= 1e-4 else "below 0.01 %"
 
 
 def _alike(numbers: list[float]) -> list[str]:
@@ -236,7 +266,7 @@ def _alike(numbers: list[float]) -> list[str]:
     return [f"{n / scale:.5g}{factor}" if np.isfinite(n) else "no limit" for n in numbers]
 
 
-def certificate_pdf(of: Certificate, page: str, xml: bytes) -> bytes:
+def certificate_pdf(certificate: Certificate, page: str, xml: bytes) -> bytes:
     """Return the page as a tagged PDF/A-3 with the XML in it; nothing is fetched."""
     try:
         import weasyprint
@@ -247,7 +277,7 @@ def certificate_pdf(of: Certificate, page: str, xml: bytes) -> bytes:
     now = datetime.fromisoformat(timestamp())
     attachment = weasyprint.Attachment(
         string=xml,
-        name=f"{of.number}.xml",
+        name=f"{certificate.number}.xml",
         description="The same as a Digital Calibration Certificate",
         created=now,
         modified=now,
