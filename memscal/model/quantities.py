@@ -239,15 +239,18 @@ def declared_quantity(name: str) -> Quantity | None:
     return TRUTH[max(names, key=len)] if names else None
 
 
+def name_and_scan(name: str) -> tuple[str, str]:
+    """Return a parameter's name without the number of its scan, and that number if it has one."""
+    start, _, number = name.rpartition("_")
+    return (start, number) if start in ESTIMATED and number.isdigit() else (name, "")
+
+
 def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
     """Return how an estimated parameter is shown; one that is not known keeps its name."""
-    # A number at the end of a known name says which scan it belongs to.
-    start, _, number = name.rpartition("_")
-    if start in ESTIMATED and number.isdigit():
-        words = f"{ESTIMATED[start].words}, scan {number}"
-        declared = replace(ESTIMATED[start], name=name, words=words)
-    else:
-        declared = ESTIMATED.get(name) or Quantity(name, "SI units", name.replace("_", " "))
+    start, scan = name_and_scan(name)
+    declared = ESTIMATED.get(start) or Quantity(name, "SI units", name.replace("_", " "))
+    if scan:
+        declared = replace(declared, name=name, words=f"{declared.words}, scan {scan}")
     if not si_unit:
         return declared
     dimension = next((name for name, units in DIMENSIONS.items() if units.si == si_unit), si_unit)

@@ -12,7 +12,14 @@ from memscal.mechanics.contact import Contact
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.checks import REPEAT_CENTRES, Message
-from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
+from memscal.model.quantities import (
+    ESTIMATED,
+    MM,
+    PER_MM,
+    measured_text,
+    name_and_scan,
+    parameter_quantity,
+)
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries.declared import (
@@ -20,18 +27,18 @@ from memscal.summaries.declared import (
     correlated_parameters,
     members,
     parameter_json,
+    parameters_json,
     record_arrays,
 )
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
 Calibrated: TypeAlias = Calibration | ApparatusData
 
-_OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
+_BY_METHOD = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
 #: What scans tell of the film, where they do.
-_OF_FILM = ("film_laws", "free")
+_FILM = ("film_laws", "free")
 #: Checks that a G that is Gaussian passes.
-_OF_GAUSSIAN = ("gaussian_misfit", "width_agreement")
-_OF_G = "reconvolution"
+_GAUSSIAN = ("gaussian_misfit", "width_agreement")
 #: Reduced chi-squares of the Gaussian and of G(r) whose ratio is smaller are alike; where that of
 #: G(r) fails its check, too.
 _ALIKE = 1.1
@@ -41,56 +48,70 @@ _ALIKE_FAILED = 1.5
 def tables(result: Calibrated) -> list[Table]:
     """Return the estimates with their standard uncertainties, and the quality checks."""
     apparatus = apparatus_of(result)
-    messages = apparatus.process.messages
-    rows = estimate_rows(apparatus.parameters, apparatus.resolved_wavenumber, messages)
-    if method := _method(apparatus):
+    rows = estimate_rows(
+        apparatus.parameters, apparatus.resolved_wavenumber, apparatus.process.messages
+    )
+    method = _method(apparatus)
+    if method:
         rows.insert(-1, ("method", "", method))
     if isinstance(result, Calibration):
         misfit = result.solution.deconvolution.misfit
-        gaussian = result.solution.gaussian_misfit
         rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
+        gaussian = result.solution.gaussian_misfit
         rows.append(("reconvolution with the Gaussian", "", _misfit(gaussian)))
     title = f"{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
     shown = [Table(title, ("", "", ""), rows)]
-    if (other := apparatus.other) is not None:
+    other = apparatus.other
+    if other is not None:
         title = f"The same by method {other.method}, to compare"
-        shown.append(Table(title, ("", "", ""), _parameter_rows(other.parameters)))
+        rows = [_parameter_row(other.parameters, name) for name in other.parameters.names]
+        shown.append(Table(title, ("", "", ""), rows))
     return [*shown, checks_table(apparatus.checks)]
 
 
 def answer(result: Calibrated) -> str:
     """Return which A and which description of G to use, and why."""
     apparatus = apparatus_of(result)
-    parameters = apparatus.parameters
     method = _method(apparatus)
-    failed = [c.name for c in apparatus.checks if c.name in _OF_GAUSSIAN and not c.passed]
-    checks = {check.name: check for check in apparatus.checks}
-    alike = False
-    if failed == ["gaussian_misfit"] and (of_g := checks.get(_OF_G)) is not None:
-        ratio = _ALIKE if of_g.passed else _ALIKE_FAILED
-        alike = checks[failed[0]].value < ratio * of_g.value
-    which = (
-        f"Its Gaussian of σ = {measured_text(parameters, 'gaussian_sigma')} suffices: the scan "
-        "shows no departure."
-        if not failed
-        else "The Gaussian fails the check gaussian misfit, and G(r) explains the scan no better: "
-        "the noise is larger than stated, or the model does not hold."
-        if alike
-        else f"Use G(r), for the Gaussian fails the check {' and '.join(failed)}."
-    ).replace("_", " ")
     by = f" (method {method})" if method else ""
-    a = measured_text(parameters, "conversion_constant")
-    a = a.replace("(relative)", "(relative: the load is not known)")
-    return f"{_of_the_law(apparatus)}Use A = {a}{by}. {verdict(apparatus.checks)}\n{which}"
+    a = measured_text(apparatus.parameters, "conversion_constant")
+    if apparatus.reading.per == "relative":
+        a = a.replace("(relative)", "(relative: the load is not known)")
+    law = _dominating_law(apparatus)
+    use = f"Use A = {a}{by}. {verdict(apparatus.checks)}"
+    return f"{law}{use}\n{_which_g(apparatus)}"
 
 
-def _of_the_law(apparatus: ApparatusData) -> str:
+def _which_g(apparatus: ApparatusData) -> str:
+    """Say whether the Gaussian suffices, by the checks that a Gaussian G passes."""
+    checks = {check.name: check for check in apparatus.checks}
+    failed = [name for name, check in checks.items() if name in _GAUSSIAN and not check.passed]
+    if not failed:
+        sigma = measured_text(apparatus.parameters, "gaussian_sigma")
+        return f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
+    if failed == ["gaussian_misfit"] and "reconvolution" in checks:
+        g = checks["reconvolution"]
+        ratio = _ALIKE if g.passed else _ALIKE_FAILED
+        if checks["gaussian_misfit"].value < ratio * g.value:
+            return (
+                "The Gaussian fails the check gaussian misfit, and G(r) explains the scan no "
+                "better: the noise is larger than stated, or the model does not hold."
+            )
+    names = " and ".join(name.replace("_", " ") for name in failed)
+    return f"Use G(r), for the Gaussian fails the check {names}."
+
+
+def _dominating_law(apparatus: ApparatusData) -> str:
+    """Say where the film's law, if it is not stated, is most of the uncertainty."""
+    if apparatus.film is None or apparatus.film.law:
+        return ""
     dominated = []
     for symbol, name in (("A", "conversion_constant"), ("σ", "gaussian_sigma")):
         form = apparatus.budget.get(name, {}).get("model_form", 0.0)
-        if (share := (form / apparatus.parameters.uncertainty(name)) ** 2) > 0.5:
+        share = (form / apparatus.parameters.uncertainty(name)) ** 2
+        if share > 0.5:
             dominated.append(f"{share:.0%} of the variance of {symbol}")
-    if not dominated or apparatus.film is None or apparatus.film.law:
+    if not dominated:
         return ""
     return (
         "The film's law, which is not stated, dominates the uncertainty: it makes up "
@@ -105,14 +126,13 @@ def _method(apparatus: ApparatusData) -> str:
 def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
     parameters = apparatus.parameters
     other = apparatus.other
-    own = {name: parameter_json(parameters, name) for name in _OF_A_ROUTE if name in parameters}
-    estimates: dict[str, Any] = {_method(apparatus) or "chosen": own}
+    names = [name for name in _BY_METHOD if name in parameters]
+    estimates = {_method(apparatus) or "chosen": parameters_json(parameters, names)}
     if other is not None:
-        names = other.parameters.names
-        estimates[other.method] = {name: parameter_json(other.parameters, name) for name in names}
+        estimates[other.method] = parameters_json(other.parameters)
     if "conversion_constant_gaussian" in parameters:
-        names = ("conversion_constant_gaussian", "gaussian_sigma")
-        a, sigma = (parameter_json(parameters, name) for name in names)
+        a = parameter_json(parameters, "conversion_constant_gaussian")
+        sigma = parameter_json(parameters, "gaussian_sigma")
         estimates["gaussian"] = {"conversion_constant": a, "gaussian_sigma": sigma}
     return estimates
 
@@ -121,20 +141,21 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     """Return the object of ``calibrate --json``; its form is part of the contract."""
     apparatus = apparatus_of(result)
     parameters = apparatus.parameters
+    configuration = apparatus.process.configuration
     values: dict[str, Any] = {
         "schema_version": "1",
         "method": _method(apparatus) or None,
-        **{name: parameter_json(parameters, name) for name in parameters.names},
+        **parameters_json(parameters),
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
         "film_law": (apparatus.film and apparatus.film.law) or None,
     }
-    configuration = apparatus.process.configuration
     choice = configuration.get("centre")
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
-        values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
-    values |= {name: configuration[name] for name in _OF_FILM if name in configuration}
+        shown = list(parameters_json(parameters, centres).values())
+        values["centres"] = {**choice, "values": shown}
+    values |= {name: configuration[name] for name in _FILM if name in configuration}
     if isinstance(result, Calibration):
         misfit = result.solution.deconvolution.misfit
         gaussian = result.solution.gaussian_misfit
@@ -144,10 +165,9 @@ def mapping(result: Calibrated) -> dict[str, Any]:
             "chi2_reduced": finite(misfit.chi2_reduced),
             "gaussian_chi2_reduced": finite(gaussian.chi2_reduced),
         }
-    return values | {
-        "checks": checks_json(apparatus.checks),
-        "warnings": texts_of(apparatus.process.messages),
-    }
+    values["checks"] = checks_json(apparatus.checks)
+    values["warnings"] = texts_of(apparatus.process.messages)
+    return values
 
 
 def dataset(result: Calibrated) -> Dataset:
@@ -156,12 +176,12 @@ def dataset(result: Calibrated) -> Dataset:
 
     apparatus = apparatus_of(result)
     field = {"g": "field", "g_errors": "field_errors", "g_scatter": "field_scatter"}
-    of_scan = records.RECONVOLUTION.read_in(apparatus.reading)
+    reconvolution = records.RECONVOLUTION.read_in(apparatus.reading)
     return xarray.Dataset(
         record_arrays(records.RADIAL, apparatus.radial_profile)
         | record_arrays(records.RADIAL_COVARIANCE, apparatus.radial_profile)
         | record_arrays(records.TRANSFER, apparatus.transfer)
-        | record_arrays(of_scan, apparatus.reconvolution, {"x": "position"})
+        | record_arrays(reconvolution, apparatus.reconvolution, {"x": "position"})
         | record_arrays(records.FIELD, apparatus.field, field),
         attrs={"title": sensor_title(apparatus)},
     )
@@ -176,20 +196,23 @@ def estimate_rows(
     parameters: ParameterSet, resolved: float, messages: Sequence[Message]
 ) -> list[tuple[str, str, str]]:
     """Return words, symbol and value of each parameter and of the resolved wavenumber (rad/m)."""
-    rows = _parameter_rows(parameters)
-    if any(message.kind == REPEAT_CENTRES for message in messages):
-        # Of further repeats the centre is shown.
-        rows = [
-            (words.replace(", scan ", ", repeat "), symbol, value)
-            for words, symbol, value in rows
-            if ", scan " not in words or words.startswith("centre")
-        ]
+    repeats = any(message.kind == REPEAT_CENTRES for message in messages)
+    rows = []
+    for name in parameters.names:
+        start, number = name_and_scan(name)
+        words, symbol, value = _parameter_row(parameters, name)
+        if repeats and number:
+            # Of further repeats the centre is shown.
+            if start not in ("centre", "centre_y"):
+                continue
+            words = f"{ESTIMATED[start].words}, repeat {number}"
+        rows.append((words, symbol, value))
     return [*rows, ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")]
 
 
-def _parameter_rows(parameters: ParameterSet) -> list[tuple[str, str, str]]:
-    quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
-    return [(q.words, q.symbol, measured_text(parameters, name)) for name, q in quantities.items()]
+def _parameter_row(parameters: ParameterSet, name: str) -> tuple[str, str, str]:
+    quantity = parameter_quantity(parameters, name)
+    return quantity.words, quantity.symbol, measured_text(parameters, name)
 
 
 def sensor_title(apparatus: ApparatusData) -> str:

@@ -41,7 +41,8 @@ def mapping(contact: Contact) -> dict[str, Any]:
 
 def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str]]:
     """Return notes on depths beyond linear elasticity, and all warnings of the JSON object."""
-    notes = [Message("deep", text) for contact in contacts if (text := _deep(contact))]
+    texts = [_deep(contact) for contact in contacts]
+    notes = [Message("deep", text) for text in texts if text]
     singular = [_SINGULAR] if contacts[0].indenter.shape == "rod" else []
     return notes, [*singular, *(note.text for note in notes)]
 
@@ -108,10 +109,13 @@ def _numbers(name: str, contacts: Sequence[Contact], form: str = ".4g") -> dict[
 
 def _title(contact: Contact) -> str:
     film = contact.film
-    friction = "sticking" if math.isinf(contact.friction) else f"friction {contact.friction:.4g}"
-    friction = friction if contact.friction else "frictionless"
+    friction = "frictionless"
+    if contact.friction:
+        sticks = math.isinf(contact.friction)
+        friction = "sticking" if sticks else f"friction {contact.friction:.4g}"
     loading = f", {contact.loading} loading" if contact.loading and contact.friction else ""
-    interface = f"; interface: {text}" if (text := contact.interface.description) else ""
+    rough = contact.interface.description
+    interface = f"; interface: {rough}" if rough else ""
     strain = f", {contact.film_of_law.law_text}" if contact.strain == "finite" else ""
     return (
         f"{_name(contact)} on a film of {film.thickness / MM:.4g} mm, "

@@ -29,7 +29,7 @@ def total_of(budget: Mapping[str, float]) -> float:
 
 _UNCERTAINTY = "_uncertainty"
 #: Endings of names of what stands beside a quantity in JSON, in its unit, and as what.
-_BESIDE = {
+_COMPANIONS = {
     _UNCERTAINTY: "standard_uncertainty",
     "_errors": "standard_uncertainty",
     "_budget": "budget",
@@ -47,11 +47,12 @@ def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) ->
         key = quantity.label or name
         if quantity.dimension not in DIMENSIONS:
             held[key] = plain(_value(name, holder, values))
-        elif not name.endswith(tuple(_BESIDE)):
+        elif not name.endswith(tuple(_COMPANIONS)):
             held[key] = {"value": plain(_value(name, holder, values), quantity.scale)}
-            for ending, beside in _BESIDE.items():
-                if (other := name + ending) in declared:
-                    held[key][beside] = plain(_value(other, holder, values), quantity.scale)
+            for ending, companion in _COMPANIONS.items():
+                if name + ending in declared:
+                    number = _value(name + ending, holder, values)
+                    held[key][companion] = plain(number, quantity.scale)
             held[key]["unit"] = quantity.unit_text
     return held
 
@@ -80,26 +81,37 @@ def power_of_ten(values: FloatArray) -> int:
 def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
     """Return a parameter's value and standard uncertainty in the unit in which it is shown."""
     quantity = parameter_quantity(parameters, name)
-    numbers = (parameters[name], parameters.uncertainty(name))
-    value, u = (plain(number, quantity.scale) for number in numbers)
-    return {"value": value, "standard_uncertainty": u, "unit": quantity.unit_text}
+    return {
+        "value": plain(parameters[name], quantity.scale),
+        "standard_uncertainty": plain(parameters.uncertainty(name), quantity.scale),
+        "unit": quantity.unit_text,
+    }
+
+
+def parameters_json(
+    parameters: ParameterSet, names: Iterable[str] | None = None
+) -> dict[str, dict[str, Any]]:
+    """Return parameters as JSON by their names, by default all."""
+    chosen = parameters.names if names is None else names
+    return {name: parameter_json(parameters, name) for name in chosen}
 
 
 def cell(quantity: Quantity, holder: object, /, *, unit: str | None = None, **values: Any) -> str:
     """Return a number with its standard uncertainty as a cell of a table, in its unit or none."""
-    names = (quantity.name, quantity.name + _UNCERTAINTY)
-    value, u = (_value(name, holder, values) for name in names)
+    value = _value(quantity.name, holder, values) / quantity.scale
+    u = _value(quantity.name + _UNCERTAINTY, holder, values)
     spread = None if u is None else u / quantity.scale
-    return format_measured(value / quantity.scale, spread, quantity.unit if unit is None else unit)
+    return format_measured(value, spread, quantity.unit if unit is None else unit)
 
 
 def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
     """Return the quantities of an object by the names of their columns in a data frame."""
-    held = {quantity: _value(quantity.name, holder, values) for quantity in quantities}
-    return {
-        quantity.column: value / quantity.scale if quantity.dimension in DIMENSIONS else value
-        for quantity, value in held.items()
-    }
+    held = {}
+    for quantity in quantities:
+        value = _value(quantity.name, holder, values)
+        measured = quantity.dimension in DIMENSIONS
+        held[quantity.column] = value / quantity.scale if measured else value
+    return held
 
 
 def data_frame(quantities: Iterable[Quantity], values: Mapping[str, FloatArray]) -> DataFrame:

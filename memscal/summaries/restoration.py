@@ -25,6 +25,7 @@ _QUANTITIES = (
     Quantity("sigma_zz_calculated", "stress", "calculated normal stress", axes=("r",)),
 )
 _PROFILE = by_name(PROFILE.quantities)
+_FRICTIONLESS = "calculated without friction"
 _NUMBERS = ("force", "stress_on_axis", "centre", "centre_y", "baseline")
 
 
@@ -41,13 +42,13 @@ def _values(restored: Restoration) -> dict[str, Any]:
     return values
 
 
-def _determined(restored: Restoration) -> list[Quantity]:
+def _determined(restored: Restoration) -> dict[str, Quantity]:
     """Return the quantities of a restoration without centres that the scan does not determine."""
-    free = restored.points.free[0]
-    fixed = [name for i, name in enumerate(("centre", "centre_y")) if not free[i]]
-    hidden = {name + end for name in fixed for end in ("", "_uncertainty")}
-    of = restored.points.reading
-    return [quantity.read_in(of) for quantity in RESTORED if quantity.name not in hidden]
+    shown = {q.name: q.read_in(restored.points.reading) for q in RESTORED}
+    for name, free in zip(("centre", "centre_y"), restored.points.free[0], strict=True):
+        if not free:
+            del shown[name], shown[f"{name}_uncertainty"]
+    return shown
 
 
 def _errors(restored: Restoration) -> FloatArray:
@@ -57,18 +58,18 @@ def _errors(restored: Restoration) -> FloatArray:
 def mapping(restored: Restoration) -> dict[str, Any]:
     """Return the object of ``restore --json`` without its file; the contract fixes its form."""
     comparison = restored.comparison
-    names = ("r", "sigma_zz", "sigma_zz_errors")
-    errors = {"sigma_zz_errors": _errors(restored)}
+    calculated = None
+    if comparison is not None:
+        calculated = members(RESTORED_AGAINST, comparison, origin=_origin(comparison))
+    stress = [_PROFILE[name] for name in ("r", "sigma_zz", "sigma_zz_errors")]
     return {
-        **members(_determined(restored), restored, **_values(restored)),
+        **members(_determined(restored).values(), restored, **_values(restored)),
         "reconvolution": {
             "chi2_reduced": finite(restored.chi_square / restored.degrees),
             "degrees": finite(restored.degrees),
         },
-        "stress": members([_PROFILE[name] for name in names], restored, **errors),
-        "calculated": None
-        if comparison is None
-        else members(RESTORED_AGAINST, comparison, origin=_origin(comparison)),
+        "stress": members(stress, restored, sigma_zz_errors=_errors(restored)),
+        "calculated": calculated,
         "checks": checks_json(restored.checks),
         "warnings": texts_of(restored.messages),
     }
@@ -76,31 +77,38 @@ def mapping(restored: Restoration) -> dict[str, Any]:
 
 def answer(restored: Restoration) -> str:
     """Return stress on the axis and total force."""
-    shown = by_name(_determined(restored))
-    values = _values(restored)
-    axis, force = (declared.cell(shown[name], restored, **values) for name in _NUMBERS[1::-1])
+    cells = _cells(restored)
+    axis = cells["stress_on_axis"]
     return (
-        f"Stress on the axis {axis}; force {force} at {restored.scan.load:.4g} N.\n"
+        f"Stress on the axis {axis}; force {cells['force']} at {restored.scan.load:.4g} N.\n"
         f"{verdict(restored.checks)}"
     )
 
 
+def _cells(restored: Restoration) -> dict[str, str]:
+    """Return the numbers that the scan determines, with their uncertainties, by their names."""
+    values = _values(restored)
+    shown = _determined(restored)
+    names = [name for name in shown if name in _NUMBERS]
+    return {name: declared.cell(shown[name], restored, **values) for name in names}
+
+
 def tables(restored: Restoration) -> list[Table]:
     """Return the numbers, the stress at a few radii, and the quality checks."""
-    values = _values(restored)
-    shown = [quantity for quantity in _determined(restored) if quantity.name in _NUMBERS]
-    rows = [
-        ("load", f"{restored.scan.load:.4g} N"),
-        *((quantity.words, declared.cell(quantity, restored, **values)) for quantity in shown),
-        ("resolved up to the wavenumber", f"{restored.resolved_wavenumber / PER_MM:.3g} rad/mm"),
-        ("restored stress blurred again", f"χ²/ν = {restored.chi_square / restored.degrees:.3g}"),
-    ]
-    if (comparison := restored.comparison) is not None:
+    rows = [("load", f"{restored.scan.load:.4g} N")]
+    shown = _determined(restored)
+    rows += [(shown[name].words, cell) for name, cell in _cells(restored).items()]
+    resolved = restored.resolved_wavenumber / PER_MM
+    rows.append(("resolved up to the wavenumber", f"{resolved:.3g} rad/mm"))
+    misfit = restored.chi_square / restored.degrees
+    rows.append(("restored stress blurred again", f"χ²/ν = {misfit:.3g}"))
+    comparison = restored.comparison
+    if comparison is not None:
         origin = _origin(comparison)
-        within = comparison.within
         fit = f"χ²/ν = {comparison.chi_square:.3g}, p = {comparison.p_value:.2g}"
-        beside = f"within 95 % bounds at {within:.0%} of radii"
-        rows += [(f"{origin}, blurred", fit), (f"{origin}, beside the restored", beside)]
+        rows.append((f"{origin}, blurred", fit))
+        share = f"within 95 % bounds at {comparison.within:.0%} of radii"
+        rows.append((f"{origin}, beside the restored", share))
     film, indenter, *_ = restored.scan.set_up
     title = (
         f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
@@ -118,7 +126,9 @@ def _stress_table(restored: Restoration) -> Table:
     radii = radii[radii <= restored.r[-1]]
     stress = restored.stress(radii) / KPA
     errors = restored.stress_uncertainty(radii) / KPA
-    head = ["r (mm)", "restored"] + (["calculated"] if comparison is not None else [])
+    head = ["r (mm)", "restored"]
+    if comparison is not None:
+        head.append("calculated")
     rows = []
     for r, s, u in zip(radii, stress, errors, strict=True):
         row = [f"{r / MM:.4g}", format_measured(float(s), float(u), "kPa")]
@@ -131,7 +141,7 @@ def _stress_table(restored: Restoration) -> Table:
 def _origin(comparison: StressComparison) -> str:
     if isinstance(comparison.stress, Contact):
         friction = comparison.stress.friction
-        return f"calculated with{f' friction {friction:.4g}' if friction else 'out friction'}"
+        return f"calculated with friction {friction:.4g}" if friction else _FRICTIONLESS
     source = comparison.stress.source
     return "expected stress" if source is None else f"expected stress ({source.file_name})"
 
@@ -161,8 +171,7 @@ def frame(restored: Restoration) -> DataFrame:
 
 def correlated(restored: Restoration) -> dict[str, Any]:
     """Return force, stress on the axis, centre and baseline with their joint covariance."""
-    held = _values(restored) | {"force": restored.force, "baseline": restored.baseline}
-    shown = [quantity.name for quantity in _determined(restored) if quantity.name in _NUMBERS]
-    return declared.correlated_numbers(
-        shown, [held[name] for name in shown], restored.scalar_covariance
-    )
+    values = _values(restored) | {"force": restored.force, "baseline": restored.baseline}
+    names = [name for name in _determined(restored) if name in _NUMBERS]
+    numbers = [values[name] for name in names]
+    return declared.correlated_numbers(names, numbers, restored.scalar_covariance)

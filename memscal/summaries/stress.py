@@ -25,21 +25,20 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
     applied = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED]
     return {
         **declared.members(applied, stress, **_force_over_load(stress)),
-        "profiles": [
-            {
-                "scan": getattr(profile.scan.source, "file_name", None),
-                **declared.members(
-                    [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON],
-                    profile,
-                    **_centre(profile),
-                ),
-                "stress": declared.members(_POINTS_IN_JSON, profile),
-            }
-            for profile in stress.profiles
-        ],
+        "profiles": [_profile_json(profile) for profile in stress.profiles],
         "overridden": list(stress.overridden),
         "checks": checks_json(stress.checks),
         "warnings": texts_of(stress.messages),
+    }
+
+
+def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
+    source = profile.scan.source
+    numbers = [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON]
+    return {
+        "scan": None if source is None else source.file_name,
+        **declared.members(numbers, profile, **_centre(profile)),
+        "stress": declared.members(_POINTS_IN_JSON, profile),
     }
 
 
@@ -57,56 +56,65 @@ def _centre(profile: MeasuredProfile) -> dict[str, Any]:
 def answer(stress: MeasuredStress) -> str:
     """Return how large the stress is, and whether the force is the load."""
     profiles = stress.profiles
-    force = records.APPLIED[2]
     lightest = min(profiles, key=lambda profile: profile.load)
     strongest = max(profiles, key=lambda profile: profile.maximum)
-    texts = [
-        f"{declared.cell(_NUMBERS['maximum'], profile)} at {profile.load:.4g} N"
-        for profile in ([lightest, strongest] if strongest is not lightest else [lightest])
-    ]
+    maxima = _maximum(lightest)
+    if strongest is not lightest:
+        maxima += f", {_maximum(strongest)}"
     number = f"{len(profiles)} profile{'s' if len(profiles) > 1 else ''}"
-    ratio = declared.cell(force, stress, **_force_over_load(stress))
+    ratio = declared.cell(records.APPLIED[2], stress, **_force_over_load(stress))
     return (
-        f"S_zz up to {', '.join(texts)}.\n"
+        f"S_zz up to {maxima}.\n"
         f"{number}: total force over applied load {ratio}. {verdict(stress.checks)}"
     )
 
 
+def _maximum(profile: MeasuredProfile) -> str:
+    return f"{declared.cell(_NUMBERS['maximum'], profile)} at {profile.load:.4g} N"
+
+
 def tables(stress: MeasuredStress) -> list[Table]:
     """Return the profiles, what holds for all of them, and the quality checks that matter."""
-    load, *shown = (_NUMBERS[name] for name in ("load", "force", "maximum", "centre"))
-    head = ("", load.heading, "state", *(quantity.heading for quantity in shown), "checks")
+    kinds = ("applied_force", "applied_force_all")
+    # What checks all profiles, the force of each, and what failed.
+    shown = [check for check in stress.checks if check.kind in kinds or not check.passed]
+    return [_profiles_table(stress), _common_table(stress), checks_table(shown)]
+
+
+def _profiles_table(stress: MeasuredStress) -> Table:
+    quantities = [_NUMBERS[name] for name in ("force", "maximum", "centre")]
+    headings = [quantity.heading for quantity in quantities]
     rows = []
     marked = set()
     for i, profile in enumerate(stress.profiles):
-        number = str(i + 1)
-        failed = [c.kind for c in stress.checks if c.profile == number and not c.passed]
+        row = [str(i + 1), f"{profile.load:.4g}", profile.lubrication or "not stated"]
+        centre = _centre(profile)
+        row += [declared.cell(quantity, profile, unit="", **centre) for quantity in quantities]
+        checks = [check for check in stress.checks if check.profile == row[0]]
+        failed = [check.kind.replace("_", " ") for check in checks if not check.passed]
         if failed:
             marked.add(i)
-        names = ", ".join(name.replace("_", " ") for name in failed)
-        centre = _centre(profile)
-        cells = [declared.cell(quantity, profile, unit="", **centre) for quantity in shown]
-        state = profile.lubrication or "not stated"
-        checks = f"FAILED: {names}" if failed else "passed"
-        rows.append((number, f"{profile.load:.4g}", state, *cells, checks))
+        rows.append([*row, f"FAILED: {', '.join(failed)}" if failed else "passed"])
     film = stress.scans[0].film
     indenter = stress.scans[0].indenter
     title = (
         f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
         f"{indenter.shape} of radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
     )
-    # What checks all profiles, the force of each, and what failed.
-    kinds = ("applied_force", "applied_force_all")
-    checks_shown = [check for check in stress.checks if check.kind in kinds or not check.passed]
+    head = ("", _NUMBERS["load"].heading, "state", *headings, "checks")
+    return Table(title, head, rows, frozenset(marked), labels=3)
+
+
+def _common_table(stress: MeasuredStress) -> Table:
     ratio = _force_over_load(stress)
-    shown = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED[::2]]
-    numbers = [(q.words, declared.cell(q, stress, **ratio)) for q in shown]
+    rows = []
+    for quantity in records.APPLIED[::2]:
+        shown = quantity.read_in(stress.scans[0].reading)
+        rows.append((shown.words, declared.cell(shown, stress, **ratio)))
     points = sum(profile.r.size for profile in stress.profiles)
     farthest = max(float(profile.r[-1]) for profile in stress.profiles)
-    places = ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")
-    common = Table("All profiles", ("", ""), [*numbers, places])
-    profiles = Table(title, head, rows, frozenset(marked), labels=3)
-    return [profiles, common, checks_table(checks_shown)]
+    rows.append(("points", f"{points}, from the axis to {farthest / MM:.3g} mm"))
+    return Table("All profiles", ("", ""), rows)
 
 
 def dataset(stress: MeasuredStress) -> declared.Dataset:
@@ -128,16 +136,14 @@ def dataset(stress: MeasuredStress) -> declared.Dataset:
 def frame(stress: MeasuredStress) -> declared.DataFrame:
     """Return one row for each point, with the number, load and lubrication of its profile."""
     sizes = [profile.r.size for profile in stress.profiles]
-    values: dict[str, Any] = {
-        name: np.concatenate([getattr(profile, name) for profile in stress.profiles])
-        for name in _POINTS
-    }
-    values["profile"] = np.repeat(np.arange(1, len(sizes) + 1), sizes)
+    values: dict[str, Any] = {"profile": np.repeat(np.arange(1, len(sizes) + 1), sizes)}
+    for name in _POINTS:
+        values[name] = np.concatenate([getattr(profile, name) for profile in stress.profiles])
     for name in ("load", "lubrication"):
         values[name] = np.repeat([getattr(profile, name) for profile in stress.profiles], sizes)
-    names = ("load", "lubrication", *_POINTS)
     number = Quantity("profile", "number", "number of the profile")
-    return declared.data_frame((number, *(_QUANTITIES[name] for name in names)), values)
+    columns = [_QUANTITIES[name] for name in ("load", "lubrication", *_POINTS)]
+    return declared.data_frame((number, *columns), values)
 
 
 def correlated(stress: MeasuredStress) -> dict[str, Any]:
@@ -147,17 +153,17 @@ def correlated(stress: MeasuredStress) -> dict[str, Any]:
     values = []
     spread = []
     for i, profile in enumerate(stress.profiles, start=1):
-        numbers = {
-            "force": (profile.force, profile.force_uncertainty),
-            "maximum": (profile.maximum, profile.maximum_uncertainty),
-            "centre": (profile.centre[profile.axis], profile.centre_uncertainty[profile.axis]),
-            "baseline": (profile.baseline, profile.baseline_uncertainty),
-        }
-        names += [f"{name}_{i}" for name in numbers]
-        values += [float(value) for value, _ in numbers.values()]
-        spread += [float(u) for _, u in numbers.values()]
+        for name in ("force", "maximum", "centre", "baseline"):
+            value = getattr(profile, name)
+            u = getattr(profile, f"{name}_uncertainty")
+            if name == "centre":
+                value = value[profile.axis]
+                u = u[profile.axis]
+            names.append(f"{name}_{i}")
+            values.append(float(value))
+            spread.append(float(u))
     covariance = np.diag(np.square(spread))
-    forces = slice(0, None, len(names) // len(stress.profiles))
+    forces = slice(0, None, 4)
     for source in SHARED_SOURCES:
         shared = np.array([profile.force_budget.get(source, 0.0) for profile in stress.profiles])
         covariance[forces, forces] += np.outer(shared, shared) - np.diag(shared**2)

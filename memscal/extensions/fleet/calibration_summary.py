@@ -7,7 +7,7 @@ from memscal.extensions.fleet.many import FleetCalibration
 from memscal.model.quantities import parameter_quantity
 from memscal.model.records import TRANSFER
 from memscal.summaries.calibration import estimate_rows
-from memscal.summaries.declared import DataFrame, correlated_parameters, members, parameter_json
+from memscal.summaries.declared import DataFrame, correlated_parameters, members, parameters_json
 from memscal.summaries.table import Table, checks_json, checks_table, texts_of
 
 
@@ -25,7 +25,7 @@ def mapping(result: FleetCalibration) -> dict[str, Any]:
     values: dict[str, Any] = {"index": result.index, "passed": result.passed}
     if result.parameters is None or result.resolved_wavenumber is None:
         return values | {"error": str(result.error)}
-    estimates = {name: parameter_json(result.parameters, name) for name in result.parameters.names}
+    estimates = parameters_json(result.parameters)
     checks = checks_json(result.checks)
     warnings = texts_of(result.messages)
     resolved = members(TRANSFER.quantities[-1:], result)
