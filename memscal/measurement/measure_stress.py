@@ -42,18 +42,18 @@ _BLIND = (
 #: The restoration's check of the force is replaced by that of the profile.
 _REPLACED = "restored_force"
 #: Checks that compare the scatter with a stated noise.
-_OF_STATED_NOISE = ("noise_as_stated", "chi_square")
+_NOISE_CHECKS = ("noise_as_stated", "chi_square")
 
 
 def stress_checks(
     profiles: Sequence[MeasuredProfile], restored: Sequence[Sequence[QualityCheck]]
 ) -> tuple[QualityCheck, ...]:
     """Return each profile's checks (``restored``), numbered from one, then that of all."""
-    checks = [
-        replace(check, name=f"{check.name}_{i + 1}", meaning=f"{profile.label}: {check.meaning}")
-        for i, (profile, others) in enumerate(zip(profiles, restored, strict=True))
-        for check in (_force(profile), *others)
-    ]
+    checks = []
+    for number, (profile, others) in enumerate(zip(profiles, restored, strict=True), start=1):
+        for own in (_force(profile), *others):
+            meaning = f"{profile.label}: {own.meaning}"
+            checks.append(replace(own, name=f"{own.name}_{number}", meaning=meaning))
     if len(profiles) > 1:
         checks.append(check_of_all_forces(profiles))
     return tuple(checks)
@@ -67,9 +67,9 @@ def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
     scan = np.array([budget["scan"] for budget in budgets])
     weight = scan**-2 / np.sum(scan**-2)
     ratio = np.array([profile.force / profile.load for profile in profiles])
-    variance = float(np.sum((weight * scan) ** 2))
+    variance = np.sum((weight * scan) ** 2)
     for source in SHARED_SOURCES:
-        variance += float(weight @ [budget[source] for budget in budgets]) ** 2
+        variance += (weight @ [budget[source] for budget in budgets]) ** 2
     return float(weight @ ratio), math.sqrt(variance)
 
 
@@ -80,17 +80,19 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
-    allowed = float(np.linalg.norm([*_relative(profile).values(), restore.NEGLIGIBLE_FORCE]))
+    allowed = math.hypot(*_relative(profile).values(), restore.NEGLIGIBLE_FORCE)
     off = abs(profile.force / profile.load - 1) / allowed
-    return check(
-        "applied_force",
-        off,
-        restore.FORCE_LIMIT,
+    meaning = (
         f"Difference of the profile's total force, {profile.force:.4g} N, from the applied load of "
         f"{profile.load:.4g} N, over its standard uncertainty of {allowed * profile.load:.2g} N. "
-        + _FORCE,
-        float(erfc(off / math.sqrt(2))),
+        f"{_FORCE}"
     )
+    return check("applied_force", off, restore.FORCE_LIMIT, meaning, _two_sided(off))
+
+
+def _two_sided(off: float) -> float:
+    """Chance of a normal deviation of at least so many standard uncertainties."""
+    return float(erfc(off / math.sqrt(2)))
 
 
 def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
@@ -98,19 +100,17 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
     off = abs(mean - 1) / allowed
-    return check(
-        "applied_force_all",
-        off,
-        2.0,  # one check of all profiles together may be stricter than one for each
+    meaning = (
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
         f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
-        "difference from one is counted. " + _FORCE + _BLIND,
-        float(erfc(off / math.sqrt(2))),
+        f"difference from one is counted. {_FORCE}{_BLIND}"
     )
+    # One check of all profiles together may be stricter than one for each.
+    return check("applied_force_all", off, 2.0, meaning, _two_sided(off))
 
 
 #: Messages of a restoration that the measured stress gives itself.
-_OF_ALL_PROFILES = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NOISE_UNSTATED)
+_GIVEN_ONCE = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NOISE_UNSTATED)
 
 
 @reported
@@ -172,9 +172,9 @@ def measure_stress(
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     scans = opened_scans(scan, accept_altered=accept_altered)
     restore.require_covariance(sensor)
-    mismatches = (restore.accept_mismatches(data, sensor, override=override) for data in scans)
-    altered = accepted_alterations(sensor.source, *(data.source for data in scans))
-    overridden = (*altered, *chain(*mismatches))
+    overridden = accepted_alterations(sensor.source, *(data.source for data in scans))
+    for data in scans:
+        overridden += restore.accept_mismatches(data, sensor, override=override)
     for data in scans:
         require_span(data)
     origins = tuple(one_load.measured_scan(data) for data in scans)
@@ -184,11 +184,7 @@ def measure_stress(
         if single.u_zz_correlation is not None:
             why = "Their noise is correlated: of each load two matrices over them are kept."
             restore.require_contact_size(single, MOST_OF_CORRELATED_CONTACT, why)
-    loads = (
-        _measure(origin, single, sensor, signal)
-        for origin, of_scan in zip(origins, singles, strict=True)
-        for single, signal in zip(of_scan, one_load.contact_signals(of_scan, sensor), strict=True)
-    )
+    loads = _measured_loads(origins, singles, sensor)
     measured = counted(loads, "loads", sum(map(len, singles)))
     profiles, restored, notes = zip(*measured, strict=True)
     checks = stress_checks(profiles, restored)
@@ -198,9 +194,9 @@ def measure_stress(
         conversion_constant=sensor.conversion_constant,
         conversion_constant_uncertainty=sensor.parameters.uncertainty("conversion_constant"),
         checks=checks,
-        overridden=overridden,
+        overridden=tuple(overridden),
         process=Process.of_now(
-            configuration={"override": list(overridden)},
+            configuration={"override": overridden},
             messages=tuple(_messages(notes, sensor, checks, overridden)),
         ),
         artifact=sensor.source,
@@ -219,28 +215,28 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
             why="What is compared together shares one sensor and its calibration.",
             cure="Measure all of them with one artifact (memscal apply ARTIFACT SCAN...).",
         )
-    profiles = tuple(profile for stress in stresses for profile in stress.profiles)
+    profiles: list[MeasuredProfile] = []
+    checks = []
+    for stress in stresses:
+        for own in stress.checks:
+            if own.profile:
+                number = len(profiles) + int(own.profile)
+                checks.append(replace(own, name=f"{own.kind}_{number}"))
+        profiles += stress.profiles
     require_different(map(_contents, profiles))
-    starts = np.cumsum([0, *(len(stress.profiles) for stress in stresses)])
-    checks = [
-        replace(check, name=f"{check.kind}_{int(check.profile) + start}")
-        for stress, start in zip(stresses, starts, strict=False)
-        for check in stress.checks
-        if check.profile
-    ]
     # The checks, under their new numbers, state what failed.
     messages = []
     for stress in stresses:
         names = ", ".join(scan.source.file_name for scan in stress.scans if scan.source)
         place = names or f"{stress.profiles[0].label} and on"
-        others = (message for message in stress.messages if message.kind != quality.FAILED_CHECK)
+        others = [message for message in stress.messages if message.kind != quality.FAILED_CHECK]
         messages += [replace(message, text=f"{place}: {message.text}") for message in others]
     return replace(
         first,
-        profiles=profiles,
-        scans=tuple(scan for stress in stresses for scan in stress.scans),
+        profiles=tuple(profiles),
+        scans=tuple(chain(*(stress.scans for stress in stresses))),
         checks=(*checks, check_of_all_forces(profiles)),
-        overridden=tuple(text for stress in stresses for text in stress.overridden),
+        overridden=tuple(chain(*(stress.overridden for stress in stresses))),
         process=replace(first.process, messages=tuple(dict.fromkeys(messages))),
     )
 
@@ -252,6 +248,15 @@ def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
     arrays = (points.x, points.y, points.u) if points else (profile.r, profile.s_zz)
     named = f"{source.file_name}, {profile.label}" if source else profile.label
     return f"The profile of {named}", tuple(array.tobytes() for array in arrays)
+
+
+def _measured_loads(
+    origins: Sequence[MeasuredScan], singles: Sequence[Sequence[Scan]], sensor: ApparatusFunction
+) -> Iterator[tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]]:
+    for origin, loads in zip(origins, singles, strict=True):
+        signals = one_load.contact_signals(loads, sensor)
+        for single, signal in zip(loads, signals, strict=True):
+            yield _measure(origin, single, sensor, signal)
 
 
 def _measure(
@@ -266,11 +271,12 @@ def _measure(
         raise _placed(failure, scan) from failure
     one_load.require_ends(scan, signal, restored.centre)
     profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
-    estimated = scan.u_zz_errors is None
-    noise = profile.points["zz"].noise if estimated else None
-    left_out = {_REPLACED, *_OF_STATED_NOISE} if estimated else {_REPLACED}
-    checks = [check for check in restored.checks if check.name not in left_out]
-    return profile, checks, list(_of_profile(scan, restored, noise))
+    checks = [check for check in restored.checks if check.name != _REPLACED]
+    noise = None
+    if scan.u_zz_errors is None:
+        checks = [check for check in checks if check.name not in _NOISE_CHECKS]
+        noise = profile.points["zz"].noise
+    return profile, checks, list(_profile_messages(scan, restored, noise))
 
 
 def _prepared(
@@ -310,7 +316,9 @@ def _messages(
         yield replace(message, text=f"{place}{message.text}")
 
 
-def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> Iterator[Message]:
+def _profile_messages(
+    scan: Scan, restored: Restoration, noise: FloatArray | None
+) -> Iterator[Message]:
     """Yield the messages of one load; ``noise``: where it was estimated, in V."""
     if noise is not None:
         yield restore.noise_unstated_message(scan.reading.text(float(noise.min())))
@@ -322,5 +330,5 @@ def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> 
     if not scan.lubrication:
         yield Message("lubrication_unstated", "The scan does not state its lubrication.")
     for message in restored.messages:
-        if message.kind not in _OF_ALL_PROFILES:
+        if message.kind not in _GIVEN_ONCE:
             yield message

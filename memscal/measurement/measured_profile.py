@@ -10,6 +10,7 @@ only where the scan does not determine it.
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,21 +63,13 @@ class ContactSignal:
     by_load: FloatArray  # (2, n): derivative by the logarithm of the load, in V
     contact_radius: float  # in m, without friction
 
-    def slope(self, distance: FloatArray, sticking: float = 0.0) -> FloatArray:
-        """Derivative of the voltage (V) by the logarithm of the load; ``sticking`` from 0 to 1."""
-        between = (1 - sticking) * self.by_load[0] + sticking * self.by_load[1]
-        return np.asarray(np.interp(distance, self.r, between))
-
-    def sticking(self, distance: float, voltage: float) -> float:
-        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1."""
-        free, stuck = (float(np.interp(distance, self.r, curve)) for curve in self.voltage)
-        return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
-
 
 def contact_signals(loads: Sequence[Scan], apparatus: ApparatusFunction) -> list[ContactSignal]:
     """Calculate the contacts of a scan's nominal loads and near them, or raise a DomainError."""
-    groups = [loads[i : i + _AT_ONCE] for i in range(0, len(loads), _AT_ONCE)]
-    return [signal for group in groups for signal in _signals(group, apparatus)]
+    signals = []
+    for i in range(0, len(loads), _AT_ONCE):
+        signals += _signals(loads[i : i + _AT_ONCE], apparatus)
+    return signals
 
 
 def _signals(loads: Sequence[Scan], apparatus: ApparatusFunction) -> list[ContactSignal]:
@@ -85,7 +78,7 @@ def _signals(loads: Sequence[Scan], apparatus: ApparatusFunction) -> list[Contac
     except (DomainError, ConvergenceError) as failure:
         if len(loads) > 1:
             # Each by itself shows which of them fails.
-            return [signal for scan in loads for signal in _signals([scan], apparatus)]
+            return [_signals([scan], apparatus)[0] for scan in loads]
         if isinstance(failure, ConvergenceError):
             raise
         raise DomainError(
@@ -101,16 +94,20 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
     # larger by up to 40 % on the axis.  A lubricated contact, and a rod's, is frictionless.
     scan = loads[0]
     near = np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
-    slides = scan.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
-    targets, places = np.unique(np.outer([s.stated_load for s in loads], near), return_inverse=True)
-    paths = [_path(scan, targets, mu) for mu in ((0.0,) if slides else (0.0, math.inf))]
+    nominal = [single.stated_load for single in loads]
+    targets, places = np.unique(np.outer(nominal, near), return_inverse=True)
+    paths = [_path(scan, targets, 0.0)]
+    if scan.lubrication != "lubricated" and not isinstance(scan.indenter, Rod):
+        paths.append(_path(scan, targets, math.inf))
     signals = []
     for single, three in zip(loads, places.reshape(-1, near.size), strict=True):
-        width = float(np.hypot(np.ptp(single.x), 0.0 if single.y is None else np.ptp(single.y)))
+        width = _width(single)
         r = np.linspace(0.0, 1.5 * width, _DISTANCES)
         nodes = Wavenumbers.covering(_LARGEST_KH / scan.set_up.film.thickness, 3 * width)
-        through = apparatus.conversion_constant * sensor_transfer(apparatus, nodes.k)
-        spectra = [through * path[i].base_spectrum(nodes.k) for path in paths for i in three]
+        transfer = apparatus.conversion_constant * sensor_transfer(apparatus, nodes.k)
+        spectra = []
+        for path in paths:
+            spectra += [transfer * path[i].base_spectrum(nodes.k) for i in three]
         voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, near.size, r.size)
         # Without friction both are the frictionless contact.
         below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
@@ -119,16 +116,19 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
     return signals
 
 
+def _width(scan: Scan) -> float:
+    """Width of a line, or diagonal of a raster, in m."""
+    return float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y)))
+
+
 def _path(scan: Scan, loads: FloatArray, friction: float) -> Sequence[Contact]:
     film = scan.set_up.film
     indenter = scan.set_up.indenter
     if isinstance(indenter, Rod):
         return indent(film, indenter, load=loads, friction=friction, strain="linear")
-    law = Interface()
-    goals = tuple(map(Load, loads.tolist()))
-    request = RingRequest(
-        film, indenter, law, goals, friction, "incremental", "hankel", None, _RINGS, compared=False
-    )
+    targets = tuple(map(Load, loads.tolist()))
+    how = ("incremental", "hankel", None, _RINGS)
+    request = RingRequest(film, indenter, Interface(), targets, friction, *how, compared=False)
     return solve_on_rings(request)
 
 
@@ -162,13 +162,14 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
 
 def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     """Refuse a scan whose profile exceeds 5 % at its ends: its baseline is undetermined."""
-    measured = np.isfinite(scan.u_zz)
     if scan.y is None:
-        x = scan.x[measured.reshape(-1, scan.x.size).any(axis=0)]
-        axes = [(x, centre[0 if scan.direction == "x" else 1])]
+        measured = np.isfinite(scan.u_zz).reshape(-1, scan.x.size).any(axis=0)
+        axes = [(scan.x[measured], centre[0 if scan.direction == "x" else 1])]
     else:
         axes = [(scan.x, centre[0]), (scan.y, centre[1])]
-    ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
+    ends: list[float] = []
+    for axis, middle in axes:
+        ends += np.abs([axis.min() - middle, axis.max() - middle]).tolist()
     calculated = signal.voltage[0]
     left = float(np.interp(ends, signal.r, calculated).max() / calculated.max())
     if left > _LARGEST_END:
@@ -225,65 +226,81 @@ class PreparedScan:
 
 
 def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
-    """Bring every point to its nominal load."""
+    """Bring every point to its nominal load; points without a load are missing."""
     # From P_i to P by -dU/d ln P ln(P_i/P); the variance is n_i^2 + (dU/d ln P u(P_i)/P)^2.
     stated = np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
-    prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), stated)
     if scan.normal_load is None:
-        return prepared
-    # Centre and noise are estimated twice, the second time from the first one's scan.
+        return PreparedScan(scan, stated)
+    excess = np.log(scan.normal_load / scan.stated_load)
+    nominal = replace(scan, normal_load=None, normal_load_errors=None)
     errors = scan.normal_load_errors
-    (x, y) = scan.positions
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.stated_load
+    x, y = scan.positions
+    prepared = PreparedScan(replace(nominal, u_zz=scan.u_zz - 0.0 * excess), stated)
+    # Centre and noise are estimated twice, the second time from the first one's scan.
     for find in (_found_quickly, _found):
         level = prepared.scan
         found = find(level, apparatus, measured_points(level))
-        # How far the voltage nearest to the axis is on the way to a contact that sticks.
-        nearest = int(np.argmin(found.distance))
-        sticking = signal.sticking(float(found.distance[nearest]), float(found.signal[nearest]))
-        slope = signal.slope(np.hypot(x - found.centre[0], y - found.centre[1]), sticking)
-        of_load = np.abs(slope) * load_share
+        distance = np.hypot(x - found.centre[0], y - found.centre[1])
+        slope = np.interp(distance, signal.r, _slope(signal, found))
+        load_noise = np.abs(slope) * load_share
         electronic = stated
-        if scan.u_zz_errors is None and of_load.any():
-            noise = _noise_of_load(found, of_load[np.isfinite(level.u_zz)])
+        if scan.u_zz_errors is None and load_noise.any():
+            noise = _electronic_noise(found, load_noise[np.isfinite(level.u_zz)])
             electronic = np.full_like(slope, noise)
-        level = _with_noise(_at_nominal(scan, slope), electronic, of_load)
+        level = replace(nominal, u_zz=scan.u_zz - slope * excess)
+        level = _with_noise(level, electronic, load_noise)
         prepared = PreparedScan(level, electronic, found.estimate)
     return prepared
 
 
-def _at_nominal(scan: Scan, slope: FloatArray) -> Scan:
-    """Return the scan at its nominal load; points without a load are missing."""
-    if scan.normal_load is None:
-        return scan
-    shift = slope * np.log(scan.normal_load / scan.stated_load)
-    return replace(scan, u_zz=scan.u_zz - shift, normal_load=None, normal_load_errors=None)
+def _slope(signal: ContactSignal, found: _Found) -> FloatArray:
+    """Derivative of the voltage by ln of the load, in V, between no friction and full stick."""
+    # As far as the voltage nearest to the axis is from the one to the other.
+    nearest = np.argmin(found.distance)
+    free, stuck = (np.interp(found.distance[nearest], signal.r, u) for u in signal.voltage)
+    sticking = 0.0
+    if stuck > free:
+        sticking = min(max((found.signal[nearest] - free) / (stuck - free), 0.0), 1.0)
+    return np.asarray((1 - sticking) * signal.by_load[0] + sticking * signal.by_load[1])
 
 
-def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan:
-    if not of_load.any():
+def _with_noise(scan: Scan, electronic: FloatArray, load_noise: FloatArray) -> Scan:
+    if not load_noise.any():
         return scan
-    total = np.hypot(electronic, of_load)
+    total = np.hypot(electronic, load_noise)
     correlation = scan.u_zz_correlation
     if correlation is not None:
         # The scatter of the loads is independent: it takes its share from the correlation.
-        flat = total.reshape(-1, correlation.shape[0])
-        ours = electronic.reshape(flat.shape)
-        share = np.sqrt(np.nanmean(ours**2, axis=0) / np.nanmean(flat**2, axis=0))
-        correlation = scaled(correlation, share)
+        shape = (-1, correlation.shape[0])
+        electronic_variance = np.nanmean(electronic.reshape(shape) ** 2, axis=0)
+        share = np.sqrt(electronic_variance / np.nanmean(total.reshape(shape) ** 2, axis=0))
+        correlation = _scaled(correlation, share)
     return replace(scan, u_zz_errors=total, u_zz_correlation=correlation)
 
 
-def _noise_of_load(found: _Found, of_load: FloatArray) -> float:
+def _scaled(correlation: FloatArray, factors: FloatArray) -> FloatArray:
+    """Multiply the correlation of each pair of points by a factor (n,) of both."""
+    if not is_banded(correlation):
+        product = correlation * np.outer(factors, factors)
+        np.fill_diagonal(product, 1.0)
+        return product
+    product = correlation.copy()
+    for j in range(1, correlation.shape[1]):
+        product[:-j, j] *= factors[:-j] * factors[j:]
+    return product
+
+
+def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
     """Noise beside that of the loads, by maximum likelihood of the residuals."""
-    count = found.residual.size
     residual = found.residual
+    count = residual.size
     # The fitted parameters lower the scatter of the residuals.
     square = found.weight * residual**2 * count / max(count - found.parameters, 1)
-    scatter = 1.4826 * float(np.median(np.abs(residual)))
-    largest = float(np.abs(found.signal).max())
+    scatter = 1.4826 * np.median(np.abs(residual))
+    largest = np.abs(found.signal).max()
     tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * largest)
-    variance = tried[:, None] ** 2 + of_load**2
+    variance = tried[:, None] ** 2 + load_noise**2
     return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
 
 
@@ -294,7 +311,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         indenter=scan.set_up.indenter,
         sensor=scan.sensor,
         load_cell=scan.load_cell,
-        width=float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y))),
+        width=_width(scan),
         lubrication=scan.lubrication,
         position_scale_uncertainty=scan.position_scale_uncertainty,
         synthetic=bool(scan.synthetic),
@@ -312,27 +329,24 @@ def measured_profile(
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
     a = restored.apparatus.conversion_constant
-    estimate = restored.posterior.estimate
-    noise = restored.noise / np.sqrt(estimate.outlier_weight)
+    posterior = restored.posterior
+    noise = restored.noise / np.sqrt(posterior.estimate.outlier_weight)
     average, x, y = _averaging(restored, noise)
-    drift = restored.posterior.state[restored.posterior.nodes + int(restored.points.free.sum()) :]
-    level = average @ (restored.points.u - estimate.model.drift_columns @ drift)
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
+    background = posterior.estimate.model.drift_columns @ posterior.drift
+    s_zz = (average @ (restored.points.u - background))[order] / a
     average = average[order]
-    s_zz = level[order] / a
-    relative = restored.apparatus.parameters.uncertainty("conversion_constant") / a
-    if (factor := restored.points.decorrelation) is None:
-        of_noise = np.sqrt(average.power(2) @ noise**2)
+    decorrelation = restored.points.decorrelation
+    if decorrelation is None:
+        noise_root = np.sqrt(average.power(2) @ noise**2)
     else:
         # Of repeats there are more columns than positions.
-        correlated = noise[:, None] * factor.correlate(np.eye(noise.size))
-        of_noise = np.linalg.qr((average @ correlated).T)[1].T
-    roots = {
-        "noise": of_noise / a,
-        "conversion_constant": relative * s_zz[:, None],
-        **_of_place(restored, average),
-    }
+        correlated = noise[:, None] * decorrelation.correlate(np.eye(noise.size))
+        noise_root = np.linalg.qr((average @ correlated).T)[1].T
+    share = restored.apparatus.parameters.uncertainty("conversion_constant") / a
+    roots = {"noise": noise_root / a, "conversion_constant": share * s_zz[:, None]}
+    roots |= _place_roots(restored, average)
     maximum, budget = _on_axis(restored)
     curve_r = np.linspace(0.0, float(r[order][-1]), 301)
     return MeasuredProfile(
@@ -365,18 +379,18 @@ def _points(scan: Scan, noise: FloatArray, restored: Restoration) -> Mapping[str
     if not noise.any():
         # Only the electronic noise scatters: it is that of the restoration.
         noise = np.full_like(noise, restored.noise.min())
-    points = {"zz": _of_channel(scan, normal, noise[measured_mask(scan)], weight)}
-    for channel in (name for name in TANGENTIAL if f"u_{name}" in scan.channels):
-        try:
-            shear = measured_points(scan, channel)
-        except (InputError, FitError):
+    points = {"zz": _channel_points(scan, normal, noise[measured_mask(scan)], weight)}
+    for channel in TANGENTIAL:
+        if f"u_{channel}" in scan.channels:
             # The normal stress does not need it; a comparison of the shear states what is missing.
-            continue
-        points[channel] = _of_channel(scan, shear, shear.u_errors, np.ones_like(shear.u))
+            with suppress(InputError, FitError):
+                shear = measured_points(scan, channel)
+                ones = np.ones_like(shear.u)
+                points[channel] = _channel_points(scan, shear, shear.u_errors, ones)
     return points
 
 
-def _of_channel(
+def _channel_points(
     scan: Scan, points: ScanPoints, noise: FloatArray | None, weight: FloatArray
 ) -> MeasuredPoints:
     load_errors = np.zeros_like(points.u)
@@ -404,29 +418,30 @@ def _averaging(restored: Restoration, noise: FloatArray) -> tuple[Any, FloatArra
     from scipy.sparse import csr_array
 
     places = np.stack([restored.points.x, restored.points.y])
-    unique, back = np.unique(places, axis=1, return_inverse=True)
-    share = noise**-2 / np.bincount(back := back.ravel(), noise**-2)[back]
-    return csr_array((share, (back, np.arange(noise.size)))), unique[0], unique[1]
+    (x, y), place = np.unique(places, axis=1, return_inverse=True)
+    place = place.ravel()
+    share = noise**-2 / np.bincount(place, noise**-2)[place]
+    return csr_array((share, (place, np.arange(noise.size)))), x, y
 
 
-def _of_place(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
+def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
     """Roots of the covariance that centre, baseline and drift bring, shared out without a rest."""
-    model = restored.posterior.estimate.model
     posterior = restored.posterior
+    model = posterior.estimate.model
     nodes = posterior.nodes
-    free = restored.points.free
-    geometry = model.geometry(np.atleast_2d(restored.centre))
     film = film_transfer(restored.scan, model.reference.wavenumbers)
     pressure = posterior.state[:nodes] / restored.scan.stated_load / film
-    columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
-    columns = [average @ column / restored.apparatus.conversion_constant for column in columns]
-    sigma = posterior.covariance[nodes:, nodes:]
-    n = int(free.sum())
-    carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
-    of_centre = columns[0] + columns[1] @ carried.T
+    a = restored.apparatus.conversion_constant
+    geometry = model.geometry(np.atleast_2d(restored.centre))
+    by_centre = average @ model.centre_derivative(geometry, pressure) / a
+    by_drift = average @ model.drift_columns / a
+    covariance = posterior.covariance[nodes:, nodes:]
+    n = by_centre.shape[1]
+    carried = np.linalg.solve(covariance[:n, :n], covariance[:n, n:])
+    left = covariance[n:, n:] - covariance[n:, :n] @ carried
     return {
-        "centre": of_centre @ square_root(sigma[:n, :n]),
-        "baseline": columns[1] @ square_root(sigma[n:, n:] - sigma[n:, :n] @ carried),
+        "centre": (by_centre + by_drift @ carried.T) @ square_root(covariance[:n, :n]),
+        "baseline": by_drift @ square_root(left),
     }
 
 
@@ -441,32 +456,23 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     transfer = sensor_transfer(apparatus, k)
     row = on_axis * transfer
     state = posterior.state[:nodes]
-    maximum = float(row @ state)
-    a = apparatus.conversion_constant
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
-    shared = shared_changes(apparatus, [restored.scan], np.append(k, 0.0))
-    of_film = [shared.get(name, np.zeros(k.size + 1)) for name in posterior.film_inputs]
-    of_kernel = {
-        "apparatus": apparatus_changes(apparatus, np.append(k, 0.0), shared),
-        "film": np.reshape(of_film, (-1, k.size + 1)).T,
-        **({"load": shared["load"][:, None]} if "load" in shared else {}),
+    k_and_zero = np.append(k, 0.0)
+    shared = shared_changes(apparatus, [restored.scan], k_and_zero)
+    none = np.zeros_like(k_and_zero)
+    film = [shared.get(name, none) for name in posterior.film_inputs]
+    kernel_changes = {
+        "apparatus": apparatus_changes(apparatus, k_and_zero, shared),
+        "film": np.reshape(film, (-1, none.size)).T,
     }
-    for source, change in of_kernel.items():
+    if "load" in shared:
+        kernel_changes["load"] = shared["load"][:, None]
+    for source, change in kernel_changes.items():
         # G = (A G)/A: its own change beside that of what was restored with it.
-        of_g = (change[:-1] - transfer[:, None] * change[-1]) / a
+        of_g = (change[:-1] - transfer[:, None] * change[-1]) / apparatus.conversion_constant
         changes[source] = changes[source] + on_axis * state @ of_g
-    budget = {source: float(np.linalg.norm(change)) for source, change in changes.items()}
-    noise = float(row @ posterior.covariances["scan"][:nodes, :nodes] @ row)
-    return maximum, {"noise": float(np.sqrt(max(noise, 0.0))), **budget}
-
-
-def scaled(correlation: FloatArray, factors: FloatArray) -> FloatArray:
-    """Multiply the correlation of each pair of points by a factor (n,) of both."""
-    if not is_banded(correlation):
-        product = correlation * np.outer(factors, factors)
-        np.fill_diagonal(product, 1.0)
-        return product
-    product = correlation.copy()
-    for j in range(1, correlation.shape[1]):
-        product[:-j, j] *= factors[:-j] * factors[j:]
-    return product
+    variance = row @ posterior.covariances["scan"][:nodes, :nodes] @ row
+    budget = {"noise": float(np.sqrt(max(variance, 0.0)))}
+    for source, change in changes.items():
+        budget[source] = float(np.linalg.norm(change))
+    return float(row @ state), budget

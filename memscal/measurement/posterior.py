@@ -307,6 +307,11 @@ class Posterior:
         """How many entries of the state are the transform."""
         return self.estimate.model.k.size
 
+    @property
+    def drift(self) -> FloatArray:
+        """Baseline and drift, in V, that the drift's columns belong to."""
+        return self.state[self.nodes + int(self.estimate.points.free.sum()) :]
+
 
 def reach_of(points: ScanPoints) -> float:
     """Return the radius out to which a scan's stress is computed, in m."""
