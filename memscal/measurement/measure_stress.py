@@ -264,11 +264,16 @@ def _measure(
 ) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
     """Return the profile of a scan of one load, with checks and messages of its restoration."""
     one_load.require_points(scan, signal)
-    prepared = _prepared(scan, sensor, signal)
     try:
+        prepared = one_load.prepared_scan(scan, sensor, signal)
         restored = restore.restore_known(prepared.scan, sensor, start=prepared.estimate)
     except (FitError, InputError) as failure:
-        raise _placed(failure, scan) from failure
+        # A scan that is too short fails here already, and in less plain words.
+        if scan.y is None:
+            top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
+            one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
+        problem = f"{restore.load_of(scan)}: {failure.problem}"
+        raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
     one_load.require_ends(scan, signal, restored.centre)
     profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
     checks = [check for check in restored.checks if check.name != _REPLACED]
@@ -277,24 +282,6 @@ def _measure(
         checks = [check for check in checks if check.name not in _NOISE_CHECKS]
         noise = profile.points["zz"].noise
     return profile, checks, list(_profile_messages(scan, restored, noise))
-
-
-def _prepared(
-    scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
-) -> one_load.PreparedScan:
-    try:
-        return one_load.prepared_scan(scan, sensor, signal)
-    except (FitError, InputError) as failure:
-        # A scan that is too short fails here already, and in less plain words.
-        if scan.y is None:
-            top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-            one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
-        raise _placed(failure, scan) from failure
-
-
-def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
-    problem = f"{restore.load_of(scan)}: {failure.problem}"
-    return type(failure)(problem, why=failure.why, cure=failure.cure)
 
 
 def _messages(

@@ -429,8 +429,8 @@ def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray
     posterior = restored.posterior
     model = posterior.estimate.model
     nodes = posterior.nodes
-    film = film_transfer(restored.scan, model.reference.wavenumbers)
-    pressure = posterior.state[:nodes] / restored.scan.stated_load / film
+    film = film_transfer(restored.scan.set_up.expected, model.reference.wavenumbers)
+    pressure = posterior.stress / restored.scan.stated_load / film
     a = restored.apparatus.conversion_constant
     geometry = model.geometry(np.atleast_2d(restored.centre))
     by_centre = average @ model.centre_derivative(geometry, pressure) / a
@@ -455,7 +455,6 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     on_axis = wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]
     transfer = sensor_transfer(apparatus, k)
     row = on_axis * transfer
-    state = posterior.state[:nodes]
     changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
     k_and_zero = np.append(k, 0.0)
     shared = shared_changes(apparatus, [restored.scan], k_and_zero)
@@ -470,9 +469,9 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     for source, change in kernel_changes.items():
         # G = (A G)/A: its own change beside that of what was restored with it.
         of_g = (change[:-1] - transfer[:, None] * change[-1]) / apparatus.conversion_constant
-        changes[source] = changes[source] + on_axis * state @ of_g
+        changes[source] = changes[source] + on_axis * posterior.stress @ of_g
     variance = row @ posterior.covariances["scan"][:nodes, :nodes] @ row
     budget = {"noise": float(np.sqrt(max(variance, 0.0)))}
     for source, change in changes.items():
         budget[source] = float(np.linalg.norm(change))
-    return float(row @ state), budget
+    return float(row @ posterior.stress), budget

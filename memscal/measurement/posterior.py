@@ -36,7 +36,7 @@ from scipy.special import hyp0f1
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import WeighedFit, Weighing, weigh_departures
+from memscal.estimation.bayesian import Weighing, weigh_departures
 from memscal.estimation.departures import DepartureBasis, ReducedScan, Side, departure_basis
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.points import ScanPoints
@@ -58,23 +58,22 @@ _SHEARS_COMPRESSIBLE = (0.0, 0.1, 0.2)
 _LEAST_PRESSURE = 0.1
 
 
-def film_transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
+def film_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> FloatArray:
     """Transform of the base's normal stress under a pressure of unit transform."""
-    return _transfer(scan.set_up.expected, wavenumbers)
-
-
-def _transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> FloatArray:
     # A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
     # on a linear film makes the rod's own base stress.  Other indenters sink less.
-    linear = RadialSpectrum(wavenumbers, _linear_transfer(set_up.film, wavenumbers.k))
-    if (law := law_at_once(set_up)) == LINEAR:
+    linear = _linear_transfer(set_up, wavenumbers)
+    law = law_at_once(set_up)
+    if law == LINEAR:
         return linear.values
-    own, other = (rod_spectrum(set_up, linear, name) for name in (law, LINEAR))
-    return linear.values + _per_pressure(set_up, linear, own - other)
+    change = rod_spectrum(set_up, linear, law) - rod_spectrum(set_up, linear, LINEAR)
+    return linear.values + _per_pressure(set_up, linear, change)
 
 
-def _linear_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
-    return base_normal_from_pressure(k * film.thickness, film.poisson_ratio)
+def _linear_transfer(set_up: SetUp, wavenumbers: Wavenumbers) -> RadialSpectrum:
+    film = set_up.film
+    values = base_normal_from_pressure(wavenumbers.k * film.thickness, film.poisson_ratio)
+    return RadialSpectrum(wavenumbers, values)
 
 
 def _per_pressure(set_up: SetUp, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
@@ -93,33 +92,36 @@ class PressureShape:
 
     def transform(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
         """Transform at ``k`` (rad/m) for a width (m), one at k = 0; its derivative by the width."""
-        plain, first, second = _orders(self.exponent, k.tobytes(), width)
+        plain, first, second = _three_orders(self.exponent, k.tobytes(), width)
         slope = -width * k**2 * first
         if self.shear == 0.0:
             return plain, slope
         m = self.exponent
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
         rise = k * first - ratio * width**2 * k**3 * second
-        share = 0.5 * self.shear * _pull(self.film, k.tobytes())
+        share = 0.5 * self.shear * _shear_ratio(self.film, k.tobytes())
         return plain - share * k * width * first, slope - share * rise
 
 
 @lru_cache(maxsize=32)
-def _orders(m: float, nodes: bytes, width: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _three_orders(
+    m: float, nodes: bytes, width: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the transforms of the exponents m, m + 1 and m + 2, at the radius a of m."""
     k = np.frombuffer(nodes)
     if math.isinf(m):
         same = gaussian_transfer(k, width)
         return same, same, same
-    z = -(m + 2) * (k * width) ** 2 / 2
     b = m + 2
-    first, second = (np.asarray(hyp0f1(b + i, z), np.float64) for i in (1, 2))
+    z = -b * (k * width) ** 2 / 2
+    first = np.asarray(hyp0f1(b + 1, z), np.float64)
+    second = np.asarray(hyp0f1(b + 2, z), np.float64)
     # Downwards the recurrence is stable (DLMF 10.6.1).
     return first + z / (b * (b + 1)) * second, first, second
 
 
 @lru_cache(maxsize=16)
-def _pull(film: ElasticFilm, k: bytes) -> FloatArray:
+def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
     x = np.frombuffer(k) * film.thickness
     nu = film.poisson_ratio
@@ -140,6 +142,8 @@ _NARROWEST = 0.2
 #: One of several shapes is nearer to a contact's pressure than a Gaussian is to a sensor's G:
 #: departures are expected to be smaller by this factor.
 _SMALLER = 0.4
+#: A shape of less probability is left out.
+_NEGLIGIBLE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,37 +158,54 @@ class _Basis(DepartureBasis):
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeFit:
-    """The average of departures from the fit of one shape of pressure."""
+class _PressureEstimate:
+    """Average of departures from the fit of one shape of pressure, or of several shapes."""
 
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
     state: FloatArray  # (s,): posterior mean
-    rows: FloatArray  # (s, p): the state's departure from the fit, by the kernels and the rest
-    weighed: WeighedFit  # by departures from the fit
-    growth: float  # adopted noise over the posterior's
+    covariance: FloatArray  # (s, s): expected squared error of the state
+    gain: VoltageMap  # (s, n): derivative of the state by the voltages
+    residual: FloatArray  # (n,), in V
+    noise: float  # of a point of weight one, in V, or over the stated uncertainties
 
-    @classmethod
-    def of(cls, start: ProfileEstimate, weighing: Weighing) -> "ShapeFit":
-        """Average the hypotheses about the fit of a shape."""
-        model = start.model
-        fit = weighing.reduced.fit
-        weighed = weighing.average()
-        kernels = weighing.basis.kernels(model.k)
-        rows = np.vstack([kernels, np.eye(weighing.basis.flat, kernels.shape[1])[2:]])
-        pressure = fit.conversion_constant * kernels[:, 0]
-        first = np.concatenate([pressure, fit.centre[model.points.free], fit.drift])
-        growth = start.adopted_noise(weighed.noise) / weighed.noise
-        return cls(first + rows @ weighed.mean, rows, weighed, growth)
 
-    @property
-    def covariance(self) -> FloatArray:
-        """Expected squared error of the state, (s, s)."""
-        return self.growth**2 * (self.rows @ self.weighed.covariance @ self.rows.T)
+def _averaged_departures(start: ProfileEstimate, weighing: Weighing) -> _PressureEstimate:
+    """Average the hypotheses about the fit of a shape."""
+    model = start.model
+    fit = weighing.reduced.fit
+    weighed = weighing.average()
+    kernels = weighing.basis.kernels(model.k)
+    rows = np.vstack([kernels, np.eye(weighing.basis.flat, kernels.shape[1])[2:]])
+    pressure = fit.conversion_constant * kernels[:, 0]
+    fitted = np.concatenate([pressure, fit.centre[model.points.free], fit.drift])
+    growth = start.adopted_noise(weighed.noise) / weighed.noise
+    return _PressureEstimate(
+        state=fitted + rows @ weighed.mean,
+        covariance=growth**2 * (rows @ weighed.covariance @ rows.T),
+        gain=rows @ weighed.gain,
+        residual=weighed.residual,
+        noise=weighed.noise,
+    )
 
-    @property
-    def gain(self) -> VoltageMap:
-        """Derivative of the state by the voltages, (s, n)."""
-        return self.rows @ self.weighed.gain
+
+def _averaged_shapes(scan: Scan, start: ProfileEstimate) -> _PressureEstimate:
+    """Average the shapes by their marginal likelihood; their spread counts as uncertainty."""
+    weighed = weighed_shapes(pressure_shapes(scan.set_up.film), start)
+    log_marginal = np.array([weighing.log_marginal_likelihoods[0] for weighing in weighed])
+    weight = np.exp(log_marginal - log_marginal.max())
+    kept = np.flatnonzero(weight >= _NEGLIGIBLE)
+    fits = [_averaged_departures(start, weighed[i]) for i in kept]
+    shares = weight[kept] / weight[kept].sum()
+    mean = shares @ np.stack([fit.state for fit in fits])
+    apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
+    pairs = list(zip(shares, fits, strict=True))
+    return _PressureEstimate(
+        state=mean,
+        covariance=sum(share * fit.covariance for share, fit in pairs) + apart @ apart.T,
+        gain=reduce(add, (fit.gain * share for share, fit in pairs)),
+        residual=shares @ np.stack([fit.residual for fit in fits]),
+        noise=float(shares @ [fit.noise for fit in fits]),
+    )
 
 
 def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> list[Weighing]:
@@ -216,7 +237,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
     drift = start.model.drift_columns.shape[1]
     force = gaussian.conversion_constant
     width = max(gaussian.sigma, _NARROWEST * points.step)
-    forces, widths = (np.full(len(shapes), value) for value in (force, width))
+    forces = np.full(len(shapes), force)
+    widths = np.full(len(shapes), width)
     data = points.standardised(points.u, start.weights)
     growth = np.zeros_like(widths)
     for _ in range(_STEPS):
@@ -232,14 +254,15 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
         widths = widths * (1 + growth)
         if np.abs(ahead).max() < _SETTLED:
             break
-    fits = (forces > 0) & (np.abs(ahead) < _SETTLED)
-    fits &= (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
-    forces = np.where(fits, forces, force)
-    widths = np.where(fits, widths, width)
+    settled = (forces > 0) & (np.abs(ahead) < _SETTLED)
+    settled &= (widths > width / _FARTHEST) & (widths < width * _FARTHEST)
+    forces = np.where(settled, forces, force)
+    widths = np.where(settled, widths, width)
     columns = np.moveaxis(_shape_columns(shapes, start, forces, widths), 1, 0)
     background = start.model.drift_columns @ gaussian.drift
-    return [
-        replace(
+    fits = []
+    for force, width, jacobian in zip(forces, widths, columns, strict=True):
+        fit = replace(
             gaussian,
             conversion_constant=float(force),
             sigma=float(width),
@@ -247,8 +270,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
             jacobian=jacobian,
             predicted=force * jacobian[:, 0] + background,
         )
-        for force, width, jacobian in zip(forces, widths, columns, strict=True)
-    ]
+        fits.append(fit)
+    return fits
 
 
 def _shape_columns(
@@ -257,20 +280,19 @@ def _shape_columns(
     """Derivatives of the voltages by force, width, centre and drift, (n, shapes, p)."""
     model = start.model
     geometry = start.gaussian.geometry
-    pairs = [shape.transform(model.k, w) for shape, w in zip(shapes, widths, strict=True)]
-    kernels, slopes = (np.stack(each, axis=1) for each in zip(*pairs, strict=True))
+    kernels = np.zeros((model.k.size, len(shapes)))
+    slopes = np.zeros_like(kernels)
+    for i, (shape, width) in enumerate(zip(shapes, widths, strict=True)):
+        kernels[:, i], slopes[:, i] = shape.transform(model.k, width)
     signal, widening = np.hsplit(model.signal(geometry, np.hstack([kernels, slopes])), 2)
     radial = forces * model.radial_derivative(geometry, kernels)
     towards = model.by_free_centres(geometry.towards)
-    drift = np.broadcast_to(
-        model.drift_columns[:, None], (*signal.shape, model.drift_columns.shape[1])
-    )
+    drift = model.drift_columns[:, None]
+    drift = np.broadcast_to(drift, (*signal.shape, drift.shape[-1]))
     own = np.stack([signal, forces * widening], axis=2)
     return np.concatenate([own, radial[:, :, None] * towards[:, None], drift], axis=2)
 
 
-#: A shape of less probability is left out.
-_NEGLIGIBLE = 1e-4
 #: Eigenvalues of the covariance of A G below this share of the largest count as zero.
 _EXACT = 1e-10
 _RESOLVED = 3.0
@@ -308,6 +330,11 @@ class Posterior:
         return self.estimate.model.k.size
 
     @property
+    def stress(self) -> FloatArray:
+        """Transform of the base stress at the nodes, in N."""
+        return self.state[: self.nodes]
+
+    @property
     def drift(self) -> FloatArray:
         """Baseline and drift, in V, that the drift's columns belong to."""
         return self.state[self.nodes + int(self.estimate.points.free.sum()) :]
@@ -320,53 +347,50 @@ def reach_of(points: ScanPoints) -> float:
 
 def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     """Return the transform of G at ``k`` (rad/m), as a convolution with it has it."""
-    return _of_sensor(apparatus, k.tobytes())[0]
+    return _sensor_changes(apparatus, k.tobytes())[0]
 
 
 def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
-    weighed = weighed_shapes(pressure_shapes(scan.set_up.film), estimate)
-    log_marginal = np.array([each.log_marginal_likelihoods[0] for each in weighed])
-    weight = np.exp(log_marginal - log_marginal.max())
-    kept = np.flatnonzero(weight >= _NEGLIGIBLE)
-    fits = [ShapeFit.of(estimate, weighed[i]) for i in kept]
-    shares = weight[kept]
-    shares /= shares.sum()
-    mean = shares @ np.stack([fit.state for fit in fits])
-    gain = reduce(add, (fit.gain * share for fit, share in zip(fits, shares, strict=True)))
-    within = sum(share * fit.covariance for fit, share in zip(fits, shares, strict=True))
-    apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
-    nodes = estimate.model.k.size
+    averaged = _averaged_shapes(scan, estimate)
+    mean = averaged.state
     model = estimate.model
-    film = film_transfer(scan, model.reference.wavenumbers)
+    nodes = model.k.size
+    wavenumbers = model.reference.wavenumbers
+    set_up = scan.set_up.expected
+    film = film_transfer(set_up, wavenumbers)
     scale = np.concatenate([scan.stated_load * film, np.ones(mean.size - nodes)])
-    by_film = _film_changes(scan, model.reference.wavenumbers)
+    film_changes = _film_changes(set_up, wavenumbers)
     shared = shared_changes(apparatus, [scan], model.k)
-    of_sensor = apparatus_changes(apparatus, model.k, shared)
-    of_load = shared.pop("load", None)
-    names = tuple(dict.fromkeys([*by_film, *shared]))
-    nothing = np.zeros(nodes)
     # One error of a film that sensor and contact share changes A G and the film's transfer.
-    of_film, of_kernel = (
-        np.array([known.get(name, nothing) for name in names]).reshape(-1, nodes).T
-        for known in (by_film, shared)
-    )
+    names = tuple(dict.fromkeys([*film_changes, *shared]))
+    names = tuple(name for name in names if name != "load")
+    nothing = np.zeros(nodes)
+    by_film = [film_changes.get(name, nothing) for name in names]
+    by_sensor = [shared.get(name, nothing) for name in names]
+    of_film = np.reshape(by_film, (-1, nodes)).T
+    of_kernel = np.reshape(by_sensor, (-1, nodes)).T
+    sensor = apparatus_changes(apparatus, model.k, shared)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
-    scaled = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
+    stretched = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
     shifts = {
-        "apparatus": _signals(estimate, mean, of_sensor * film[:, None]),
+        "apparatus": _signals(estimate, mean, sensor * film[:, None]),
         "film": _signals(estimate, mean, of_film * transfer[:, None] + of_kernel * film[:, None]),
-        "position_scale": scaled[:, None],
+        "position_scale": stretched[:, None],
     }
-    if of_load is not None:
-        shifts["load"] = _signals(estimate, mean, (of_load * film)[:, None])
-    covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
-    changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
-    changes["film"][:nodes] += scan.stated_load * of_film * mean[:nodes, None]
-    covariances |= {source: columns @ columns.T for source, columns in changes.items()}
-    variance = np.sum([np.diag(covariance)[:nodes] for covariance in covariances.values()], axis=0)
+    if "load" in shared:
+        shifts["load"] = _signals(estimate, mean, (shared["load"] * film)[:, None])
+    changes = {}
+    covariances = {"scan": np.outer(scale, scale) * averaged.covariance}
+    for source, shift in shifts.items():
+        change = -scale[:, None] * (averaged.gain @ shift)
+        if source == "film":
+            change[:nodes] += scan.stated_load * of_film * mean[:nodes, None]
+        changes[source] = change
+        covariances[source] = change @ change.T
+    variance = sum(np.diag(covariance)[:nodes] for covariance in covariances.values())
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
     lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
     resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
@@ -377,8 +401,8 @@ def posterior_of(
         shifts=shifts,
         changes=changes,
         film_inputs=names,
-        residual=shares @ np.stack([fit.weighed.residual for fit in fits]),
-        found_noise=float(np.dot(shares, [fit.weighed.noise for fit in fits])),
+        residual=averaged.residual,
+        found_noise=averaged.noise,
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
 
@@ -389,9 +413,11 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     model = estimate.model
     geometry = estimate.gaussian.geometry
     wavenumbers = model.reference.wavenumbers
-    references = [(RadialSpectrum(wavenumbers, change),) for change in changes.T]
-    columns = [replace(model, references=own).signal(geometry, kernel) for own in references]
-    return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
+    columns = np.zeros((model.points.u.size, changes.shape[1]))
+    for i, change in enumerate(changes.T):
+        changed = replace(model, references=(RadialSpectrum(wavenumbers, change),))
+        columns[:, i] = changed.signal(geometry, kernel)
+    return columns
 
 
 def apparatus_changes(
@@ -401,11 +427,11 @@ def apparatus_changes(
 
     Those ``without`` which they are asked for are left to :func:`shared_changes`.
     """
-    return _of_sensor(apparatus, k.tobytes(), tuple(without))[1]
+    return _sensor_changes(apparatus, k.tobytes(), tuple(without))[1]
 
 
 #: Properties of a film that sensor and contact have in common, by their names in budgets.
-_OF_FILM = ("young_modulus", "poisson_ratio", "thickness")
+_FILM_PROPERTIES = ("young_modulus", "poisson_ratio", "thickness")
 
 
 def shared_changes(
@@ -418,7 +444,7 @@ def shared_changes(
     known = apparatus.film
     names = list[str]()
     if known is not None and all(scan.film and _alike(scan.film, known) for scan in scans):
-        names += _OF_FILM
+        names += _FILM_PROPERTIES
     if all(scan.load_cell.same_as(apparatus.load_cell) for scan in scans):
         names.append("load")
     return input_changes(apparatus, names, k)
@@ -446,26 +472,25 @@ def _kernel_changes(
 
 def common_inputs(apparatus: ApparatusFunction, other: ApparatusFunction) -> list[str]:
     """Return the inputs that the calibrations of two channels by one rod scan have in common."""
-    scans = (
-        (one.film, one.indenter, one.load, one.load_cell, one.process.input_scan)
-        for one in (apparatus, other)
-    )
-    same = len(set(scans)) == 1
-    return [name for name in apparatus.kernel_changes if same and name in other.kernel_changes]
+    scans = set()
+    for one in (apparatus, other):
+        scans.add((one.film, one.indenter, one.load, one.load_cell, one.process.input_scan))
+    if len(scans) > 1:
+        return []
+    return [name for name in apparatus.kernel_changes if name in other.kernel_changes]
 
 
 def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
     """Whether two films state the same properties and uncertainties."""
-    names = [name + end for name in _OF_FILM for end in ("", "_uncertainty")]
-    pairs = [(getattr(film, name), getattr(other, name)) for name in names]
-    return film.name == other.name and all(
-        (a is None) == (b is None) and math.isclose(a or 0.0, b or 0.0, rel_tol=1e-6)
-        for a, b in pairs
-    )
+    names = [*_FILM_PROPERTIES, *(f"{name}_uncertainty" for name in _FILM_PROPERTIES)]
+    # What is not stated is not a number.
+    values = np.array([[getattr(one, name) for name in names] for one in (film, other)], float)
+    same = np.isclose(values[0], values[1], rtol=1e-6, atol=0.0, equal_nan=True)
+    return film.name == other.name and bool(same.all())
 
 
 @lru_cache(maxsize=16)
-def _of_sensor(
+def _sensor_changes(
     apparatus: ApparatusFunction, nodes: bytes, without: tuple[str, ...] = ()
 ) -> tuple[FloatArray, FloatArray]:
     """Return transfer function and changes, which all profiles of one sensor share."""
@@ -477,7 +502,8 @@ def _of_sensor(
         shared = a * u_a * profile.conversion_correlation * profile.g_errors
         covariance = covariance + np.outer(shared, profile.g) + np.outer(profile.g, shared)
     for name in without:
-        covariance = covariance - np.multiply.outer(*[a * apparatus.kernel_changes[name]] * 2)
+        change = a * apparatus.kernel_changes[name]
+        covariance = covariance - np.outer(change, change)
     # Rings far out count by their area.
     ring = np.sqrt(profile.r + profile.r[1])
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
@@ -488,20 +514,18 @@ def _of_sensor(
     return transforms[:, 0], transforms[:, 1:]
 
 
-def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> dict[str, FloatArray]:
+def _film_changes(set_up: SetUp, wavenumbers: Wavenumbers) -> dict[str, FloatArray]:
     """Change of the film's transfer function by one standard uncertainty of what is not known."""
-    set_up = scan.set_up.expected
-    linear = RadialSpectrum(wavenumbers, _linear_transfer(set_up.film, wavenumbers.k))
-    columns: dict[str, FloatArray] = {}
+    changes: dict[str, FloatArray] = {}
     for name in ("thickness", "poisson_ratio"):
-        if ends := more_and_less(set_up.film, name):
-            *films, share = ends
-            varied = (set_up._replace(film=film) for film in films)
-            more, less = (_transfer(each, wavenumbers) for each in varied)
-            columns[name] = share * (more - less)
+        ends = more_and_less(set_up.film, name)
+        if ends:
+            more, less, share = ends
+            upper = film_transfer(set_up._replace(film=more), wavenumbers)
+            lower = film_transfer(set_up._replace(film=less), wavenumbers)
+            changes[name] = share * (upper - lower)
     if law_at_once(set_up.under(NEO_HOOKEAN)) != LINEAR:
-        columns |= {
-            name: _per_pressure(set_up, linear, change * set_up.load)
-            for name, change in law_sensitivities(set_up, linear).items()
-        }
-    return columns
+        linear = _linear_transfer(set_up, wavenumbers)
+        for name, change in law_sensitivities(set_up, linear).items():
+            changes[name] = _per_pressure(set_up, linear, change * set_up.load)
+    return changes

@@ -65,81 +65,6 @@ class StressComparison:
     within: float  # share of the radii at which they agree within 1.96 standard uncertainties
 
 
-def compare_stress(
-    posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
-) -> StressComparison:
-    """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
-    _, indenter, load, _ = scan.set_up
-    if not isinstance(indenter, Rod) and abs(stress.load / load - 1) > SAME_LOAD:
-        raise InputError(
-            f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
-            why=f"The contact of a {indenter.shape} grows with its load: stress is not "
-            "proportional to it.",
-            cure="Calculate the stress for the scan's load.",
-        )
-    model = posterior.estimate.model
-    nodes = posterior.nodes
-    if isinstance(stress, Contact):
-        spectrum = stress.base_spectrum(model.k) / stress.load
-    else:
-        spectrum = hankel_transform(stress.r, stress.sigma_zz, model.k) / stress.load
-    synthesis = model.reference.wavenumbers.synthesise(np.eye(nodes), r)
-    calculated = scan.stated_load * (synthesis @ spectrum)
-    covariance = synthesis @ posterior.covariance[:nodes, :nodes] @ synthesis.T
-    peak = float(np.abs(calculated).max())
-    allowed = np.hypot(_EXPANDED * np.sqrt(np.maximum(np.diag(covariance), 0)), _NEGLIGIBLE * peak)
-    apart = np.abs(synthesis @ posterior.state[:nodes] - calculated)
-    chi_square, degrees = _direct(posterior, scan, spectrum)
-    return StressComparison(
-        stress=stress,
-        sigma_zz=calculated,
-        chi_square=chi_square / degrees,
-        degrees=degrees,
-        limit=quality.chi_square_limit(degrees) / degrees,
-        p_value=float(chdtrc(degrees, chi_square)),
-        difference=float(apart.max()) / peak,
-        within=float(np.mean(apart <= allowed)),
-    )
-
-
-def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[float, int]:
-    """Return chi-square of the scan against a calculated stress, and its degrees of freedom."""
-    points = posterior.estimate.points
-    estimate = posterior.estimate
-    model = estimate.model
-    centres = np.zeros(points.free.shape)
-    free = points.free
-    centres[free] = posterior.state[posterior.nodes : posterior.nodes + free.sum()]
-    geometry = model.geometry(centres)
-    pressure = spectrum / film_transfer(scan, model.reference.wavenumbers)
-    signal = model.signal(geometry, pressure)
-    columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
-    # The film is not part of the direct way: the calculated stress is at its base already.
-    added = np.hstack([posterior.shifts["apparatus"], posterior.shifts["position_scale"]])
-    # One load cell errs alike under the rod, which changes A, and under the contact.
-    of_load = (scan.load_uncertainty or 0.0) / scan.stated_load * signal[:, None]
-    added = np.hstack([added, of_load + posterior.shifts.get("load", 0.0)])
-    # The stated noise as it is: raised by a misfit, it would hide it.
-    stated = points.u_errors is not None
-    ratio = 1 / estimate.noise_scale if stated else posterior.noise_ratio
-    weights = estimate.weights / (ratio * estimate.noise_scale) ** 2
-    points, _ = points.sharing(points.standardised(added, weights))
-    flat = np.linalg.qr(points.standardised(np.hstack(columns), weights))[0]
-    left = points.standardised(points.u - signal, weights)
-    left = left - flat @ (flat.T @ left)
-    return float(left @ left), left.size - flat.shape[1]
-
-
-def read_expected(expected: Expected) -> StressProfile | Contact:
-    """Return a stress to compare with, read from its file where it is one."""
-    if isinstance(expected, str | PathLike):
-        return read_reference(expected)
-    if isinstance(expected, StressProfile | Contact):
-        return expected
-    cure = "Give a contact from memscal.indent(), a StressProfile, or the path of a file."
-    raise InputError(f"The expected stress is a {type(expected).__name__}.", cure=cure)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Restoration(Result, Checked):
     r"""The stress at the film's base that explains a scan, with its uncertainty.
@@ -204,7 +129,7 @@ class Restoration(Result, Checked):
         InputError
             If a radius is beyond 1.5 times the scan's width, where nothing was computed.
         """
-        return np.asarray(self._synthesis(r) @ self.posterior.state[: self.posterior.nodes])
+        return np.asarray(self._synthesis(r) @ self.posterior.stress)
 
     def stress_uncertainty(self, r: ArrayLike) -> FloatArray:
         """Return the standard uncertainty (k = 1) of :meth:`stress`, in Pa."""
@@ -217,7 +142,7 @@ class Restoration(Result, Checked):
     @property
     def force(self) -> float:
         """Integral of the restored stress over the plane, in N."""
-        return float(self._at_zero @ self.posterior.state[: self.posterior.nodes])
+        return float(self._at_zero @ self.posterior.stress)
 
     @property
     def force_uncertainty(self) -> float:
@@ -246,7 +171,7 @@ class Restoration(Result, Checked):
     @property
     def baseline(self) -> float:
         """Baseline in the middle of the scan, in V."""
-        return float(self.posterior.state[self._first_drift])
+        return float(self.posterior.drift[0])
 
     @property
     def baseline_uncertainty(self) -> float:
@@ -301,16 +226,14 @@ class Restoration(Result, Checked):
     @property
     def measured_stress(self) -> FloatArray:
         """Measured stress S_zz = U/A at each point, less baseline, for the nominal load, in Pa."""
-        drift = self.posterior.state[self._first_drift :]
-        signal = self.points.u - self.posterior.estimate.model.drift_columns @ drift
+        background = self.posterior.estimate.model.drift_columns @ self.posterior.drift
+        signal = self.points.u - background
         return self.apparatus.stress(signal * self.scan.stated_load / self.points.load)
 
     def blurred_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
-        k = self.posterior.estimate.model.k
-        nodes = self.posterior.nodes
-        blurred = sensor_transfer(self.apparatus, k) * self.posterior.state[:nodes]
-        return np.asarray(self._synthesis(r) @ blurred)
+        transfer = sensor_transfer(self.apparatus, self.posterior.estimate.model.k)
+        return np.asarray(self._synthesis(r) @ (transfer * self.posterior.stress))
 
     def compare(self, expected: Expected) -> StressComparison:
         """Compare a calculated stress with the scan, blurred by G, and with the restored one.
@@ -320,7 +243,12 @@ class Restoration(Result, Checked):
         InputError
             If it is no stress.
         """
-        return compare_stress(self.posterior, self.scan, read_expected(expected), self.r)
+        if isinstance(expected, str | PathLike):
+            expected = read_reference(expected)
+        if isinstance(expected, StressProfile | Contact):
+            return _compared(self, expected)
+        cure = "Give a contact from memscal.indent(), a StressProfile, or the path of a file."
+        raise InputError(f"The expected stress is a {type(expected).__name__}.", cure=cure)
 
     def profile(self) -> StressProfile:
         """Return the restored stress as a table with its uncertainty, as a file holds it."""
@@ -377,3 +305,65 @@ class Restoration(Result, Checked):
             raise InputError(f"A radius is {np.max(radii) * 1e3:.4g} mm.", why=why, cure=cure)
         wavenumbers = self.posterior.estimate.model.reference.wavenumbers
         return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)
+
+
+def _compared(restored: Restoration, stress: StressProfile | Contact) -> StressComparison:
+    """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
+    scan = restored.scan
+    _, indenter, load, _ = scan.set_up
+    if not isinstance(indenter, Rod) and abs(stress.load / load - 1) > SAME_LOAD:
+        raise InputError(
+            f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
+            why=f"The contact of a {indenter.shape} grows with its load: stress is not "
+            "proportional to it.",
+            cure="Calculate the stress for the scan's load.",
+        )
+    wavenumbers = restored.posterior.estimate.model.reference.wavenumbers
+    if isinstance(stress, Contact):
+        spectrum = stress.base_spectrum(wavenumbers.k) / stress.load
+    else:
+        spectrum = hankel_transform(stress.r, stress.sigma_zz, wavenumbers.k) / stress.load
+    calculated = scan.stated_load * wavenumbers.synthesise(spectrum, restored.r)
+    peak = float(np.abs(calculated).max())
+    u = np.sqrt(np.maximum(np.diag(restored.covariance), 0.0))
+    apart = np.abs(restored.sigma_zz - calculated)
+    chi_square, degrees = _direct(restored, spectrum)
+    return StressComparison(
+        stress=stress,
+        sigma_zz=calculated,
+        chi_square=chi_square / degrees,
+        degrees=degrees,
+        limit=quality.chi_square_limit(degrees) / degrees,
+        p_value=float(chdtrc(degrees, chi_square)),
+        difference=float(apart.max()) / peak,
+        within=float(np.mean(apart <= np.hypot(_EXPANDED * u, _NEGLIGIBLE * peak))),
+    )
+
+
+def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
+    """Return chi-square of the scan against a calculated stress, and its degrees of freedom."""
+    scan = restored.scan
+    posterior = restored.posterior
+    estimate = posterior.estimate
+    points = estimate.points
+    model = estimate.model
+    # Repeats share the centre, which is zero across a line.
+    geometry = model.geometry(np.atleast_2d(restored.centre))
+    pressure = spectrum / film_transfer(scan.set_up.expected, model.reference.wavenumbers)
+    signal = model.signal(geometry, pressure)
+    # One load cell errs alike under the rod, which changes A, and under the contact.
+    by_load = (scan.load_uncertainty or 0.0) / scan.stated_load * signal[:, None]
+    by_load = by_load + posterior.shifts.get("load", 0.0)
+    # The film is not part of the direct way: the calculated stress is at its base already.
+    shifts = (posterior.shifts["apparatus"], posterior.shifts["position_scale"], by_load)
+    # The stated noise as it is: raised by a misfit, it would hide it.
+    noise = posterior.noise_ratio * estimate.noise_scale
+    if points.u_errors is not None:
+        noise = 1.0
+    weights = estimate.weights / noise**2
+    points, _ = points.sharing(points.standardised(np.hstack(shifts), weights))
+    columns = np.hstack([model.centre_derivative(geometry, pressure), model.drift_columns])
+    flat = np.linalg.qr(points.standardised(columns, weights))[0]
+    left = points.standardised(points.u - signal, weights)
+    left = left - flat @ (flat.T @ left)
+    return float(left @ left), left.size - flat.shape[1]

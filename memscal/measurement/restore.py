@@ -1,5 +1,6 @@
 """Restoration of the stress at the base of the film from a scan and a calibrated sensor."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -34,12 +35,7 @@ from memscal.parallel import single_threaded
 from memscal.readings.mistaken_unit import require_span
 
 #: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
-_OF_THE_FILM = (
-    *("young_modulus", "poisson_ratio", "thickness"),
-    *("law", "mooney_rivlin_ratio", "name"),
-)
-
-
+_FILM = ("young_modulus", "poisson_ratio", "thickness", "law", "mooney_rivlin_ratio", "name")
 #: Lines whose loads differ by less than this are repeats of one load.
 _ONE_LOAD = 0.05
 #: Recorded loads of one line scatter by less than this about their median.
@@ -55,8 +51,9 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     passes = scan.passes
     if scan.kind != "repeats" and not passes.any():
         return (replace(scan, load=_line_load(scan, scan.normal_load, "")),)
-    rows = [scan.normal_load[passes == i] for i in range(int(passes.max()) + 1)]
-    loads = np.array([_line_load(scan, row, f", line {i + 1}") for i, row in enumerate(rows)])
+    lines = range(int(passes.max()) + 1)
+    recorded = [scan.normal_load[passes == i] for i in lines]
+    loads = np.array([_line_load(scan, recorded[i], f", line {i + 1}") for i in lines])
     order = np.argsort(loads, kind="stable")
     starts = np.flatnonzero(np.diff(loads[order]) > _ONE_LOAD * loads[order][:-1]) + 1
     singles = []
@@ -115,10 +112,10 @@ _HELD = "Columns over all of them are held in memory."
 
 def require_contact_size(scan: Scan, most: int = MOST_OF_CONTACT, why: str = _HELD) -> None:
     """Refuse a contact of more points than its stress is restored or measured from."""
-    if (size := scan.u_zz.size) > most:
-        named = scan.source.file_name if scan.source else "The scan"
+    size = scan.u_zz.size
+    if size > most:
         cure = "Average neighbouring readings, thin the raster, or leave out repeats."
-        raise too_large(named, size, most, "points of one load", why=why, cure=cure)
+        raise too_large(place_of(scan), size, most, "points of one load", why=why, cure=cure)
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
@@ -126,11 +123,11 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     require_covariance(apparatus)
     require_contact_size(scan)
     require_span(scan)
-    load = scan.normal_load
-    if load is None or isinstance(scan.indenter, Rod):
+    loads = scan.normal_load
+    if loads is None or isinstance(scan.indenter, Rod):
         return
-    low = float(np.nanmin(load))
-    high = float(np.nanmax(load))
+    low = np.nanmin(loads)
+    high = np.nanmax(loads)
     if high - low > SAME_LOAD * scan.stated_load:
         raise InputError(
             f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
@@ -175,8 +172,7 @@ def accept_other_sensor(
     scan: Scan | MeasuredScan, apparatus: ApparatusFunction, names: Sequence[str], *, override: bool
 ) -> list[str]:
     """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
-    sources = (scan.source, "scan"), (apparatus.source, "artifact")
-    places = tuple(file_in_words(*source) for source in sources)
+    places = (file_in_words(scan.source, "scan"), file_in_words(apparatus.source, "artifact"))
     apparatus.require_pascals()
     unit = scan.unit or "V"
     si = apparatus.reading.si
@@ -186,11 +182,10 @@ def accept_other_sensor(
         raise InputError(problem, cure=cure)
     sensors = (scan.sensor, apparatus.sensor)
     films = (scan.film, apparatus.film)
+    differences = stated_differences(SENSOR, names, sensors, places)
+    differences += stated_differences(FILM, _FILM, films, places, "film")
     return accepted_differences(
-        [
-            *stated_differences(SENSOR, names, sensors, places),
-            *stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
-        ],
+        differences,
         override=override,
         problem="Scan and artifact do not belong together",
         why="An apparatus function holds for one channel of one sensor, as it was calibrated "
@@ -204,16 +199,29 @@ FORCE_LIMIT = 3.0
 NEGLIGIBLE_FORCE = 0.01
 
 
-def _reconvolution(restored: Restoration) -> QualityCheck:
+def _checks(restored: Restoration) -> list[QualityCheck]:
     degrees = restored.degrees
-    return check(
-        "reconvolution",
-        restored.chi_square / degrees,
-        chi_square_limit(degrees) / degrees,
+    outliers = np.mean(restored.posterior.estimate.outlier_weight < quality.OUTLIER_WEIGHT)
+    blurred = (
         "Reduced chi-square of the scan against the restored stress blurred again by A G. A "
         "failure means that no radial stress at the base of this film explains the scan through "
-        "this apparatus function.",
+        "this apparatus function."
     )
+    doubtful = (
+        "Share of points whose weight was more than halved. A failure means that the noise is not "
+        "what the uncertainties take it for: look at the residuals."
+    )
+    limit = chi_square_limit(degrees) / degrees
+    checks = [
+        check("reconvolution", restored.chi_square / degrees, limit, blurred),
+        _force(restored),
+        *_noise(restored),
+        _symmetry(restored),
+        check("outliers", float(outliers), quality.OUTLIER_LIMIT, doubtful),
+    ]
+    if restored.comparison is not None:
+        checks.append(_expected(restored.comparison))
+    return checks
 
 
 def force_less_load(
@@ -229,17 +237,15 @@ def force_less_load(
 def _force(restored: Restoration) -> QualityCheck:
     load = restored.scan.stated_load
     budget = force_less_load(restored.force_budget, restored.scan.load_uncertainty)
-    allowed = float(np.linalg.norm([*budget.values(), NEGLIGIBLE_FORCE * load]))
-    return check(
-        "restored_force",
-        abs(restored.force - load) / allowed,
-        FORCE_LIMIT,
+    allowed = math.hypot(*budget.values(), NEGLIGIBLE_FORCE * load)
+    meaning = (
         f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
         f"of {load:.4g} N, in their standard uncertainty. A failure means that gain, load or unit "
         "differ between the calibration and this scan, or that the film's Poisson's ratio, which "
         "decides how much lies beyond the scan, is wrong. It does not test A: a factor that is "
-        "wrong in both, such as of one balance, changes nothing.",
+        "wrong in both, such as of one balance, changes nothing."
     )
+    return check("restored_force", abs(restored.force - load) / allowed, FORCE_LIMIT, meaning)
 
 
 def _noise(restored: Restoration) -> list[QualityCheck]:
@@ -275,16 +281,6 @@ def _symmetry(restored: Restoration) -> QualityCheck:
     meaning = f"Fall of chi-square by {uneven.count} {meaning}"
     p_value = float(chdtrc(uneven.count, uneven.fall))
     return check(name, uneven.fall, chi_square_limit(uneven.count), meaning, p_value)
-
-
-def _outliers(restored: Restoration) -> QualityCheck:
-    return check(
-        "outliers",
-        float(np.mean(restored.posterior.estimate.outlier_weight < quality.OUTLIER_WEIGHT)),
-        quality.OUTLIER_LIMIT,
-        "Share of points whose weight was more than halved. A failure means that the noise is not "
-        "what the uncertainties take it for: look at the residuals.",
-    )
 
 
 def _expected(compared: StressComparison) -> QualityCheck:
@@ -388,13 +384,14 @@ def restore(
     """
     sensor = opened_apparatus(apparatus, accept_altered=accept_altered)
     measured = opened_scan(scan, accept_altered=accept_altered)
-    measured = measured if load is None else scan_at_load(measured, load)
+    if load is not None:
+        measured = scan_at_load(measured, load)
     if isinstance(expected, str | PathLike):
         expected = read_reference(expected, accept_altered=accept_altered)
     require_measurement(measured, sensor)
-    sources = sensor.source, measured.source, getattr(expected, "source", None)
-    overridden = accept_mismatches(measured, sensor, override=override)
-    overridden = [*accepted_alterations(*sources), *overridden]
+    sources = (sensor.source, measured.source, getattr(expected, "source", None))
+    overridden = accepted_alterations(*sources)
+    overridden += accept_mismatches(measured, sensor, override=override)
     restored = restore_known(measured, sensor, expected)
     messages = quality.override_messages(overridden)
     return replace(restored, messages=(*messages, *restored.messages))
@@ -421,15 +418,12 @@ def restore_known(
         apparatus=apparatus,
         posterior=posterior,
         r=r,
-        sigma_zz=matrix @ posterior.state[:nodes],
+        sigma_zz=matrix @ posterior.stress,
         covariance=matrix @ posterior.covariance[:nodes, :nodes] @ matrix.T,
     )
     if expected is not None:
         restored = replace(restored, comparison=restored.compare(expected))
-    checks = [_reconvolution(restored), _force(restored), *_noise(restored)]
-    checks += [_symmetry(restored), _outliers(restored)]
-    if restored.comparison is not None:
-        checks.append(_expected(restored.comparison))
+    checks = _checks(restored)
     return replace(restored, checks=tuple(checks), messages=restoration_messages(restored, checks))
 
 
@@ -440,7 +434,7 @@ def gaussian_pressure(
     start: profile.ProfileEstimate | None = None,
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
-    through, transfer = _of_pressure(scan, apparatus, points)
+    through, transfer = _reference(scan, apparatus, points)
     with _undetermined():
         return profile.estimate_profile(points, through, start=start), transfer
 
@@ -450,17 +444,19 @@ def plain_pressure(
 ) -> GaussianFit:
     """Return the best Gaussian pressure without departures, in a tenth of the time."""
     with _undetermined():
-        return profile.fitted_gaussian(points, _of_pressure(scan, apparatus, points)[0])
+        return profile.fitted_gaussian(points, _reference(scan, apparatus, points)[0])
 
 
-def _of_pressure(
+def _reference(
     scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
 ) -> tuple[RadialSpectrum, FloatArray]:
     """Transform of a unit force's voltages, in V m^2 / N, and that of A G, in V/Pa."""
     # A film passes nothing of exp(-kh) beyond kh = 20: 2e-9 of the load.
     wavenumbers = Wavenumbers.covering(20.0 / scan.set_up.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
-    return RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers)), transfer
+    return RadialSpectrum(
+        wavenumbers, transfer * film_transfer(scan.set_up.expected, wavenumbers)
+    ), transfer
 
 
 @contextmanager
