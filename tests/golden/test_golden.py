@@ -1,5 +1,6 @@
-"""Printed results, public names and the contents of old files stay what they were."""
+"""Printed results, pages and figures, public names and the contents of old files stay what they were."""
 
+import difflib
 import re
 from collections.abc import Iterator
 from operator import attrgetter
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from golden.make import COMMANDS, OUTPUTS, SIGNATURES, Runs, differences, load, signatures
+from golden.views import VIEW_COMMANDS, VIEWS, view
 from numpy.testing import assert_allclose
 
 import memscal
@@ -66,6 +68,17 @@ def test_numbers_are_compared_within_a_share_of_their_uncertainty(changed, place
     golden = {"value": 1.0, "standard_uncertainty": 0.1}
     found = differences(golden, changed, TOLERANCE, SHARE)
     assert [place.partition(":")[0] for place in found] == places
+
+
+@pytest.mark.parametrize("name", VIEW_COMMANDS)
+def test_a_view_is_the_golden_one(name: str, runs: Runs) -> None:
+    golden = (VIEWS / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+    changes = list(difflib.unified_diff(golden, view(name, runs).splitlines(), lineterm="", n=1))
+    assert changes == [], "\n".join(changes[:40])
+
+
+def test_every_golden_view_has_its_command() -> None:
+    assert {path.stem for path in Path(VIEWS).glob("*.txt")} == set(VIEW_COMMANDS)
 
 
 def test_json_has_one_convention_of_units():
