@@ -10,7 +10,6 @@ from .axisymmetry.kernels import RadialKernel as RadialKernel
 from .axisymmetry.kernels import SmoothedDisc as SmoothedDisc
 from .calibration.calibrate import Calibration as Calibration
 from .calibration.calibrate import calibrate as calibrate
-from .calibration.uncertainty import InputEffect as InputEffect
 from .deconvolution.fourier_ratio import Field as Field
 from .deconvolution.fourier_ratio import Quotient as Quotient
 from .deconvolution.fourier_ratio import divide as divide
@@ -19,10 +18,8 @@ from .deconvolution.fourier_ratio import normalise as normalise
 from .deconvolution.fourier_ratio import reconvolve as reconvolve
 from .deconvolution.widths import fit_gaussian as fit_gaussian
 from .errors import MemscalError as MemscalError
-from .estimation.points import ScanPoints as ScanPoints
 from .extensions.fleet.many import FleetCalibration as FleetCalibration
 from .extensions.fleet.many import calibrate_many as calibrate_many
-from .extensions.monte_carlo.monte_carlo import BudgetComparison as BudgetComparison
 from .extensions.monte_carlo.monte_carlo import MonteCarlo as MonteCarlo
 from .extensions.monte_carlo.monte_carlo import monte_carlo as monte_carlo
 from .extensions.monte_carlo.sweep import Sweep as Sweep
@@ -47,15 +44,11 @@ from .friction.compare import compare as compare
 from .friction.results import BoundedEstimate as BoundedEstimate
 from .friction.results import DryAgainstLubricated as DryAgainstLubricated
 from .friction.results import FrictionComparison as FrictionComparison
-from .friction.results import ImpliedFriction as ImpliedFriction
 from .friction.results import InterfaceComparison as InterfaceComparison
-from .friction.results import InterfaceLaw as InterfaceLaw
 from .friction.results import Interval as Interval
-from .friction.results import LawComparison as LawComparison
 from .friction.results import LoadComparison as LoadComparison
 from .measurement.measure_stress import measure_stress as measure_stress
 from .measurement.restoration import Restoration as Restoration
-from .measurement.restoration import StressComparison as StressComparison
 from .measurement.restore import restore as restore
 from .mechanics.contact import Contact as Contact
 from .mechanics.film_response import InterfaceTraction as InterfaceTraction
@@ -64,10 +57,8 @@ from .mechanics.interface import ExponentialCompliance as ExponentialCompliance
 from .mechanics.interface import GreenwoodTripp as GreenwoodTripp
 from .mechanics.interface import Interface as Interface
 from .mechanics.interface import NormalLaw as NormalLaw
-from .mechanics.surface import FilmField as FilmField
 from .model.apparatus import ApparatusField as ApparatusField
 from .model.apparatus import ApparatusRadial as ApparatusRadial
-from .model.apparatus import OtherEstimate as OtherEstimate
 from .model.apparatus import ParameterSet as ParameterSet
 from .model.apparatus import Reconvolution as Reconvolution
 from .model.apparatus import TransferFunction as TransferFunction
@@ -90,7 +81,6 @@ from .model.measured_stress import MeasuredPoints as MeasuredPoints
 from .model.measured_stress import MeasuredProfile as MeasuredProfile
 from .model.measured_stress import MeasuredScan as MeasuredScan
 from .model.measured_stress import MeasuredStress as MeasuredStress
-from .model.places import Places as Places
 from .model.provenance import Process as Process
 from .model.provenance import SourceFile as SourceFile
 from .model.scan import Scan as Scan

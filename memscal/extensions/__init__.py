@@ -88,7 +88,7 @@ HOOKS = {
 
 PUBLIC = {
     "extensions.fleet.many": ["FleetCalibration", "calibrate_many"],
-    "extensions.monte_carlo.monte_carlo": ["BudgetComparison", "MonteCarlo", "monte_carlo"],
+    "extensions.monte_carlo.monte_carlo": ["MonteCarlo", "monte_carlo"],
     "extensions.monte_carlo.sweep": ["Sweep"],
     "extensions.planning.design": ["Design", "Plan", "design"],
     "extensions.simulation.disturbances": ["Disturbances"],

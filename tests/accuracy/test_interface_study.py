@@ -18,13 +18,14 @@ from helpers.scans import simulate_experiment
 from scipy.stats import binom
 
 import memscal
-from memscal import ElasticFilm, Interface, LawComparison
+from memscal import ElasticFilm, Interface
 from memscal.extensions.interface_laws.families import SLIP_LENGTHS, elasto_plastic_family
 from memscal.extensions.interface_laws.model_comparison import compare_interface
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
+from memscal.friction.results import LawComparison
 
 pytestmark = pytest.mark.accuracy
 

@@ -10,7 +10,7 @@ from helpers.scans import as_function, known_apparatus, pressed, sphere_scan
 
 import memscal
 from memscal.figures import report, style
-from memscal.model.apparatus import ParameterSet
+from memscal.model.apparatus import OtherEstimate, ParameterSet
 from memscal.model.scan import StressSensor
 
 _VOID = {"meta", "img", "br", "link", "hr"}
@@ -112,7 +112,7 @@ def test_values_stand_with_uncertainty_and_unit(page):
 def test_the_other_estimate_has_a_table_of_its_own(make_apparatus):
     data = make_apparatus()
     of_a = data.parameters.only(("conversion_constant",))
-    other = memscal.OtherEstimate("bayesian", of_a, data.radial_profile)
+    other = OtherEstimate("bayesian", of_a, data.radial_profile)
     page = page_of(replace(data, other=other))
     assert [row[0] for row in page.rows].count("conversion constant") == 2
 

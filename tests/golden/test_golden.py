@@ -1,4 +1,4 @@
-"""Printed results, pages and figures, public names and the contents of old files stay what they were."""
+"""Printed results, pages, figures, public names and contents of old files stay what they were."""
 
 import difflib
 import re

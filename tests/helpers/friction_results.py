@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import memscal
+from memscal.friction.results import ImpliedFriction, InterfaceLaw, LawComparison
 
 FRICTION = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, math.inf])
 LOADS = (0.34, 0.69, 1.37, 2.75)
@@ -187,7 +188,7 @@ def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceCompar
     pressures = np.array([27e3, 33e3, 50e3, 80e3])
     friction = np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8])
     stiffnesses = np.outer(pressures, 1.6 / slip_length / np.array([0.8, 1.0, 1.3]))
-    implied = memscal.ImpliedFriction(np.array(LOADS), friction, pressures, stiffnesses)
+    implied = ImpliedFriction(np.array(LOADS), friction, pressures, stiffnesses)
     names = ("effective Amontons", "effective Amontons, one for each load", "elasto-plastic")
     tangential = _laws("dry", names, (0.0, 2.1, 7.4), slip_length, implied)
     names = ("rigid, frictionless", "normal compliance")
@@ -202,7 +203,7 @@ def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: A
     chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0
     inside = lengths[chi_square - 120.0 <= _LIMIT]
     laws = tuple(
-        memscal.InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
+        InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
         for name, value in zip(names, evidence, strict=True)
     )
     better, worse = sorted((-1, 0), key=lambda i: -evidence[i])
@@ -212,7 +213,7 @@ def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: A
         length, 0.1 * length, interval, "", lengths, chi_square, least=120.0, unit="m"
     )
     loads = np.array(LOADS)
-    return memscal.LawComparison(lubrication, loads, laws, (factor,), estimate, implied)
+    return LawComparison(lubrication, loads, laws, (factor,), estimate, implied)
 
 
 def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memscal.BoundedEstimate:
