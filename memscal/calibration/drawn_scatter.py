@@ -89,7 +89,8 @@ def draw_count(solution: Solution) -> int:
 def _columns(rows: Any) -> FloatArray:
     """Draws (m, ...) less their mean over sqrt(m - 1), the draw as the last axis."""
     values = np.array(rows)
-    return np.asarray(np.moveaxis(values - values.mean(axis=0), 0, -1) / np.sqrt(len(values) - 1))
+    apart = (values - values.mean(axis=0)) / np.sqrt(len(values) - 1)
+    return np.moveaxis(apart, 0, -1)
 
 
 def _divided(

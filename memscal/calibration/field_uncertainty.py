@@ -65,7 +65,7 @@ def field_errors(
     inside_x = np.clip(x, g.x[0], g.x[-1])
     at_nodes = RectBivariateSpline(g.y, g.x, g.image)(inside_y, inside_x)
     at_nodes[np.hypot.outer(y, x) >= fields.support] = 0.0
-    variances_of = _of_division if deconvolution.divided else _of_posterior
+    variances_of = _division_variances if deconvolution.divided else _posterior_variances
     variances = variances_of(solution, deconvolution, (x, y), at_nodes.ravel(), inputs)
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
     planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
@@ -104,7 +104,7 @@ def _kernels(
     return combined
 
 
-def _of_posterior(
+def _posterior_variances(
     solution: Solution,
     deconvolution: Deconvolution,
     axes: tuple[FloatArray, FloatArray],
@@ -171,18 +171,11 @@ class _Filter:
             index.append(fields.index[i] - first)
             every *= round((axes[i][1] - axes[i][0]) / step)
         box = (at_points[0].shape[1], at_points[1].shape[1])
-        return cls(
-            ratio=ratio[np.ix_(*band)],
-            window=window[np.ix_(*band)],
-            at_nodes=at_nodes,
-            at_g=at_g,
-            at_points=at_points,
-            twice=np.where(band[1] == 0, 1.0, 2.0),
-            every=every,
-            count=m * n,
-            share=share,
-            places=np.ravel_multi_index(index, box),
-        )
+        open_ = np.ix_(*band)
+        twice = np.where(band[1] == 0, 1.0, 2.0)
+        places = np.ravel_multi_index(index, box)
+        passing = (ratio[open_], window[open_])
+        return cls(*passing, at_nodes, at_g, at_points, twice, every, m * n, share, places)
 
     def passed(self, kernels: FloatArray) -> FloatArray:
         """What the window passes of kernels (nodes, q), where G is stated."""
@@ -244,7 +237,7 @@ def _by_parameters(
     return moved, hidden, sums
 
 
-def _of_division(
+def _division_variances(
     solution: Solution,
     deconvolution: Deconvolution,
     axes: tuple[FloatArray, FloatArray],
@@ -274,12 +267,12 @@ def _of_division(
     # Of A G: of the readings themselves, of these with what was fitted to them, of the latter.
     own = np.zeros(shape)
     np.add.at(own, fields.index, share**2 * noise)
-    own = fftshift(irfft2(rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own), s=shape))
-    rows, columns = (
-        np.rint(axis / step).astype(np.intp)[chosen] + size // 2
-        for axis, step, chosen, size in zip((y, x), grid.spacing, stated, shape, strict=True)
-    )
-    variance = own[np.ix_(rows, columns)].ravel()
+    squared = irfft2(ratio, s=shape) ** 2
+    own = fftshift(irfft2(rfft2(squared) * rfft2(own), s=shape))
+    dy, dx = grid.spacing
+    rows = np.rint(y / dy).astype(np.intp) + shape[0] // 2
+    columns = np.rint(x / dx).astype(np.intp) + shape[1] // 2
+    variance = own[np.ix_(rows[stated[0]], columns[stated[1]])].ravel()
     for left, right in gain.parts:
         by_points: Any = np.eye(share.size) if right is None else right
         for some in _chunks(by_points.shape[1]):

@@ -175,8 +175,8 @@ class RasterFields:
             steps = next(places.steps for places in points.places if all(places.steps))
             nowhere = np.zeros(0, dtype=np.intp)
             lattice = (
-                EvenAxis(float(points.x.min()), steps[0], nowhere),
-                EvenAxis(float(points.y.min()), steps[1], nowhere),
+                EvenAxis(points.x.min(), steps[0], nowhere),
+                EvenAxis(points.y.min(), steps[1], nowhere),
             )
         x, columns = _continued(lattice[0], float(np.ptp(points.x)), choice.extent)
         y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)

@@ -59,7 +59,7 @@ BUDGETED = (
     "noise_equivalent_area",
 )
 #: Parameters of the Gaussian fit, which a shape that is none changes.
-_OF_GAUSSIAN = (
+_GAUSSIAN_PARAMETERS = (
     "gaussian_sigma",
     "conversion_constant_gaussian",
     "ellipticity",
@@ -113,7 +113,7 @@ def input_effects(
         slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
         error = slope * estimate.distance * shares[estimate.points.scan]
         effects["position_scale"] = InputEffect(-error)
-    effects |= _of_loads(scans, stresses, estimate)
+    effects |= _load_effects(scans, stresses, estimate)
     if "load" in effects:
         # Beside its scaling: at finite strain a larger load spreads the stress.
         spread = _mistaken(estimate, load_sensitivities(scans, model.references))
@@ -129,17 +129,19 @@ def _mistaken(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> Float
     return -model.signal(estimate.gaussian.geometry, estimate.kernel)
 
 
-def _of_loads(
+def _load_effects(
     scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
 ) -> dict[str, InputEffect]:
     """Effects of factors: loads, forces of references, and their discretisation."""
     signal = estimate.predicted - estimate.background
     pairs = zip(stresses, estimate.model.references, strict=True)
+    loads: list[float | None] = []
+    for scan in scans:
+        u = scan.load_uncertainty
+        loads.append(u and u / scan.stated_load)
     shares: dict[str, Sequence[float | None]] = {
         "reference_force": [abs(carried_force(*pair) - 1.0) for pair in pairs],
-        "load": [
-            scan.load_uncertainty and scan.load_uncertainty / scan.stated_load for scan in scans
-        ],
+        "load": loads,
         "reference_convergence": [stress.convergence for stress in stresses],
     }
     effects = {}
@@ -224,11 +226,10 @@ class _Derivatives:
     @classmethod
     def stacked(cls, parts: Sequence[_Derivatives]) -> _Derivatives:
         """Put the derivatives of several results below each other."""
-        return cls(
-            VoltageMap.stacked([part.by_voltage for part in parts]),
-            np.vstack([part.by_state for part in parts]),
-            np.vstack([part.hidden for part in parts]),
-        )
+        by_voltage = VoltageMap.stacked([part.by_voltage for part in parts])
+        by_state = np.vstack([part.by_state for part in parts])
+        hidden = np.vstack([part.hidden for part in parts])
+        return cls(by_voltage, by_state, hidden)
 
 
 def propagate(
@@ -242,15 +243,15 @@ def propagate(
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
     estimate = solution.estimate
     kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
-    names, values, of_parameters = _parameters(estimate, deconvolution, kernel)
-    derivatives = _Derivatives.stacked([of_parameters, kernel[1:]])
+    names, values, parameters = _parameters(estimate, deconvolution, kernel)
+    derivatives = _Derivatives.stacked([parameters, kernel[1:]])
     by_voltage = derivatives.by_voltage
     columns = {
         "noise": estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.fixed_root,
         "window": derivatives.hidden,
     }
-    rows = [names.index(name) for name in _OF_GAUSSIAN if name in names]
+    rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
     columns["misfit"] = np.zeros((len(by_voltage), misfit.shape[1]))
     columns["misfit"][rows] = misfit
@@ -377,26 +378,23 @@ def _parameters(
     """Names, values and derivatives of the parameters, in the order in which they are reported."""
     fit = estimate.gaussian
     g = deconvolution.g
-    of_g = kernel[1 : 1 + g.r.size]
+    radial = kernel[1 : 1 + g.r.size]
     functionals = kernel_functionals(g, deconvolution.gaussian_sigma)
-    widths = of_g.combined(np.stack([functional.row for functional in functionals]))
-    if deconvolution.divided and of_g.hidden.size:
+    widths = radial.combined(np.stack([functional.row for functional in functionals]))
+    if deconvolution.divided and radial.hidden.size:
         # What a window hides of G adds to the integral of its square by its own square.
-        whole = noise_area(g.r, g.radial + of_g.hidden[:, 0])
+        whole = noise_area(g.r, g.radial + radial.hidden[:, 0])
         widths.hidden[-1, 0] = whole - functionals[-1].value
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain = estimate.gaussian_gain
     ellipse = estimate.points.ellipse
     nuisances, scale = _nuisances(estimate.points.free)
     count = len(scale)
-    parts = [
-        kernel[:1],
-        _fitted(kernel, gain[[1, *range(len(gain) - ellipse, len(gain))]]),
-        widths,
-        _fitted(kernel, estimate.weighed.gain[2 : 2 + count] * scale),
-        _fitted(kernel, gain[:1]),
-    ]
-    parts[3].by_state[:, 2 : 2 + count] = np.diag(scale)
+    shape = [1, *range(len(gain) - ellipse, len(gain))]
+    nuisance = _fitted(kernel, estimate.weighed.gain[2 : 2 + count] * scale)
+    nuisance.by_state[:, 2 : 2 + count] = np.diag(scale)
+    conversion = _fitted(kernel, gain[:1])
+    parts = [kernel[:1], _fitted(kernel, gain[shape]), widths, nuisance, conversion]
     values = [
         *(deconvolution.conversion_constant, fit.sigma, *fit.ellipticity[:ellipse]),
         *(functional.value for functional in functionals),
@@ -406,7 +404,7 @@ def _parameters(
     names = (
         "conversion_constant",
         "gaussian_sigma",
-        *_OF_GAUSSIAN[2 : 2 + ellipse],
+        *_GAUSSIAN_PARAMETERS[2 : 2 + ellipse],
         *(functional.name for functional in functionals),
         *nuisances,
         "conversion_constant_gaussian",
@@ -448,12 +446,9 @@ def _kernel_derivatives(
     by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
     by_state[:, division.places] = by_nuisance
     spread = division.lost[:, 1:] @ square_root(estimate.weighed.covariance)
-    derivatives = _Derivatives(
-        by_voltage=division.direct + by_nuisance @ estimate.weighed.gain[division.places],
-        by_state=by_state,
-        hidden=np.hstack([division.lost[:, :1], spread]),
-    )
-    return derivatives, division
+    by_voltage = division.direct + by_nuisance @ estimate.weighed.gain[division.places]
+    hidden = np.hstack([division.lost[:, :1], spread])
+    return _Derivatives(by_voltage, by_state, hidden), division
 
 
 def _posterior_kernel(

@@ -85,8 +85,8 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     r = field.r
     g = field.radial
     area = noise_area(r, g)
-    of_noise = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
-    return (_gaussian_width(r, g, sigma), _half_width(r, g), of_noise)
+    noise_width = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
+    return (_gaussian_width(r, g, sigma), _half_width(r, g), noise_width)
 
 
 def noise_area(r: FloatArray, g: FloatArray) -> float:

@@ -93,9 +93,9 @@ def _predict(
     size = np.linalg.norm(both[:, :-1], axis=0)
     others, rank = _left_over(rest, size)
     others_degrees = sum(sizes.values()) - sizes[out] - rank
-    of_own = both[:, nuisances].copy()
-    of_own[: len(rest)] = 0.0
-    left, rank = _left_over(np.hstack([of_own, both]), np.append(size[nuisances], size))
+    own_nuisances = both[:, nuisances].copy()
+    own_nuisances[: len(rest)] = 0.0
+    left, rank = _left_over(np.hstack([own_nuisances, both]), np.append(size[nuisances], size))
     degrees = sum(sizes.values()) - rank - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
@@ -141,9 +141,9 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
     shifts = []
     for link in links:
-        of_shifts = link[:, : len(link)]
+        shifting = link[:, : len(link)]
         others = link[:, len(link) : -1]
-        shifts.append(np.linalg.solve(of_shifts, link[:, -1] - others @ coefficients))
+        shifts.append(np.linalg.solve(shifting, link[:, -1] - others @ coefficients))
     places = np.zeros(repeats.size)
     places[shifted] = np.concatenate(shifts)
     # Over the scatter that is left: exact whether the noise is stated or not.

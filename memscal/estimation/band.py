@@ -49,7 +49,7 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
         noise = error * estimate.conversion_constant * reference
     elif (points := estimate.points).as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.
-        share = points.cell / points.of_places("readings") * estimate.outlier_weight
+        share = points.cell / points.place_numbers("readings") * estimate.outlier_weight
         noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
         signal = np.abs(smoothed.spectrum.values)
         clear = RELEVANT_OF_RASTER

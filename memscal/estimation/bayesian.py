@@ -198,12 +198,12 @@ class _Conditionals:
 
     def gain(self, shares: FloatArray) -> FloatArray:
         """Derivatives of the means by the weighted data, summed by shares (h,): (p, n)."""
-        of_sensor = np.bincount(self.family, shares, len(self.sensors.q))
+        sensor_shares = np.bincount(self.family, shares, len(self.sensors.q))
         some = shares > 0
-        kept = of_sensor > 0
+        kept = sensor_shares > 0
         components = self.by_component[some] * (shares[:, None] * self.filter)[some, None, :]
         parameters = [components, self.sensors.root[kept]]
-        weighted = of_sensor[kept, None, None] * self.sensors.q[kept]
+        weighted = sensor_shares[kept, None, None] * self.sensors.q[kept]
         data = [self.left[some], weighted]
         by_parameters = np.hstack([_abreast(part) for part in parameters])
         by_data = np.hstack([_abreast(part) for part in data])
@@ -211,15 +211,15 @@ class _Conditionals:
 
     def covariance_root(self, shares: FloatArray) -> FloatArray:
         """Square root (p, c) of the sum of covariances by shares (h,)."""
-        of_sensor = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
+        sensor_shares = np.bincount(self.family, shares * self.variance, len(self.sensors.q))
         some = shares > 0
-        kept = of_sensor > 0
+        kept = sensor_shares > 0
         # Posterior variances along the singular vectors; in all other directions the prior's.
         prior = self.prior[:, None]
         variance = self.variance[:, None]
         along = shares[:, None] * prior * variance / (variance + prior * self.singular**2)
         parts = [
-            self.sensors.root[kept] * (of_sensor[kept] ** 0.5)[:, None, None],
+            self.sensors.root[kept] * (sensor_shares[kept] ** 0.5)[:, None, None],
             self.by_component[some] * (along[some] ** 0.5)[:, None, :],
         ]
         if self.right.shape[1] < self.right.shape[2]:

@@ -48,7 +48,7 @@ class _Plane:
 class FieldModel(ForwardModel):
     """Voltages at the points of scans through fields."""
 
-    of_waves: ClassVar[bool] = False
+    sums_waves: ClassVar[bool] = False
 
     @cached_property
     def _plane(self) -> _Plane:

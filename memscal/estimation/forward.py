@@ -153,7 +153,7 @@ class ForwardModel:
     points: ScanPoints
     # Transform of the base stress per newton for each scan, on the same nodes.
     references: tuple[RadialSpectrum, ...]
-    of_waves: ClassVar[bool] = True  # voltages are sums of waves around a centre
+    sums_waves: ClassVar[bool] = True  # voltages are sums of waves around a centre
 
     @property
     def reference(self) -> RadialSpectrum:
@@ -234,7 +234,7 @@ class ForwardModel:
         """Columns (n, b + f): the ``first``, then F; and C (f, nodes): kernels K make F C K."""
         # By singular values: a film transmits few combinations of all waves.  No F and C where
         # there are not more points than columns.
-        if self.points.u.size <= DENSE or not self.of_waves:
+        if self.points.u.size <= DENSE or not self.sums_waves:
             return np.hstack(first), None
         alike: dict[bytes, list[int]] = {}
         for scan, measure in enumerate(self._measures):
@@ -257,11 +257,11 @@ class ForwardModel:
         np.concatenate(first, axis=1, out=columns[:, :start])
         for scans in alike.values():
             place = slice(start, start + size.size)
-            of_scans = np.where(np.isin(self.points.scan, scans), factor, 0.0)
+            own_factor = np.where(np.isin(self.points.scan, scans), factor, 0.0)
             for row in range(0, factor.size, BLOCK):
                 block = slice(row, row + BLOCK)
                 waves = geometry.interpolation[block] @ splines
-                columns[block, place] = waves * of_scans[block, None]
+                columns[block, place] = waves * own_factor[block, None]
             share = self._measures[scans[0]] / np.where(strongest > 0, strongest, 1.0)
             mixes.append(size[:, None] * right * share)
             start += size.size

@@ -56,7 +56,7 @@ def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
     # ``None`` where noise is stated, or where there are too few of either.
     if points.u_errors is not None or not points.planar:
         return None
-    groups = np.stack([points.scan, points.of_places("index"), points.load])
+    groups = np.stack([points.scan, points.place_numbers("index"), points.load])
     group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
     readings = np.bincount(group)
     degrees = group.size - int(group.max()) - 1
@@ -71,7 +71,7 @@ def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float |
     """Noise of one reading by divided third differences along the rows of a raster."""
     # sum c_i r_i / (sum c_i^2)^(1/2), 1/c_i the product of all x_i - x_j, is zero for every
     # parabola, and has the variance of the noise.
-    keys = np.stack([points.x, points.of_places("row"), points.repeat, points.scan])
+    keys = np.stack([points.x, points.place_numbers("row"), points.repeat, points.scan])
     four = np.lib.stride_tricks.sliding_window_view(np.lexsort(keys), 4)
     gaps = np.diff(points.x[four], axis=1)
     together = np.all(keys[1:, four[:, :1]] == keys[1:, four], axis=(0, 2))

@@ -147,7 +147,7 @@ class ScanPoints:
         inside = [self.scan == scan for scan in range(self.scans)]
         return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in inside)
 
-    def of_places(self, name: str) -> IndexArray:
+    def place_numbers(self, name: str) -> IndexArray:
         """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
         values = np.empty(self.u.size, dtype=np.intp)
         for scan, places in enumerate(self.places):

@@ -166,7 +166,7 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     points = estimate.points
     runs_along_x = points.free[points.scan, 0]
     along = np.where(runs_along_x, points.x, points.y)
-    across = np.where(runs_along_x, points.of_places("row"), 0)
+    across = np.where(runs_along_x, points.place_numbers("row"), 0)
     order = np.lexsort((along, across, points.repeat, points.scan))
     place = np.argsort(order)
     sequence = grouped(across, points.repeat, points.scan)
@@ -192,7 +192,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     # leaves m degrees of pure error; the means take l.  This is exact also where repeats lie only
     # near each other (Christensen, Ann. Stat. 17, 1989): the design contains their difference.
     points = estimate.points
-    keys = (points.scan, points.of_places("index"), points.load)
+    keys = (points.scan, points.place_numbers("index"), points.load)
     group = grouped(*(key[model.point] for key in keys))
     if points.decorrelation is not None or group.max() + 1 == group.size:
         return None
