@@ -244,9 +244,10 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
 def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
     """Return the name of a profile, and its readings."""
     points = profile.points.get("zz")
-    source = profile.scan.source
     arrays = (points.x, points.y, points.u) if points else (profile.r, profile.s_zz)
-    named = f"{source.file_name}, {profile.label}" if source else profile.label
+    named = profile.label
+    if profile.scan.source:
+        named = f"{profile.scan.source.file_name}, {named}"
     return f"The profile of {named}", tuple(array.tobytes() for array in arrays)
 
 
@@ -295,12 +296,12 @@ def _messages(
     yield from restore.failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}
-    for i, of_load in enumerate(notes, start=1):
-        for message in of_load:
+    for i, messages in enumerate(notes, start=1):
+        for message in messages:
             numbers.setdefault(message, []).append(str(i))
-    for message, of_profiles in numbers.items():
-        place = "" if len(of_profiles) == len(notes) else f"Profile {', '.join(of_profiles)}: "
-        yield replace(message, text=f"{place}{message.text}")
+    for message, profiles in numbers.items():
+        place = f"Profile {', '.join(profiles)}: " if len(profiles) < len(notes) else ""
+        yield replace(message, text=place + message.text)
 
 
 def _profile_messages(

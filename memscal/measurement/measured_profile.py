@@ -66,19 +66,15 @@ class ContactSignal:
 
 def contact_signals(loads: Sequence[Scan], apparatus: ApparatusFunction) -> list[ContactSignal]:
     """Calculate the contacts of a scan's nominal loads and near them, or raise a DomainError."""
-    signals = []
-    for i in range(0, len(loads), _AT_ONCE):
-        signals += _signals(loads[i : i + _AT_ONCE], apparatus)
-    return signals
-
-
-def _signals(loads: Sequence[Scan], apparatus: ApparatusFunction) -> list[ContactSignal]:
+    if len(loads) > _AT_ONCE:
+        first = contact_signals(loads[:_AT_ONCE], apparatus)
+        return first + contact_signals(loads[_AT_ONCE:], apparatus)
     try:
         return _signals_of_path(loads, apparatus)
     except (DomainError, ConvergenceError) as failure:
         if len(loads) > 1:
             # Each by itself shows which of them fails.
-            return [_signals([scan], apparatus)[0] for scan in loads]
+            return [contact_signals([scan], apparatus)[0] for scan in loads]
         if isinstance(failure, ConvergenceError):
             raise
         raise DomainError(
@@ -108,11 +104,13 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
         spectra = []
         for path in paths:
             spectra += [transfer * path[i].base_spectrum(nodes.k) for i in three]
-        voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, near.size, r.size)
+        voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T
+        voltages = voltages.reshape(-1, near.size, r.size)
         # Without friction both are the frictionless contact.
         below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
         by_load = (above - below) / (2 * _LOAD_STEP)
-        signals.append(ContactSignal(r, at, by_load, paths[0][three[1]].contact_radius))
+        contact_radius = paths[0][three[1]].contact_radius
+        signals.append(ContactSignal(r, at, by_load, contact_radius))
     return signals
 
 
@@ -144,16 +142,18 @@ def require_points(scan: Scan, signal: ContactSignal) -> None:
     if scan.y is not None:
         return
     order = np.argsort(scan.x)
-    measured = (complete.reshape(-1, scan.x.size).sum(axis=0) > 0)[order]
     x = scan.x[order]
+    measured = complete.reshape(-1, scan.x.size)[:, order].any(axis=0)
     places = np.flatnonzero(measured)
     missing = np.diff(places) - 1
     gaps = np.where(missing > 0, np.diff(x[places]), 0.0)
     if gaps.size and gaps.max() > signal.contact_radius:
         i = int(np.argmax(gaps))
+        first = x[places[i] + 1]
+        last = x[places[i + 1] - 1]
         raise InputError(
             f"{load_of(scan)}: {missing[i]} neighbouring points are missing (NaN), from "
-            f"{x[places[i] + 1] * 1e3:.4g} to {x[places[i + 1] - 1] * 1e3:.4g} mm.",
+            f"{first * 1e3:.4g} to {last * 1e3:.4g} mm.",
             why=f"The gap is wider than the contact's radius, {signal.contact_radius * 1e3:.3g} "
             "mm: the profile within it would be the model's, not measured.",
             cure="Measure these points again, or leave the lines of that load out.",
@@ -210,10 +210,12 @@ def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Fou
 
 def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
     fit = plain_pressure(scan, apparatus, points)
+    distance = fit.geometry.radius
     signal = fit.conversion_constant * fit.jacobian[:, 0]
     rest = points.u - fit.predicted
+    weight = np.ones_like(rest)
     count = fit.jacobian.shape[1]
-    return _Found(fit.centre[0], fit.geometry.radius, signal, rest, np.ones_like(rest), count)
+    return _Found(fit.centre[0], distance, signal, rest, weight, count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +238,8 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
     errors = scan.normal_load_errors
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.stated_load
     x, y = scan.positions
-    prepared = PreparedScan(replace(nominal, u_zz=scan.u_zz - 0.0 * excess), stated)
+    level = replace(nominal, u_zz=scan.u_zz - 0.0 * excess)
+    prepared = PreparedScan(level, stated)
     # Centre and noise are estimated twice, the second time from the first one's scan.
     for find in (_found_quickly, _found):
         level = prepared.scan
@@ -261,8 +264,10 @@ def _slope(signal: ContactSignal, found: _Found) -> FloatArray:
     free, stuck = (np.interp(found.distance[nearest], signal.r, u) for u in signal.voltage)
     sticking = 0.0
     if stuck > free:
-        sticking = min(max((found.signal[nearest] - free) / (stuck - free), 0.0), 1.0)
-    return np.asarray((1 - sticking) * signal.by_load[0] + sticking * signal.by_load[1])
+        above = found.signal[nearest] - free
+        sticking = np.clip(above / (stuck - free), 0.0, 1.0)
+    sliding, stuck = signal.by_load
+    return np.asarray((1 - sticking) * sliding + sticking * stuck)
 
 
 def _with_noise(scan: Scan, electronic: FloatArray, load_noise: FloatArray) -> Scan:
@@ -274,8 +279,8 @@ def _with_noise(scan: Scan, electronic: FloatArray, load_noise: FloatArray) -> S
         # The scatter of the loads is independent: it takes its share from the correlation.
         shape = (-1, correlation.shape[0])
         electronic_variance = np.nanmean(electronic.reshape(shape) ** 2, axis=0)
-        share = np.sqrt(electronic_variance / np.nanmean(total.reshape(shape) ** 2, axis=0))
-        correlation = _scaled(correlation, share)
+        variance = np.nanmean(total.reshape(shape) ** 2, axis=0)
+        correlation = _scaled(correlation, np.sqrt(electronic_variance / variance))
     return replace(scan, u_zz_errors=total, u_zz_correlation=correlation)
 
 
@@ -301,7 +306,8 @@ def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
     largest = np.abs(found.signal).max()
     tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * largest)
     variance = tried[:, None] ** 2 + load_noise**2
-    return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
+    deviance = np.sum(np.log(variance) + square / variance, axis=1)
+    return float(tried[np.argmin(deviance)])
 
 
 def measured_scan(scan: Scan) -> MeasuredScan:
@@ -335,7 +341,8 @@ def measured_profile(
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     background = posterior.estimate.model.drift_columns @ posterior.drift
-    s_zz = (average @ (restored.points.u - background))[order] / a
+    averaged = average @ (restored.points.u - background)
+    s_zz = averaged[order] / a
     average = average[order]
     decorrelation = restored.points.decorrelation
     if decorrelation is None:
@@ -421,7 +428,8 @@ def _averaging(restored: Restoration, noise: FloatArray) -> tuple[Any, FloatArra
     (x, y), place = np.unique(places, axis=1, return_inverse=True)
     place = place.ravel()
     share = noise**-2 / np.bincount(place, noise**-2)[place]
-    return csr_array((share, (place, np.arange(noise.size)))), x, y
+    average = csr_array((share, (place, np.arange(noise.size))))
+    return average, x, y
 
 
 def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:
@@ -439,10 +447,9 @@ def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray
     n = by_centre.shape[1]
     carried = np.linalg.solve(covariance[:n, :n], covariance[:n, n:])
     left = covariance[n:, n:] - covariance[n:, :n] @ carried
-    return {
-        "centre": (by_centre + by_drift @ carried.T) @ square_root(covariance[:n, :n]),
-        "baseline": by_drift @ square_root(left),
-    }
+    by_centre = by_centre + by_drift @ carried.T
+    centre = by_centre @ square_root(covariance[:n, :n])
+    return {"centre": centre, "baseline": by_drift @ square_root(left)}
 
 
 def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
@@ -468,8 +475,9 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
         kernel_changes["load"] = shared["load"][:, None]
     for source, change in kernel_changes.items():
         # G = (A G)/A: its own change beside that of what was restored with it.
-        of_g = (change[:-1] - transfer[:, None] * change[-1]) / apparatus.conversion_constant
-        changes[source] = changes[source] + on_axis * posterior.stress @ of_g
+        by_kernel = change[:-1] - transfer[:, None] * change[-1]
+        by_kernel = on_axis * posterior.stress @ by_kernel / apparatus.conversion_constant
+        changes[source] = changes[source] + by_kernel
     variance = row @ posterior.covariances["scan"][:nodes, :nodes] @ row
     budget = {"noise": float(np.sqrt(max(variance, 0.0)))}
     for source, change in changes.items():

@@ -117,15 +117,16 @@ def _three_orders(
     first = np.asarray(hyp0f1(b + 1, z), np.float64)
     second = np.asarray(hyp0f1(b + 2, z), np.float64)
     # Downwards the recurrence is stable (DLMF 10.6.1).
-    return first + z / (b * (b + 1)) * second, first, second
+    own = first + z / (b * (b + 1)) * second
+    return own, first, second
 
 
 @lru_cache(maxsize=16)
 def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
     x = np.frombuffer(k) * film.thickness
-    nu = film.poisson_ratio
-    return np.asarray(base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
+    pressure = base_normal_from_pressure(x, film.poisson_ratio)
+    return np.asarray(base_normal_from_shear(x, film.poisson_ratio) / pressure)
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
@@ -175,7 +176,8 @@ def _averaged_departures(start: ProfileEstimate, weighing: Weighing) -> _Pressur
     fit = weighing.reduced.fit
     weighed = weighing.average()
     kernels = weighing.basis.kernels(model.k)
-    rows = np.vstack([kernels, np.eye(weighing.basis.flat, kernels.shape[1])[2:]])
+    unchanged = np.eye(weighing.basis.flat, kernels.shape[1])
+    rows = np.vstack([kernels, unchanged[2:]])
     pressure = fit.conversion_constant * kernels[:, 0]
     fitted = np.concatenate([pressure, fit.centre[model.points.free], fit.drift])
     growth = start.adopted_noise(weighed.noise) / weighed.noise
@@ -245,7 +247,8 @@ def fitted_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> li
         columns = _shape_columns(shapes, start, forces, widths)
         columns[..., 1:-drift] *= width
         flat = points.standardised(columns.reshape(data.size, -1), start.weights)
-        inverse = np.linalg.pinv(np.moveaxis(flat.reshape(columns.shape), 1, 0))
+        by_shape = np.moveaxis(flat.reshape(columns.shape), 1, 0)
+        inverse = np.linalg.pinv(by_shape)
         forces, steps, *_ = (inverse @ data).T
         # A step that turns back is half as long as the last, so that no width swings for ever.
         ahead = steps * width / widths
@@ -290,7 +293,8 @@ def _shape_columns(
     drift = model.drift_columns[:, None]
     drift = np.broadcast_to(drift, (*signal.shape, drift.shape[-1]))
     own = np.stack([signal, forces * widening], axis=2)
-    return np.concatenate([own, radial[:, :, None] * towards[:, None], drift], axis=2)
+    centre = radial[:, :, None] * towards[:, None]
+    return np.concatenate([own, centre, drift], axis=2)
 
 
 #: Eigenvalues of the covariance of A G below this share of the largest count as zero.
@@ -372,12 +376,13 @@ def posterior_of(
     by_sensor = [shared.get(name, nothing) for name in names]
     of_film = np.reshape(by_film, (-1, nodes)).T
     of_kernel = np.reshape(by_sensor, (-1, nodes)).T
+    together = of_film * transfer[:, None] + of_kernel * film[:, None]
     sensor = apparatus_changes(apparatus, model.k, shared)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
     stretched = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
     shifts = {
         "apparatus": _signals(estimate, mean, sensor * film[:, None]),
-        "film": _signals(estimate, mean, of_film * transfer[:, None] + of_kernel * film[:, None]),
+        "film": _signals(estimate, mean, together),
         "position_scale": stretched[:, None],
     }
     if "load" in shared:
@@ -392,7 +397,8 @@ def posterior_of(
         covariances[source] = change @ change.T
     variance = sum(np.diag(covariance)[:nodes] for covariance in covariances.values())
     gaussian = scan.stated_load * film * gaussian_transfer(model.k, estimate.gaussian.sigma)
-    lost = _RESOLVED * np.sqrt(np.maximum(variance, 0.0)) > gaussian
+    uncertainty = np.sqrt(np.maximum(variance, 0.0))
+    lost = _RESOLVED * uncertainty > gaussian
     resolved = model.k[int(np.argmax(lost)) if lost.any() else -1]
     return Posterior(
         estimate=estimate,
@@ -454,8 +460,9 @@ def input_changes(
     apparatus: ApparatusFunction, names: Iterable[str], k: FloatArray
 ) -> dict[str, FloatArray]:
     """Return changes (n,) of the transform of A G, in V/Pa, by inputs of the calibration."""
-    known = [name for name in names if name in apparatus.kernel_changes]
-    return dict(zip(known, _kernel_changes(apparatus, k.tobytes(), tuple(known)), strict=True))
+    known = tuple(name for name in names if name in apparatus.kernel_changes)
+    changes = _kernel_changes(apparatus, k.tobytes(), known)
+    return dict(zip(known, changes, strict=True))
 
 
 @lru_cache(maxsize=16)
@@ -484,8 +491,9 @@ def _alike(film: ElasticFilm, other: ElasticFilm) -> bool:
     """Whether two films state the same properties and uncertainties."""
     names = [*_FILM_PROPERTIES, *(f"{name}_uncertainty" for name in _FILM_PROPERTIES)]
     # What is not stated is not a number.
-    values = np.array([[getattr(one, name) for name in names] for one in (film, other)], float)
-    same = np.isclose(values[0], values[1], rtol=1e-6, atol=0.0, equal_nan=True)
+    values = np.array([getattr(film, name) for name in names], float)
+    others = np.array([getattr(other, name) for name in names], float)
+    same = np.isclose(values, others, rtol=1e-6, atol=0.0, equal_nan=True)
     return film.name == other.name and bool(same.all())
 
 
@@ -507,9 +515,9 @@ def _sensor_changes(
     # Rings far out count by their area.
     ring = np.sqrt(profile.r + profile.r[1])
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
-    uncertain = values > max(_EXACT * float(values[-1]), 0.0)
-    roots = vectors[:, uncertain] * np.sqrt(values[uncertain]) / ring[:, None]
-    table = np.column_stack([profile.g, roots])
+    uncertain = values > max(_EXACT * values[-1], 0.0)
+    roots = vectors[:, uncertain] * np.sqrt(values[uncertain])
+    table = np.column_stack([profile.g, roots / ring[:, None]])
     transforms = hankel_transform(profile.r, table, np.frombuffer(nodes))
     return transforms[:, 0], transforms[:, 1:]
 
