@@ -19,6 +19,7 @@ from memscal.cli.options import (
     report_options,
     trust_options,
 )
+from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import together
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
 
 
 _COEFFICIENT = Quantity("ratio", open_low=False, infinite=True)
-_FORMATS = [suffix.removeprefix(".") for suffix in out.FIGURE_SUFFIXES]
+_FORMATS = [suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]
 
 EXAMPLES = """\b
 Examples:

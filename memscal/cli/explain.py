@@ -29,19 +29,20 @@ def command(check: str | None, as_json: bool) -> int:
     """
     from memscal.model.checks import EXPLANATIONS
 
-    chosen = EXPLANATIONS if check is None else {(name := _kind(check)): EXPLANATIONS[name]}
-    listed = [(name, *texts) for name, texts in chosen.items()]
+    names = list(EXPLANATIONS) if check is None else [_kind(check)]
     if as_json:
-        names = ("name", "tests", "if_it_fails")
-        checks = [dict(zip(names, entry, strict=True)) for entry in listed]
+        checks = []
+        for name in names:
+            tests, cure = EXPLANATIONS[name]
+            checks.append({"name": name, "tests": tests, "if_it_fails": cure})
         emit_json({"schema_version": "1", "checks": checks})
     elif check is None:
-        rows = [(name.replace("_", " "), tests) for name, tests, _ in listed]
+        rows = [(name.replace("_", " "), EXPLANATIONS[name][0]) for name in names]
         emit_tables(Table("Quality checks", ("check", "what it tests"), rows))
     else:
-        [(name, tests, cure)] = listed
+        tests, cure = EXPLANATIONS[names[0]]
         rows = [("what it tests", tests), ("if it fails", cure)]
-        emit_tables(Table(name.replace("_", " "), ("", ""), rows))
+        emit_tables(Table(names[0].replace("_", " "), ("", ""), rows))
     return DONE
 
 

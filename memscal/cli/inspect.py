@@ -1,6 +1,6 @@
 """``memscal inspect``: contents of a file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,44 +42,50 @@ def command(file: Path, accept_altered: bool, as_json: bool) -> int:
 
 
 def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
-    rows = [
-        ("schema", f"{contents['schema']} {contents['schema_version']}"),
-        ("title", contents["title"]),
-        ("sha256", contents["sha256"]),
-        ("altered", contents.get("altered", "")),
-    ]
-    yield Table(str(contents["file"]), ("", ""), [row for row in rows if row[1]])
+    rows = [("schema", f"{contents['schema']} {contents['schema_version']}")]
+    named = [name for name in ("title", "sha256", "altered") if contents.get(name)]
+    rows += [(name, contents[name]) for name in named]
+    yield Table(str(contents["file"]), ("", ""), rows)
 
-    quantities = [
-        (item["name"].replace("_", " "), _value(item), item["path"])
-        for item in contents["quantities"]
-    ]
-    yield Table(
-        "Quantities (± standard uncertainty, k = 1)", ("quantity", "value", "path"), quantities
-    )
-    arrays = []
-    for item in contents["arrays"]:
-        shape = " x ".join(str(n) for n in item["shape"]) or "one"
-        low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
-        arrays.append((item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")))
-    head = ("path", "shape", "from", "to", "unit", "missing")
-    shown = len(head) - all(row[-1] == "-" for row in arrays)
-    yield Table("Arrays", head[:shown], [row[:shown] for row in arrays])
-    checks = []
-    failed = set()
-    meanings = []
-    for i, check in enumerate(contents["checks"]):
-        name = check["name"].replace("_", " ")
-        numbers = (check["value"], check["limit"])
-        result = "passed" if check["passed"] else "FAILED"
-        checks.append((name, *(_number(number, ".3g") for number in numbers), result))
-        if not check["passed"]:
-            failed.add(i)
-            meanings.append((name, check["meaning"]))
-    columns = ("check", "value", "limit", "result")
-    yield Table("Quality checks", columns, checks, frozenset(failed))
+    quantities = [(_words(item), _value(item), item["path"]) for item in contents["quantities"]]
+    title = "Quantities (± standard uncertainty, k = 1)"
+    yield Table(title, ("quantity", "value", "path"), quantities)
+    yield _arrays(contents["arrays"])
+    checks = contents["checks"]
+    failed = {i: check for i, check in enumerate(checks) if not check["passed"]}
+    head = ("check", "value", "limit", "result")
+    shown = [_check_row(check) for check in checks]
+    yield Table("Quality checks", head, shown, frozenset(failed))
+    meanings = [(_words(check), check["meaning"]) for check in failed.values()]
     yield Table("What the failures mean", ("", ""), meanings)
     yield from _provenance(contents["provenance"])
+
+
+def _arrays(arrays: Sequence[Mapping[str, Any]]) -> Table:
+    """Return paths, shapes, ranges and units; the number of missing values where there are any."""
+    head = ["path", "shape", "from", "to", "unit"]
+    missing = any(item["missing"] for item in arrays)
+    if missing:
+        head.append("missing")
+    rows = []
+    for item in arrays:
+        shape = " x ".join(str(n) for n in item["shape"]) or "one"
+        low = _number(item["minimum"], ".5g")
+        row = [item["path"], shape, low, _number(item["maximum"], ".5g"), item["unit"]]
+        if missing:
+            row.append(str(item["missing"] or "-"))
+        rows.append(row)
+    return Table("Arrays", head, rows)
+
+
+def _check_row(check: Mapping[str, Any]) -> tuple[str, ...]:
+    value = _number(check["value"], ".3g")
+    limit = _number(check["limit"], ".3g")
+    return _words(check), value, limit, "passed" if check["passed"] else "FAILED"
+
+
+def _words(item: Mapping[str, Any]) -> str:
+    return str(item["name"]).replace("_", " ")
 
 
 def _value(item: Mapping[str, Any]) -> str:
@@ -88,10 +94,11 @@ def _value(item: Mapping[str, Any]) -> str:
     if isinstance(item["value"], str):
         return item["value"]
     factor, unit = _unit_to_show(item)
+    value = item["value"] * factor
     spread = item["standard_uncertainty"]
     if spread is None:
-        return f"{item['value'] * factor:.6g}" + ("" if unit == "1" else f" {unit}")
-    return format_measured(item["value"] * factor, spread * factor, unit)
+        return f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
+    return format_measured(value, spread * factor, unit)
 
 
 def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
@@ -99,11 +106,12 @@ def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
     from memscal.formats.units import dimension_of, to_si
 
     unit = str(item["unit"])
-    dimension = dimension_of(unit, str(item["path"]))
+    path = str(item["path"])
+    dimension = dimension_of(unit, path)
     if dimension == "length":
-        return float(to_si(1e3, unit, dimension, str(item["path"]))), "mm"
+        return float(to_si(1e3, unit, dimension, path)), "mm"
     if dimension == "stress" and str(item["name"]).endswith("modulus"):
-        return float(to_si(1e-6, unit, dimension, str(item["path"]))), "MPa"
+        return float(to_si(1e-6, unit, dimension, path)), "MPa"
     return 1.0, unit
 
 
@@ -120,8 +128,8 @@ def _provenance(provenance: Mapping[str, Any]) -> Iterator[Table]:
         if isinstance(value, Mapping):
             held = [(key.replace("_", " "), stated_text(item)) for key, item in value.items()]
             groups.append(Table(words.capitalize(), ("", ""), held))
-        elif isinstance(value, list):
-            rows += [(words, str(item)) for item in value]
         else:
-            rows += [(words, line) for line in str(value).splitlines() if line]
-    yield from (Table("Provenance", ("", ""), rows), *groups)
+            lines = value if isinstance(value, list) else str(value).splitlines()
+            rows += [(words, str(line)) for line in lines if line]
+    yield Table("Provenance", ("", ""), rows)
+    yield from groups

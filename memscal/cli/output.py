@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from memscal.errors import OutputError
+from memscal.figures import FIGURE_SUFFIXES
 from memscal.formats.files import atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import Message
 from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, text_of
@@ -214,9 +215,6 @@ def emit_result(
 def _in_bold(text: str, failed: bool) -> str:
     return click.style(text, bold=True, fg="red" if failed else None)
 
-
-FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
-"""Those of ``memscal.figures.style``, which would import matplotlib; a test compares them."""
 
 _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 

@@ -27,10 +27,10 @@ from memscal.figures.calibration_scan import (
 from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED, channel_indices, legend_above
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, Reconvolution
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import failed_check_messages
 from memscal.model.quantities import ESTIMATED, KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.readings.find_places import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_name
+from memscal.summaries.table import verdict
 
 _Line: TypeAlias = tuple[str, str, str]  # text, colour and weight
 _MOST_DRAWN = 5_000  # points of lines
@@ -208,7 +208,6 @@ def _finish(axes: Axes, drawn: ScalarMappable, label: str) -> None:
 _PANELS_HEIGHT = 8.2
 _LINE_HEIGHT = 0.155
 _LINE_WIDTH = 122
-_MAX_FAILED_LINES = 12
 _MOST_MAPS = 4
 _MAP_HEIGHT = 2.2
 _MARGIN = 0.012  # left and right of the lines of text, of the width
@@ -300,18 +299,11 @@ def _text_lines(data: ApparatusData, loads: Loads) -> list[_Line]:
     # A long name is cut, not the channel behind it.
     name = textwrap.shorten(f"Apparatus function of {sensor_name(data)}", 82, placeholder=" …")
     title = textwrap.shorten(f"{name}, channel {data.sensor.channel}", 95, placeholder=" …")
-    lines = _wrapped(title, ink, "bold")
-    lines += _wrapped(_setting(data, loads), COLOURS["muted"])
-    lines += _wrapped(values_text(data), ink)
-    if data.checks and data.passed:
-        lines += _wrapped(f"All {len(data.checks)} quality checks passed.", ink)
-    failed: list[_Line] = []
-    for message in failed_check_messages(data.checks):
-        failed += _wrapped(message.text, COLOURS["failed"])
-    if len(failed) > _MAX_FAILED_LINES:
-        ending = "… and more failed checks, which the artifact names."
-        failed[_MAX_FAILED_LINES - 1 :] = _wrapped(ending, COLOURS["failed"])
-    return lines + failed
+    lines = [(title, ink, "bold"), (_setting(data, loads), COLOURS["muted"], "normal")]
+    lines.append((values_text(data), ink, "normal"))
+    colour = ink if data.passed else COLOURS["failed"]
+    said = textwrap.wrap(verdict(data.checks), _LINE_WIDTH)
+    return lines + [(line, colour, "normal") for line in said]
 
 
 def _setting(data: ApparatusData, loads: Loads) -> str:
@@ -332,10 +324,6 @@ def _setting(data: ApparatusData, loads: Loads) -> str:
     return "; ".join(parts)
 
 
-def _wrapped(text: str, colour: str, weight: str = "normal") -> list[_Line]:
-    return [(line, colour, weight) for line in textwrap.wrap(text, _LINE_WIDTH) or [""]]
-
-
 def _write_lines(figure: Figure, lines: list[_Line]) -> None:
     height = figure.get_figheight()
     for i, (line, colour, weight) in enumerate(lines):
@@ -344,6 +332,6 @@ def _write_lines(figure: Figure, lines: list[_Line]) -> None:
         text = figure.text(_MARGIN, y, style.drawable(line), color=colour, weight=weight, va="top")
         size = 9.0 if i == 0 else 7.5
         text.set(parse_math=False, fontsize=size, in_layout=False)
-        # Lines are broken by their number of characters; one of wide letters is set smaller.
+        # A line that is too wide, as one of wide letters, is set smaller.
         available = (1 - 3 * _MARGIN) * figure.bbox.width
         text.set_fontsize(size * min(1.0, available / max(text.get_window_extent().width, 1.0)))

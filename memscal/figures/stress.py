@@ -10,10 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from memscal.errors import InputError
 from memscal.figures import style
 from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED
-from memscal.measurement.restoration import Restoration, StressComparison
+from memscal.measurement.restoration import Restoration
 from memscal.mechanics.contact import Contact
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
@@ -88,16 +87,15 @@ def _legend(
 _LEAST_LIMIT = 3.5
 
 
-def restoration_figure(restored: Restoration, compared: StressComparison | None = None) -> Figure:
+def restoration_figure(restored: Restoration) -> Figure:
     """Draw the stress at the base as restored, as blurred by the sensor, and as calculated."""
-    compared = restored.comparison if compared is None else compared
     with style.panels_of(3.3, 1, 2, width_ratios=(1.6, 1)) as (figure, panels):
-        _draw_stress(panels[0], restored, compared)
+        _draw_stress(panels[0], restored)
         _draw_residuals(panels[1], restored)
     return figure
 
 
-def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison | None) -> None:
+def _draw_stress(axes: Axes, restored: Restoration) -> None:
     r = restored.r / MM
     stress = restored.sigma_zz / KPA
     band = EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
@@ -106,6 +104,7 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison |
     blurred = restored.blurred_stress(restored.r) / KPA
     label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
     axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.", label=label)
+    compared = restored.comparison
     if compared is not None:
         label = "expected"
         if isinstance(compared.stress, Contact):
@@ -153,14 +152,9 @@ _SHOWN_MEANS = 3.0
 _NAMED = 6
 
 
-def contact_figure(
-    contacts: Contact | Sequence[Contact], *, beside: Sequence[Contact] = ()
-) -> Figure:
+def contact_figure(contact: Contact, *, beside: Sequence[Contact] = ()) -> Figure:
     """Draw pressure and shear of one contact or several; of several, load against depth, too."""
-    first = [contacts] if isinstance(contacts, Contact) else contacts
-    contacts = [*first, *beside]
-    if not contacts:
-        raise InputError("There is no contact to draw.")
+    contacts = [contact, *beside]
     several = len(contacts) > 1
     with style.panels_of(2.9, 1, 3 if several else 2, note="") as (figure, panels):
         colours = style.shades(len(contacts), 0.15)

@@ -1,7 +1,6 @@
 """Style of all figures: type, colours, layout, and the bytes of a figure's file."""
 
 import io
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
+from memscal.figures import FIGURE_SUFFIXES
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray
 
@@ -79,8 +79,7 @@ def house_style() -> Iterator[None]:
 
 
 def drawable(text: str) -> str:
-    """Return the text in the font's characters, a mark for each other one; with µm for um."""
-    text = re.sub(r"\bum\b", "µm", text)
+    """Return the text in the font's characters, a mark for each other one."""
     font = get_font(findfont("DejaVu Sans"))
     return "".join(c if font.get_char_index(ord(c)) else "\ufffd" for c in text)
 
@@ -217,9 +216,6 @@ def marker_size(points: int) -> float:
     """Return a marker size in points that keeps 33 points visible and 400 apart."""
     return float(min(4.0, max(1.5, 4.0 * (40.0 / max(points, 1)) ** 0.5)))
 
-
-FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
-"""What a figure's file name may end in."""
 
 # matplotlib writes the time and its own version unless the metadata leave them out.
 _METADATA: Mapping[str, dict[str, str | None]] = {

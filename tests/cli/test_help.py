@@ -8,7 +8,6 @@ from helpers.console import Run
 
 from memscal.cli import main
 from memscal.cli.commands import COMMANDS, memscal
-from memscal.cli.output import FIGURE_SUFFIXES
 from memscal.version import __version__
 
 
@@ -92,9 +91,3 @@ def test_words_are_completed(
         main([])
     lines = capsys.readouterr().out.splitlines()
     assert {line.partition(",")[2] for line in lines} == expected
-
-
-def test_figures_end_as_the_room_that_draws_them_allows():
-    from memscal.figures.style import FIGURE_SUFFIXES as DRAWN
-
-    assert FIGURE_SUFFIXES == DRAWN
