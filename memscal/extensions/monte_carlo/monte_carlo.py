@@ -17,7 +17,6 @@ from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import BUDGETED, InputEffect
 from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
-from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
 from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, relative, rod_spectrum
 from memscal.model.arrays import FloatArray
@@ -59,7 +58,10 @@ class DrawnScans:
     def result(self, index: int) -> FloatArray | str:
         """Parameters and G of a draw, in one row, or why it failed."""
         try:
-            return self._calibrated(self.draw(index)) + self._shift_by_law(index)
+            first = self.solution
+            channel = first.estimate.points.channel
+            drawn = solve(self.draw(index), first.stresses, first.method, channel)
+            return self._results_of(drawn) + self._shift_by_law(index)
         except MemscalError as failure:
             return failure.problem
 
@@ -109,15 +111,15 @@ class DrawnScans:
         estimate = self.solution.estimate
         voltages = uncertainty.drawn_about(self.solution)
         signal = voltages - estimate.background
-        exact = {item.source for item in self.solved}
-        calibrated = {source for source, effect in self.effects.items() if effect.exact}
+        solved = {item.source for item in self.solved}
         for source, effect in self.effects.items():
             # An effect is that of a larger value in the analysis, so its sign is turned.
-            if source not in exact | calibrated:
+            if source not in solved and effect.exact is None:
                 voltages = voltages - standard[source] * (effect.voltage + effect.scaling * signal)
-        if exact:
+        if solved:
             model = replace(estimate.model, references=self._reference_changes(standard))
-            voltages = voltages + model.signal(self._geometry, estimate.kernel)
+            geometry = model.geometry(estimate.centres)
+            voltages = voltages + model.signal(geometry, estimate.kernel)
         return np.asarray(voltages)
 
     @cached_property
@@ -132,7 +134,8 @@ class DrawnScans:
         ):
             owners = [getattr(scan, component) for scan in scans]
             for number, owner in enumerate(dict.fromkeys(owners), start=1):
-                value, u = (getattr(owner, attribute + end, 0.0) for end in ("", "_uncertainty"))
+                value = getattr(owner, attribute, 0.0)
+                u = getattr(owner, f"{attribute}_uncertainty", 0.0)
                 source = name if number == 1 else f"{name}_{number}"
                 if u and source in self.effects:
                     bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
@@ -142,34 +145,31 @@ class DrawnScans:
         return tuple(inputs)
 
     @cached_property
-    def _geometry(self) -> Geometry:
-        return self.solution.estimate.model.geometry(self.solution.estimate.centres)
-
-    @cached_property
     def _nominal(self) -> list[FloatArray]:
-        pairs = zip(self.solution.scans, self.solution.estimate.model.references, strict=True)
-        return [_rod(replace(s, film=s.film and s.film.expected), ref, s) for s, ref in pairs]
+        spectra = []
+        references = self.solution.estimate.model.references
+        for scan, reference in zip(self.solution.scans, references, strict=True):
+            expected = replace(scan, film=scan.film and scan.film.expected)
+            spectra.append(_rod(expected, reference, scan))
+        return spectra
 
     def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""
-        true = list(self.solution.scans)
+        scans = list(self.solution.scans)
         for item in self.solved:
             value = np.clip(item.value + item.u * standard[item.source], *item.bounds)
             for i in item.scans:
-                owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
-                true[i] = replace(true[i], **{item.component: owner})
+                owner = getattr(scans[i], item.component)
+                owner = replace(owner, **{item.attribute: float(value)})
+                scans[i] = replace(scans[i], **{item.component: owner})
         references = self.solution.estimate.model.references
-        stated = self.solution.scans
-        return tuple(
-            replace(ref, values=(_rod(scan, ref, own) - nominal) * relative(ref.values, nominal))
-            for scan, ref, own, nominal in zip(true, references, stated, self._nominal, strict=True)
-        )
-
-    def _calibrated(self, scans: list[Scan]) -> FloatArray:
-        """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
-        first = self.solution
-        channel = self.solution.estimate.points.channel
-        return self._results_of(solve(scans, first.stresses, first.method, channel))
+        changes = []
+        for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
+            nominal = self._nominal[i]
+            change = _rod(scan, reference, self.solution.scans[i]) - nominal
+            values = change * relative(reference.values, nominal)
+            changes.append(replace(reference, values=values))
+        return tuple(changes)
 
     def _results_of(self, solution: Solution) -> FloatArray:
         numbers, g = uncertainty.read_off(solution.deconvolution, self.solution.deconvolution.g.r)
@@ -365,8 +365,12 @@ def monte_carlo(
     model = DrawnScans(solution, effects, calibration.correlations, seed)
     rows: list[FloatArray] = []
     failures: list[str] = []
-    for result in counted(shared(model.result, range(draws), workers=workers), "draws", draws):
-        (failures if isinstance(result, str) else rows).append(result)
+    results = shared(model.result, range(draws), workers=workers)
+    for result in counted(results, "draws", draws):
+        if isinstance(result, str):
+            failures.append(result)
+        else:
+            rows.append(result)
     if len(rows) < 2:
         problem = f"{len(failures)} of {draws} draws could not be calibrated."
         cure = "The scan is close to failing, too; measure with less noise."
@@ -374,17 +378,16 @@ def monte_carlo(
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
     expected = uncertainty.expected_values(solution)
     deconvolution = solution.deconvolution
-    comparisons = tuple(
-        _compared(calibration, name, expected[name], column)
-        for name, column in zip(BUDGETED, samples.T, strict=True)
-    )
+    comparisons = []
+    for name, column in zip(BUDGETED, samples.T, strict=True):
+        comparisons.append(_compared(calibration, name, expected[name], column))
     first_order = uncertainties(solution, deconvolution, effects, calibration.correlations)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         sources=("noise", *effects),
         samples=samples,
-        comparisons=comparisons,
+        comparisons=tuple(comparisons),
         r=deconvolution.g.r,
         g_mean=g.mean(axis=0),
         g_uncertainty=g.std(axis=0, ddof=1),
@@ -452,11 +455,11 @@ def _messages(
     if not calibration.effects:
         text = "No input states an uncertainty: the draws are of noise alone."
         yield Message("uncertainty_unstated", text)
-    hidden = [
-        f"{1 - (comparison.first_order / comparison.stated) ** 2:.0%} of {comparison.name}"
-        for comparison in comparisons
-        if comparison.first_order < (1 - _TOLERANCE) * comparison.stated
-    ]
+    hidden = []
+    for comparison in comparisons:
+        if comparison.first_order < (1 - _TOLERANCE) * comparison.stated:
+            share = comparison.first_order / comparison.stated
+            hidden.append(f"{1 - share**2:.0%} of {comparison.name}")
     if hidden:
         text = (
             "Not all of the stated uncertainty scatters: of its square, what regularisation or "
