@@ -1,12 +1,11 @@
 """memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
 
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
-from memscal.errors import FormatError, OutputError, placed
+from memscal.errors import FormatError, placed
 from memscal.formats import groups, values
-from memscal.formats.files import FilePath, ensure_writable, together
+from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -268,26 +267,3 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
         item = f"{path}/{name}"
         truth[name] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
     return truth
-
-
-def ensure_folder_writable(folder: FilePath, names: Iterable[str], *, overwrite: bool) -> None:
-    """Prove that files of these names can be written in a folder, which need not exist yet."""
-    target = Path(folder)
-    if not target.exists() and not target.is_symlink():
-        ensure_writable(target)
-        return
-    if not target.is_dir():
-        why = "An experiment is several scans, each a file of its own."
-        cure = "Give the name of a folder; a new one is made."
-        raise OutputError(f"The output {target} is not a folder.", why=why, cure=cure)
-    for name in names:
-        ensure_writable(target / name, overwrite=overwrite)
-
-
-def write_scans(scans: Mapping[str, Scan], folder: FilePath, *, overwrite: bool = False) -> None:
-    """Write scans as memscal-scan files of one folder, all of them or none."""
-    target = Path(folder)
-    ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
-    with together(target):
-        for name, scan in scans.items():
-            write_scan(scan, target / name, overwrite=overwrite)

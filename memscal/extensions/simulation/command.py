@@ -16,7 +16,8 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, PAPER_FILM, Quantity, option, options_of, output_options, si
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable, working
 from memscal.cli.reference import interface_of, interface_options
-from memscal.formats.files import together
+from memscal.errors import OutputError
+from memscal.formats.files import ensure_writable, together
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
@@ -318,11 +319,24 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
             raise click.UsageError(problem)
 
 
+def _require_writable_folder(target: Path, *, overwrite: bool) -> None:
+    """Prove that the scans can be written in a folder, which need not exist yet."""
+    if not target.exists() and not target.is_symlink():
+        ensure_writable(target)
+        return
+    if not target.is_dir():
+        why = "An experiment is several scans, each a file of its own."
+        cure = "Give the name of a folder; a new one is made."
+        raise OutputError(f"The output {target} is not a folder.", why=why, cure=cure)
+    for name in FILES:
+        ensure_writable(target / name, overwrite=overwrite)
+
+
 def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
     from memscal.extensions.simulation.experiment import simulate_experiment
-    from memscal.formats.scan import ensure_folder_writable, write_scans
+    from memscal.formats.scan import write_scan
 
-    ensure_folder_writable(folder, FILES, overwrite=force)
+    _require_writable_folder(folder, overwrite=force)
     radius = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
     sphere: Any = common.indenter_from("sphere", radius)
     with working("Simulating"):
@@ -340,7 +354,8 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
         )
     scans = {folder / f"{name}.h5": scan for name, scan in made.scans.items()}
     with together(folder):
-        write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
+        for path, scan in scans.items():
+            write_scan(scan, path, overwrite=force)
         if as_json:
             described = [_described(scan, path) for path, scan in scans.items()]
             emit_json({"schema_version": "1", "synthetic": True, "scans": described})
