@@ -47,9 +47,9 @@ class Progress:
     >>> print(progress)
     137 of 500 contacts, 79 s left
     >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> told = []
-    >>> drawn = memscal.monte_carlo(calibration, draws=2, progress=told.append)
-    >>> [(progress.task, progress.done, progress.total) for progress in told]
+    >>> heard = []
+    >>> drawn = memscal.monte_carlo(calibration, draws=2, progress=heard.append)
+    >>> [(progress.task, progress.done, progress.total) for progress in heard]
     [('draws', 1, 2), ('draws', 2, 2)]
     """
 
@@ -127,8 +127,10 @@ def in_steps(*steps: str) -> Iterator[None]:
     def hear(step: str) -> None:
         # What is repeated within a later step, as by another law of the film, counts for nothing.
         nonlocal done
-        if (number := steps.index(step) + 1) > done:
-            tell(done := number)
+        number = steps.index(step) + 1
+        if number > done:
+            done = number
+            tell(done)
 
     token = _STEPS.set(hear)
     try:
@@ -139,7 +141,8 @@ def in_steps(*steps: str) -> Iterator[None]:
 
 def done_with(step: str) -> None:
     """Tell that a step is done, of a task in steps if there is one."""
-    if (hear := _STEPS.get()) is not None:
+    hear = _STEPS.get()
+    if hear is not None:
         hear(step)
 
 
@@ -147,11 +150,11 @@ def reported(function: _Function) -> _Function:
     """Have the ``progress`` that a function is given told of all work within it."""
 
     @wraps(function)
-    def told(*args: Any, progress: Listener = None, **options: Any) -> Any:
+    def with_progress(*args: Any, progress: Listener = None, **options: Any) -> Any:
         with reporting(progress):
             return function(*args, **options)
 
-    return cast("_Function", told)
+    return cast("_Function", with_progress)
 
 
 def counter(task: str, total: float) -> Callable[..., None]:

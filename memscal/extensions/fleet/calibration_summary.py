@@ -37,7 +37,8 @@ def frame(result: FleetCalibration) -> DataFrame:
     import pandas as pd
 
     row: dict[str, Any] = {"passed": result.passed, "error": str(result.error or "")}
-    if (parameters := result.parameters) is not None:
+    parameters = result.parameters
+    if parameters is not None:
         for name in parameters.names:
             unit = parameter_quantity(parameters, name).si_unit
             row[f"{name} ({unit})"] = parameters[name]

@@ -62,7 +62,8 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     if low < high:
         margin = 0.04 * (high - low)
         axes.set_xlim(low - margin, high + margin)
-    if beyond := values.size - inside.size:
+    beyond = values.size - inside.size
+    if beyond:
         axes.set_xlabel(f"{label}\n{beyond} of {values.size} beyond the axis")
     legend_above(axes)
 

@@ -24,21 +24,23 @@ DRAWN = (
 def tables(result: MonteCarlo) -> list[Table]:
     """Return each parameter's standard uncertainty by the budget and by draws."""
     rows = []
-    for comparison in result.comparisons:
+    disagreeing = set()
+    for i, comparison in enumerate(result.comparisons):
         quantity = estimated_quantity(comparison.name).read_in(result.reading)
         scale = quantity.scale
-        low, high = (end / scale for end in comparison.symmetric)
-        first = comparison.first_order / scale
-        draws = comparison.uncertainty / scale
-        cells = (f"{first:.2g}", f"{draws:.2g}", f"{low:.4g} to {high:.4g}")
-        agrees = "yes" if comparison.agrees else "no"
-        rows.append((f"{quantity.words} ({quantity.unit})", *cells, agrees))
-    disagreeing = frozenset(i for i, row in enumerate(rows) if row[-1] == "no")
+        low, high = comparison.symmetric
+        row = [f"{quantity.words} ({quantity.unit})"]
+        row.append(f"{comparison.first_order / scale:.2g}")
+        row.append(f"{comparison.uncertainty / scale:.2g}")
+        row.append(f"{low / scale:.4g} to {high / scale:.4g}")
+        rows.append([*row, "yes" if comparison.agrees else "no"])
+        if not comparison.agrees:
+            disagreeing.add(i)
     *others, last = (source.replace("_", " ") for source in result.sources)
     sources = f"{', '.join(others)} and {last}" if others else last
     title = f"What scatters, by {result.draws} draws of {sources} (seed {result.seed})"
     head = ("", "u by the budget", "u of the draws", "95 % interval", "agrees")
-    return [Table(title, head, rows, disagreeing)]
+    return [Table(title, head, rows, frozenset(disagreeing))]
 
 
 def mapping(result: MonteCarlo) -> dict[str, Any]:
@@ -55,12 +57,12 @@ def mapping(result: MonteCarlo) -> dict[str, Any]:
 
 def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> dict[str, Any]:
     quantity = estimated_quantity(comparison.name).read_in(result.reading)
-    return {
-        **{q.label or q.name: plain(getattr(comparison, q.name), quantity.scale) for q in DRAWN},
-        "unit": quantity.unit_text,
-        "agrees": comparison.agrees,
-        "reason": comparison.reason,
-    }
+    values = {}
+    for drawn in DRAWN:
+        number = getattr(comparison, drawn.name)
+        values[drawn.label or drawn.name] = plain(number, quantity.scale)
+    decided = {"agrees": comparison.agrees, "reason": comparison.reason}
+    return {**values, "unit": quantity.unit_text, **decided}
 
 
 def frame(result: MonteCarlo) -> DataFrame:

@@ -1,5 +1,7 @@
 """Figure of a sweep: results of a calibration against the amplitude of the noise."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,24 +18,25 @@ _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
 
 def sweep_figure(sweep: Sweep) -> Figure:
     """Draw how A, sigma and the reconvolution change with the noise that regularises them."""
-    constants = sweep.conversion_constant, sweep.seed_conversion_constant
-    widths = sweep.gaussian_sigma_deconvolved, sweep.seed_gaussian_sigma
     constant = ESTIMATED["conversion_constant"].read_in(sweep.reading)
     power = power_of_ten(sweep.conversion_constant / constant.scale)
-    power = 0 if -2 <= power <= 3 else power
-    unit = f"$10^{{{power}}}$ {constant.unit}" if power else constant.unit
-    rows = (
-        (f"$A$ ({unit})", *constants, constant.scale * 10.0**power),
-        (r"$\sigma$ of deconvolved $G$ (mm)", *widths, MM),
-        ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
-    )
+    unit = constant.unit
+    scale = constant.scale
+    if not -2 <= power <= 3:
+        unit = f"$10^{{{power}}}$ {unit}"
+        scale *= 10.0**power
+    a = (sweep.conversion_constant / scale, sweep.seed_conversion_constant / scale)
+    sigma = (sweep.gaussian_sigma_deconvolved / MM, sweep.seed_gaussian_sigma / MM)
     with panels_of(6.6, 3, note="", sharex=True) as (figure, panels):
-        for axes, (label, exact, draws, scale) in zip(panels, rows, strict=True):
-            _draw_row(axes, sweep.amplitude, exact / scale, draws / scale)
-            axes.set_ylabel(label)
-        for axes in panels[:2]:
-            _relative_axis(axes, sweep.amplitude)
+        _draw_row(panels[0], sweep.amplitude, *a)
+        _relative_axis(panels[0], sweep.amplitude, a[0])
+        panels[0].set_ylabel(f"$A$ ({unit})")
+        _draw_row(panels[1], sweep.amplitude, *sigma)
+        _relative_axis(panels[1], sweep.amplitude, sigma[0])
+        panels[1].set_ylabel(r"$\sigma$ of deconvolved $G$ (mm)")
         axes = panels[2]
+        _draw_row(axes, sweep.amplitude, sweep.relative_rms / 0.01, sweep.seed_relative_rms / 0.01)
+        axes.set_ylabel("reconvolution, rms misfit (%)")
         axes.set_xlabel("noise amplitude, relative to the one chosen by rule (1)")
         axes.set_xlim(0.85 * np.min(sweep.amplitude), 1.18 * np.max(sweep.amplitude))
         axes.xaxis.set_major_formatter(lambda amplitude, _: f"{amplitude:g}")
@@ -46,7 +49,7 @@ def sweep_figure(sweep: Sweep) -> Figure:
 
 def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: FloatArray) -> None:
     axes.set_xscale("log")
-    axes.axvline(1.0, color="0.5", lw=0.8, ls=":", label="_rule's choice")
+    axes.axvline(1.0, color="0.5", lw=0.8, ls=":")
     draws = np.where(np.isfinite(draws), draws, np.nan)
     low, high = _limits(exact, draws)
     if np.any(np.isfinite(draws)):
@@ -59,26 +62,23 @@ def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: Float
 def _draw_seeds(
     axes: Axes, amplitude: FloatArray, draws: FloatArray, limits: tuple[float, float]
 ) -> None:
-    colour = COLOURS["gaussian"]
-    across = np.broadcast_to(amplitude[:, None], draws.shape)
+    look: dict[str, Any] = {"color": COLOURS["gaussian"], "ms": 4}
     drawn = np.any(np.isfinite(draws), axis=1)
+    x = amplitude[drawn]
     lower, median, upper = np.nanquantile(draws[drawn], (_INNER[0], 0.5, _INNER[1]), axis=1)
-    axes.fill_between(
-        amplitude[drawn], lower, upper, color=colour, alpha=0.2, lw=0, label="middle 68 % of draws"
-    )
-    axes.plot(
-        across.ravel(), draws.ravel(), ".", color=colour, ms=4, alpha=0.6, mew=0, label="one draw"
-    )
-    axes.plot(amplitude[drawn], median, "--", color=colour, label="median of draws")
+    band = axes.fill_between(x, lower, upper, color=COLOURS["gaussian"], alpha=0.2, lw=0)
+    band.set_label("middle 68 % of draws")
+    across = np.broadcast_to(amplitude[:, None], draws.shape)
+    label = "one draw"
+    axes.plot(across.ravel(), draws.ravel(), ".", alpha=0.6, mew=0, label=label, **look)
+    axes.plot(x, median, "--", label="median of draws", **look)
     outside = 0
     for sign, edge, marker in ((1, limits[1], "^"), (-1, limits[0], "v")):
         beyond = sign * draws > sign * edge
         outside += int(np.sum(beyond))
         places = amplitude[np.any(beyond, axis=1)]
         level = np.full(places.size, 0.5 + 0.46 * sign)
-        across_x = axes.get_xaxis_transform()
-        label = "_beyond the axis"
-        axes.plot(places, level, marker, color=colour, ms=4, transform=across_x, label=label)
+        axes.plot(places, level, marker, transform=axes.get_xaxis_transform(), **look)
     if outside:
         note = f"{outside} of {int(np.sum(np.isfinite(draws)))} draws beyond the axis"
         axes.set_title(note, loc="right", fontsize=7, color=COLOURS["muted"], pad=2)
@@ -86,7 +86,9 @@ def _draw_seeds(
 
 def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
     """Return axis limits from the exact results and the bulk of the draws."""
-    shown = exact[np.isfinite(exact)]
+    known = exact[np.isfinite(exact)]
+    drawn = draws[np.isfinite(draws)]
+    shown = known
     for row in draws:
         finite = row[np.isfinite(row)]
         if finite.size:
@@ -94,12 +96,11 @@ def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
             shown = np.concatenate([shown, np.quantile(finite, _SHOWN)])
     if not shown.size:
         return 0.0, 1.0
-    centre = float(np.median(exact[np.isfinite(exact)])) if np.any(np.isfinite(exact)) else 0.0
     # The axis reaches no farther from the centre than some times the typical spread.
-    steps = np.abs(exact[np.isfinite(exact)] - centre)
-    spread = np.abs(draws[np.isfinite(draws)] - centre)
-    typical = float(np.quantile(spread, 0.68)) if spread.size else 0.0
-    reach = max(1.2 * float(np.max(steps, initial=0.0)), 4.0 * typical, 1e-3 * abs(centre))
+    centre = float(np.median(known)) if known.size else 0.0
+    typical = float(np.quantile(np.abs(drawn - centre), 0.68)) if drawn.size else 0.0
+    steps = float(np.max(np.abs(known - centre), initial=0.0))
+    reach = max(1.2 * steps, 4.0 * typical, 1e-3 * abs(centre))
     low = max(float(np.min(shown)), centre - reach)
     high = min(float(np.max(shown)), centre + reach)
     margin = 0.12 * (high - low) or 0.05 * abs(centre) or 1.0
@@ -107,10 +108,9 @@ def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
     return (max(bottom, 0.0) if low >= 0 else bottom), high + margin
 
 
-def _relative_axis(axes: Axes, amplitude: FloatArray) -> None:
+def _relative_axis(axes: Axes, amplitude: FloatArray, exact: FloatArray) -> None:
     """Add a right-hand axis: the change from the result at the rule's amplitude, in percent."""
-    (line,) = (line for line in axes.lines if line.get_label() == "exact expectation")
-    base = float(np.asarray(line.get_ydata())[np.argmin(np.abs(np.log(amplitude)))])
+    base = float(exact[np.argmin(np.abs(np.log(amplitude)))])
     if not (np.isfinite(base) and base != 0):
         return
     both_ways = (lambda value: 100 * (value / base - 1), lambda change: base * (1 + change / 100))

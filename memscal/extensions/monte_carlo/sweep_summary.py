@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from memscal.extensions.monte_carlo.sweep import Sweep
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import ESTIMATED, MM, Quantity
 from memscal.summaries.declared import Dataset, plain, power_of_ten
 from memscal.summaries.table import Table
@@ -24,12 +25,13 @@ def tables(result: Sweep) -> list[Table]:
     scales = (constant.scale * 10.0**power, MM, 0.01)
     forms = (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
-    for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
-        columns.append([_number(value, form) for value in getattr(result, quantity.name) / scale])
-    for (_, name), scale, form in zip(_RESULTS, scales, forms, strict=True):
-        drawn = (draws[np.isfinite(draws)] for draws in getattr(result, name))
-        medians = [float(np.median(draws)) if draws.size else np.nan for draws in drawn]
-        columns.append([_number(median / scale, form) for median in medians])
+    medians = []
+    for (quantity, draws_name), scale, form in zip(_RESULTS, scales, forms, strict=True):
+        exact = getattr(result, quantity.name) / scale
+        columns.append([_number(value, form) for value in exact])
+        drawn = [_median(draws) / scale for draws in getattr(result, draws_name)]
+        medians.append([_number(median, form) for median in drawn])
+    columns += medians
     title = (
         "Dependence on the noise amplitude (1 is the rule's choice): the expectation, and the "
         f"median of {result.seed_relative_rms.shape[1]} draws"
@@ -41,14 +43,15 @@ def tables(result: Sweep) -> list[Table]:
 
 def mapping(result: Sweep) -> dict[str, Any]:
     """Return the whole sweep: lists over amplitudes, and lists of draws within them."""
-    return {"amplitude": {"value": plain(result.amplitude), "unit": "1"}} | {
-        quantity.name: {
+    values = {"amplitude": {"value": plain(result.amplitude), "unit": "1"}}
+    for declared, draws in _RESULTS:
+        quantity = declared.read_in(result.reading)
+        values[quantity.name] = {
             "value": plain(getattr(result, quantity.name), quantity.scale),
             "draws": plain(getattr(result, draws), quantity.scale),
             "unit": quantity.unit_text,
         }
-        for quantity, draws in ((q.read_in(result.reading), name) for q, name in _RESULTS)
-    }
+    return values
 
 
 def dataset(result: Sweep) -> Dataset:
@@ -66,3 +69,8 @@ def dataset(result: Sweep) -> Dataset:
 
 def _number(value: float, form: str) -> str:
     return f"{value:{form}}" if np.isfinite(value) else "-"
+
+
+def _median(draws: FloatArray) -> float:
+    known = draws[np.isfinite(draws)]
+    return float(np.median(known)) if known.size else np.nan

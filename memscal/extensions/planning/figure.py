@@ -13,6 +13,8 @@ from memscal.figures.style import (
     ALONG_RADIUS,
     COLOURS,
     EXPANDED,
+    draw_band,
+    draw_zero,
     legend_above,
     on_axis,
     panels_of,
@@ -52,16 +54,15 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
 
 def _draw_radial(axes: Axes, planned: Design) -> None:
     r = np.linspace(0.0, _WIDTHS * planned.parameters["gaussian_sigma"], _FINE)
-    g, error = on_axis(planned.r, np.stack([planned.g, EXPANDED * planned.g_errors]), r) / PER_MM2
+    samples = np.stack([planned.g, EXPANDED * planned.g_errors])
+    g, error = on_axis(planned.r, samples, r) / PER_MM2
+    draw_band(axes, r / MM, g - error, g + error, "±2u")
+    axes.plot(r / MM, g, color=COLOURS["deconvolved"], label="G expected")
     assumed = planned.plan.kernel.radial(r) / PER_MM2
-    r = r / MM
-    colour = COLOURS["deconvolved"]
-    axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="±2u")
-    axes.plot(r, g, color=colour, label="G expected")
-    axes.plot(r, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
-    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set(xlim=(0, r[-1]), xlabel=ALONG_RADIUS, ylabel="$G_{zz}$ (1/mm$^2$)")
-    legend_above(axes, columns=2)
+    axes.plot(r / MM, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
+    draw_zero(axes)
+    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="$G_{zz}$ (1/mm$^2$)")
+    legend_above(axes)
 
 
 def _draw_transfer(axes: Axes, planned: Design) -> None:
@@ -69,13 +70,11 @@ def _draw_transfer(axes: Axes, planned: Design) -> None:
     k = np.linspace(0.0, min(_BANDS * resolved, planned.k[-1]), _FINE)
     samples = np.stack([planned.transfer, EXPANDED * planned.transfer_errors])
     transfer, error = on_axis(planned.k, samples, k)
-    k = k / PER_MM
-    colour = COLOURS["deconvolved"]
     axes.axvspan(0, resolved / PER_MM, color=COLOURS["window"], alpha=0.12, lw=0)
     axes.axvline(resolved / PER_MM, color=COLOURS["window"], ls=":", label="resolved")
-    axes.fill_between(k, transfer - error, transfer + error, color=colour, alpha=0.25, lw=0)
-    axes.plot(k, transfer, color=colour, label="modulus for G")
-    axes.set_xlim(0, k[-1])
+    draw_band(axes, k / PER_MM, transfer - error, transfer + error)
+    axes.plot(k / PER_MM, transfer, color=COLOURS["deconvolved"], label="modulus for G")
+    axes.set_xlim(0, k[-1] / PER_MM)
     axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)", ylim=(0, None))
     legend_above(axes)
 
@@ -85,11 +84,12 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
     designs = varied_designs(planned, vary, _values(planned, vary))
     along = np.array([getattr(varied.plan, vary) for varied in designs]) / scale
     for name, symbol, colour, marker in _CURVES:
-        share = np.array([varied.relative_uncertainty(name) for varied in designs])
-        noise = [varied.budget[name]["noise"] / abs(varied.parameters[name]) for varied in designs]
-        shown: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
-        axes.plot(along, 100 * EXPANDED * share, label=symbol, **shown)
-        axes.plot(along, 100 * EXPANDED * np.array(noise), ls="--", mfc="none", **shown)
+        total = np.array([varied.relative_uncertainty(name) for varied in designs])
+        noise = np.array([varied.budget[name]["noise"] for varied in designs])
+        noise /= np.abs([varied.parameters[name] for varied in designs])
+        look: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
+        axes.plot(along, 100 * EXPANDED * total, label=symbol, **look)
+        axes.plot(along, 100 * EXPANDED * noise, ls="--", mfc="none", **look)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
     axes.axvline(getattr(planned.plan, vary) / scale, color=COLOURS["muted"], ls=":", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty, 2u (%)")
@@ -106,7 +106,8 @@ def _values(planned: Design, vary: str) -> list[float]:
     if vary == "repeats":
         return sorted({max(1, round(number * factor)) for factor in _FACTORS})
     most = max(_MOST_POSITIONS, planned.plan.positions) / planned.plan.positions
-    factors = [f for f in _FACTORS if (1 / f if vary == "step" else f) <= most]
-    values = [float(number * factor) for factor in factors]
+    if vary == "step":
+        return [float(number * factor) for factor in _FACTORS if 1 / factor <= most]
+    values = [float(number * factor) for factor in _FACTORS if factor <= most]
     # The scan has to reach over the sensor.
-    return [v for v in values if vary == "step" or v > abs(planned.plan.centre)]
+    return [value for value in values if value > abs(planned.plan.centre)]

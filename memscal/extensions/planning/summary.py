@@ -90,44 +90,49 @@ def _percent(share: float) -> str:
 
 
 def _contributions_table(planned: Design) -> Table:
-    shares = {
-        name: {s: u / abs(planned.parameters[name]) for s, u in planned.budget[name].items()}
-        for name in _SHOWN
-    }
-    largest = {name: max(contributions.values()) for name, contributions in shares.items()}
+    shares = {name: _relative_budget(planned, name) for name in _SHOWN}
     rows = []
     for source in shares["conversion_constant"]:
-        parts = [(shares[name].get(source, 0.0), largest[name]) for name in shares]
-        cells = [f"{part * 100:.2g}" if part > _NEGLIGIBLE * top else "0" for part, top in parts]
+        cells = []
+        for budget in shares.values():
+            share = budget.get(source, 0.0)
+            counts = share > _NEGLIGIBLE * max(budget.values())
+            cells.append(f"{share * 100:.2g}" if counts else "0")
         if any(cell != "0" for cell in cells):
             rows.append([_WORDS.get(source, source.replace("_", " ")), *cells])
     head = ("source", *(symbol for _, symbol in _SHOWN.values()))
     return Table("Contributions, in percent", head, rows)
 
 
+def _relative_budget(planned: Design, name: str) -> dict[str, float]:
+    value = abs(planned.parameters[name])
+    return {source: u / value for source, u in planned.budget[name].items()}
+
+
 def mapping(planned: Design) -> dict[str, Any]:
     """Return the object of ``design --json``; the contract fixes its form."""
     axis = {"g_at_axis": planned.g[0], "g_at_axis_uncertainty": planned.g_errors[0]}
+    expected = {}
+    for name in _SHOWN:
+        expected[name] = {
+            **declared.parameter_json(planned.parameters, name),
+            "relative_uncertainty": planned.relative_uncertainty(name),
+            "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
+        }
     return {
         "planned": True,
         "method": planned.method,
         "plan": declared.members(PLAN, planned.plan),
         "wanted": {name: _wanted(name, value) for name, value in planned.want.items()},
-        "expected": {
-            name: {
-                **declared.parameter_json(planned.parameters, name),
-                "relative_uncertainty": planned.relative_uncertainty(name),
-                "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
-            }
-            for name in _SHOWN
-        },
+        "expected": expected,
         **declared.members(EXPECTED, planned, **axis),
     }
 
 
 def _wanted(name: str, value: float) -> dict[str, Any]:
-    resolved = name == "resolved"
-    return {"value": value / (PER_MM if resolved else 1), "unit": "rad/mm" if resolved else "1"}
+    if name == "resolved":
+        return {"value": value / PER_MM, "unit": "rad/mm"}
+    return {"value": value, "unit": "1"}
 
 
 def dataset(planned: Design) -> declared.Dataset:
