@@ -13,7 +13,7 @@ def run() -> int:
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda number, _: os._exit(128 + number))
     # Libraries that load leave no cycles to collect, and those of a process that ends go with it.
-    gc.set_threshold(50_000)
+    gc.set_threshold(200_000)
     from memscal.cli import main
 
     code = main()
