@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from memscal.axisymmetry.hankel import ring_areas
@@ -21,6 +20,7 @@ from memscal.estimation.set_up import is_source
 from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import IndexArray
 from memscal.model.checks import QualityCheck, check, chi_square_limit
 from memscal.model.film import LINEAR, law_in_words
 from memscal.model.notation import format_measured
@@ -434,15 +434,13 @@ def _held_out(solution: Solution) -> list[QualityCheck | None]:
     return checks
 
 
-def _same(first: NDArray[np.intp], second: NDArray[np.intp]) -> bool:
+def _same(first: IndexArray, second: IndexArray) -> bool:
     """Whether two groupings of the points are the same but for the groups' names."""
     pairs = np.unique(np.stack([first, second]), axis=1).shape[1]
     return bool(pairs == np.unique(first).size == np.unique(second).size)
 
 
-def _prediction(
-    estimate: ProfileEstimate, what: str, group: NDArray[np.intp]
-) -> QualityCheck | None:
+def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> QualityCheck | None:
     worst = assumptions.hold_out(estimate, group)
     if worst is None:
         return None

@@ -298,4 +298,4 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
 
 
 def _grid(most: float) -> FloatArray:
-    return np.asarray(_RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0))
+    return _RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0)

@@ -278,7 +278,7 @@ def free_thickness(solution: Solution) -> FreeThickness:
             rods.append(press_rod(*set_up._replace(film=varied[set_up.film])))
         model = ForwardModel(estimate.points, reference_spectra(rods, points, nodes))
         evidences = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
-        return np.asarray(evidences - z @ z / 2)
+        return evidences - z @ z / 2
 
     # Sums over a grid, which are good to 1e-2 while its step is at most twice the width of a normal
     # density; where the posterior is narrower it is made finer.

@@ -105,7 +105,7 @@ def _calculated_at(
         return np.asarray(calculated[0])
     # As the family interpolates: past the friction of full stick nothing changes.
     family = PchipInterpolator(friction_position(comparison.friction), calculated)
-    return np.asarray(family(friction_position(friction)))
+    return family(friction_position(friction))
 
 
 #: How strongly points are drawn that are not distinct from zero.

@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from memscal.figures import style
 from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED
 from memscal.measurement.restoration import Restoration
 from memscal.mechanics.contact import Contact
+from memscal.model.arrays import BoolArray
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
@@ -47,7 +47,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: NDArray[np.bool_]) -> None:
+def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: BoolArray) -> None:
     """Draw a profile; points that are not clear of zero are pale, without bars."""
     dashes = "--" if profile.lubrication == "lubricated" else "-"
     (line,) = axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, color=colour, lw=0.8)

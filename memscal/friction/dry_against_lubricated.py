@@ -7,7 +7,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from memscal.friction.effective import random_uncertainty
@@ -20,7 +19,7 @@ from memscal.friction.likelihood import (
     standardise,
 )
 from memscal.friction.results import DryAgainstLubricated
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 #: Loads that differ by less than this share are one.
@@ -105,7 +104,7 @@ def _averaged(points: LoadPoints) -> LoadPoints:
     def mean(values: FloatArray) -> FloatArray:
         """Mean of the repeats, along the first axis."""
         sums = np.add.reduceat(values[order], starts, axis=0)
-        return np.asarray((sums.T / counts).T)
+        return (sums.T / counts).T
 
     noise = np.sqrt(mean(points.noise**2) / counts)
     correlation = None
@@ -128,9 +127,7 @@ def _averaged(points: LoadPoints) -> LoadPoints:
     )
 
 
-def _common_places(
-    dry: FloatArray, lubricated: FloatArray
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _common_places(dry: FloatArray, lubricated: FloatArray) -> tuple[IndexArray, IndexArray]:
     """Return the indices of places that both scans measured, a quarter of a step apart at most."""
     middles = (lubricated[1:] + lubricated[:-1]) / 2
     nearest = np.searchsorted(middles, dry)
@@ -140,14 +137,14 @@ def _common_places(
     return close[first], matched
 
 
-def _stress_at(profile: MeasuredProfile, places: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+def _stress_at(profile: MeasuredProfile, places: IndexArray) -> tuple[FloatArray, FloatArray]:
     """Return the stress at places of the sorted line, and its variance without that of A."""
     order = np.argsort((profile.x, profile.y)[profile.axis])[places]
     sources = [source for source in profile.roots if source != "conversion_constant"]
     return profile.s_zz[order], profile.errors_by(*sources)[order] ** 2
 
 
-def _at_places(points: LoadPoints, places: NDArray[np.intp]) -> LoadPoints:
+def _at_places(points: LoadPoints, places: IndexArray) -> LoadPoints:
     """Return the points at some places alone."""
     arrays: dict[str, Any] = {
         name: getattr(points, name)[places]

@@ -453,4 +453,4 @@ def _by_log_value(spectra: FloatArray, values: FloatArray, scale: float) -> Floa
     t = bounded(values, scale)
     slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
     stretch = t * (1 - t)
-    return np.asarray(stretch[:, None, None] * slopes)
+    return stretch[:, None, None] * slopes

@@ -233,7 +233,7 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
 
     def at_points(spectra: FloatArray, kernel: FloatArray = kernel * weights) -> FloatArray:
         """Inverse transforms (V, n) of spectra (V, K)."""
-        return np.asarray(sign * (spectra @ kernel.T)[:, place])
+        return sign * (spectra @ kernel.T)[:, place]
 
     transfer = sensor.transfer
     spectra = members.spectra[:, load]
@@ -386,7 +386,7 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     def whitened(values: FloatArray) -> FloatArray:
         """Values (V, n, q) in units of the noise."""
         blocks = values.reshape(*root.shape[:-1], values.shape[-1])
-        return np.asarray((root @ blocks).reshape(values.shape))
+        return (root @ blocks).reshape(values.shape)
 
     flat = np.broadcast_to(points.flat, (*shape, points.flat.shape[1]))
     if points.free_centre:

@@ -126,7 +126,7 @@ def _shear_ratio(film: ElasticFilm, k: bytes) -> FloatArray:
     """Normal stress at the base by a shear on the film over that by a pressure, at ``k``."""
     x = np.frombuffer(k) * film.thickness
     pressure = base_normal_from_pressure(x, film.poisson_ratio)
-    return np.asarray(base_normal_from_shear(x, film.poisson_ratio) / pressure)
+    return base_normal_from_shear(x, film.poisson_ratio) / pressure
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:

@@ -24,13 +24,12 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
 from memscal.mechanics.film_response import HalfSpaceIntegrals, base_stress
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.film import ElasticFilm
 
 
@@ -174,7 +173,7 @@ class RodTraction:
         values = self.load / (2 * np.pi) * np.concatenate(sums) if sums else flat
         return values.reshape(np.shape(k))
 
-    def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], float]:
+    def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, float]:
         """Return r/a, m, whether ``r`` is under the rod, and half the mean pressure in Pa."""
         ratio = np.asarray(r, dtype=np.float64) / self.radius
         under = ratio < 1

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipe, ellipkm1
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatA
 
 
 def _near_integrals(
-    x: FloatArray, starts: FloatArray, ends: FloatArray, near: NDArray[np.bool_]
+    x: FloatArray, starts: FloatArray, ends: FloatArray, near: BoolArray
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Integrate falling and rising hats over near elements, cut at the point; for each kernel."""
     point, element = np.nonzero(near)

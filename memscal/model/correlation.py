@@ -4,10 +4,10 @@ In the banded form column j is the correlation of each point with the j-th one a
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, frozen_array
+from memscal.model.arrays import FloatArray, IndexArray, frozen_array
 from memscal.model.sizes import MOST_CORRELATED, too_large
 
 #: A combination of voltages with less of the noise than this would outweigh all others.
@@ -67,7 +67,7 @@ def _require_band(band: FloatArray) -> None:
         raise InputError(f"{_NOT_POSITIVE}.", why=_WHY, cure=_CURE) from None
 
 
-def of_points(correlation: FloatArray, kept: NDArray[np.intp]) -> FloatArray:
+def of_points(correlation: FloatArray, kept: IndexArray) -> FloatArray:
     """Return the correlation of some of the points, in their order."""
     if not is_banded(correlation):
         return correlation[np.ix_(kept, kept)]

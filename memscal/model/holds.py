@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.notation import Reading
 from memscal.model.result import Result
 
@@ -18,8 +17,8 @@ class Holds(Result):
 
     log: Mapping[str, FloatArray]  # (n,) each: x, u_zz, and y and normal_load where they are logged
     line: NDArray[Any]  # (n,): line of the file
-    first: NDArray[np.intp]  # (m,): row of the log
-    stop: NDArray[np.intp]  # (m,): row after the last one
+    first: IndexArray  # (m,): row of the log
+    stop: IndexArray  # (m,): row after the last one
     mean: Mapping[str, FloatArray]  # (m,) each: every column, averaged over each hold
     u_errors: FloatArray  # (m,): standard uncertainty of the mean reading
     reading: Reading

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-IntArray = NDArray[np.intp]
+from memscal.model.arrays import IndexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +20,8 @@ class Places:
     (65, 0.25)
     """
 
-    index: IntArray  # (n,): the place of each point
-    row: IntArray  # (n,): its row along y, 0 on a line
+    index: IndexArray  # (n,): the place of each point
+    row: IndexArray  # (n,): its row along y, 0 on a line
     # Typical distance of neighbours along x and y, in m, 0 along an axis without spread.
     steps: tuple[float, float]
 
@@ -32,7 +31,7 @@ class Places:
         return int(self.index.max()) + 1
 
     @property
-    def readings(self) -> IntArray:
+    def readings(self) -> IndexArray:
         """Number of readings at the place of each point, shape (n,)."""
         return np.bincount(self.index)[self.index]
 
@@ -43,4 +42,4 @@ class EvenAxis:
 
     start: float
     step: float
-    index: IntArray
+    index: IndexArray

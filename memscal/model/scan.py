@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -99,7 +99,7 @@ _FEWEST = 5
 _MOST_GROUPS = 12
 
 
-def load_groups(loads: FloatArray) -> NDArray[np.intp]:
+def load_groups(loads: FloatArray) -> IndexArray:
     """Number loads in N, (n,), by the few that were set, ascending; all 0 if these are not seen."""
     order = np.argsort(loads, kind="stable")
     index = np.zeros(loads.size, dtype=np.intp)
@@ -338,7 +338,7 @@ class Scan:
         return (across, along) if self.direction == "y" else (along, across)
 
     @property
-    def passes(self) -> NDArray[np.intp]:
+    def passes(self) -> IndexArray:
         """Which pass each voltage belongs to, counted from zero, of the shape of ``u_zz``."""
         if self.repeat is not None:
             return np.unique(self.repeat, return_inverse=True)[1]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.model.holds import Holds
 from memscal.model.notation import Reading
 
@@ -61,7 +61,7 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
 def _averaged(
     columns: Mapping[str, FloatArray],
     line: NDArray[Any],
-    held: list[NDArray[np.intp]],
+    held: list[IndexArray],
     left_out: int,
     reading: Reading,
 ) -> Holds:
@@ -113,13 +113,13 @@ def _correlation_of_neighbours(residuals: list[FloatArray]) -> float:
     return sum(float(residual[1:] @ residual[:-1]) for residual in residuals) / (power or 1.0)
 
 
-def _loaded(load: FloatArray) -> NDArray[np.bool_]:
+def _loaded(load: FloatArray) -> BoolArray:
     """Tell from the load in which rows the indenter presses."""
     lifted, held = np.quantile(load, [0.01, 0.99])
     return np.asarray((lifted > _LIFTED * held) | (load > lifted + _PRESSED * (held - lifted)))
 
 
-def _timed(u: FloatArray, dwell: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _timed(u: FloatArray, dwell: IndexArray) -> BoolArray:
     """Tell from the readings when the indenter presses, after it came to rest at a place."""
     # Far from the sensor no reading tells: the times at the others' places, all alike, do.
     starts = np.flatnonzero(np.diff(dwell, prepend=-1))
@@ -146,13 +146,13 @@ def _noise(values: FloatArray) -> float:
 
 
 def _steady_rows(
-    runs: list[NDArray[np.intp]],
+    runs: list[IndexArray],
     values: FloatArray,
-    pressed: NDArray[np.bool_],
+    pressed: BoolArray,
     *,
     lifted: float,
     share: float,
-) -> list[NDArray[np.intp]]:
+) -> list[IndexArray]:
     """Cut each run to the rows from the first to the last that is close to its quantile."""
     noise = _NOISE * _noise(values[pressed])
     steady = []

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from memscal.model.arrays import FloatArray
-from memscal.model.places import EvenAxis, IntArray, Places
+from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.places import EvenAxis, Places
 
 #: Readings share a place where they are closer than this share of the distance that nine tenths
 #: of the readings of a pass keep from each other; a few may be read twice in one.
@@ -23,7 +23,7 @@ _OFF_LATTICE = 0.1
 _CANDIDATES = 200
 
 
-def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
+def places_of(x: FloatArray, y: FloatArray, repeat: IndexArray) -> Places:
     """Group points by place: equal positions, and of several passes those close to each other."""
     # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
     # an even lattice share a place too.
@@ -80,7 +80,7 @@ def _even_axis(positions: FloatArray) -> EvenAxis | None:
     return None
 
 
-def _close(x: FloatArray, y: FloatArray, repeat: IntArray) -> float:
+def _close(x: FloatArray, y: FloatArray, repeat: IndexArray) -> float:
     """Return the distance within which readings of several passes share a place; 0 of one pass."""
     order = np.argsort(repeat, kind="stable")
     starts = np.flatnonzero(np.diff(repeat[order])) + 1
@@ -106,7 +106,7 @@ def _nearest(places: NDArray[np.complex128]) -> FloatArray:
     return np.asarray(KDTree(plane).query(plane, k=[2])[0])[:, 0]
 
 
-def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IntArray:
+def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IndexArray:
     """Number the groups of positions in a plane that are equal or, through others, close."""
     places, index = np.unique(x + 1j * y, return_inverse=True)
     if not close:
@@ -124,7 +124,7 @@ def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IntArray
     return np.asarray(connected_components(links, directed=False)[1][index], dtype=np.intp)
 
 
-def _clusters(values: FloatArray, gap: float) -> IntArray:
+def _clusters(values: FloatArray, gap: float) -> IndexArray:
     """Number groups of values, in order, that no gap wider than ``gap`` parts."""
     order = np.argsort(values, kind="stable")
     index = np.empty(values.size, dtype=np.intp)
@@ -132,10 +132,10 @@ def _clusters(values: FloatArray, gap: float) -> IntArray:
     return index
 
 
-def _nodes(columns: IntArray, rows: IntArray) -> int:
+def _nodes(columns: IndexArray, rows: IndexArray) -> int:
     return (int(columns.max()) + 1) * (int(rows.max()) + 1)
 
 
-def _typical_step(values: FloatArray, cluster: IntArray) -> float:
+def _typical_step(values: FloatArray, cluster: IndexArray) -> float:
     means = np.bincount(cluster, values) / np.bincount(cluster)
     return float(np.median(np.diff(means))) if means.size > 1 else 0.0

@@ -52,7 +52,7 @@ def _determined(restored: Restoration) -> dict[str, Quantity]:
 
 
 def _errors(restored: Restoration) -> FloatArray:
-    return np.asarray(np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)))
+    return np.sqrt(np.maximum(np.diag(restored.covariance), 0.0))
 
 
 def mapping(restored: Restoration) -> dict[str, Any]:

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
@@ -250,7 +250,7 @@ class FilmElements:
         axis = np.flatnonzero(self.nodes[0] < 1e-9 * self.thickness)
         return np.unique(np.concatenate([self.base, self.base + self.n, axis]))
 
-    def _line(self, chosen: NDArray[np.bool_]) -> IntArray:
+    def _line(self, chosen: BoolArray) -> IntArray:
         nodes = np.flatnonzero(chosen)
         return nodes[np.argsort(self.nodes[0][nodes], kind="stable")]
 

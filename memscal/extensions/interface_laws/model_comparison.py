@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, logsumexp
 
 from memscal.apparatus import ApparatusFunction
@@ -47,7 +46,7 @@ from memscal.friction.results import (
     Interval,
     LawComparison,
 )
-from memscal.model.arrays import FloatArray, require_positive
+from memscal.model.arrays import BoolArray, FloatArray, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
@@ -247,7 +246,7 @@ class LawCurve:
     chi_square: FloatArray
 
     @property
-    def near(self) -> NDArray[np.bool_]:
+    def near(self) -> BoolArray:
         """Nodes that the likelihood does not exclude."""
         fall = 2 * (self.log_likelihood.max() - self.log_likelihood)
         return np.asarray(fall < _EXCLUDED)
@@ -378,7 +377,7 @@ def _maxima(channel: Channel, values: FloatArray) -> FloatArray:
     """Return stresses on the axis behind G, times A, shape (V, L)."""
     sensor = channel.sensor
     spectra = channel.family.at(values).spectra
-    return np.asarray(spectra @ (sensor.transfer * sensor.wavenumbers.weights))
+    return spectra @ (sensor.transfer * sensor.wavenumbers.weights)
 
 
 def _read(values: FloatArray, curve: FloatArray, top: float) -> float:

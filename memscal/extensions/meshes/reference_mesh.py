@@ -36,7 +36,7 @@ class Frame:
     @property
     def height(self) -> FloatArray:
         """Coordinate across the film, in m."""
-        return np.asarray(self.points[:, self.vertical])
+        return self.points[:, self.vertical]
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,7 +120,7 @@ class DrawnScans:
             model = replace(estimate.model, references=self._reference_changes(standard))
             geometry = model.geometry(estimate.centres)
             voltages = voltages + model.signal(geometry, estimate.kernel)
-        return np.asarray(voltages)
+        return voltages
 
     @cached_property
     def solved(self) -> tuple[SolvedInput, ...]:

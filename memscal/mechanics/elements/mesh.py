@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray
 
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
@@ -146,7 +146,7 @@ class _Front:
         depth = self.depth + np.where(count <= _EVEN_STEPS, left / count, step)
         return np.where(count == 1, self.sizes.thickness, depth)
 
-    def _kept(self, moving: NDArray[np.bool_], lower: FloatArray) -> NDArray[np.bool_]:
+    def _kept(self, moving: BoolArray, lower: FloatArray) -> BoolArray:
         """Return which nodes the next row has: never do two neighbours drop out."""
         width = np.pad(self.r[2:] - self.r[:-2], 1)
         slope = _SLOPE / self.sizes.refinement

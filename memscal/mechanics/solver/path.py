@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.errors import ConvergenceError
 from memscal.mechanics.solver import step
 from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target, Touch
+from memscal.model.arrays import BoolArray
 from memscal.progress import counted
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
@@ -259,7 +259,7 @@ def _next_meeting(
     return nearest(states, key=lambda following: _reached(following, target), default=None)
 
 
-def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _neighbours(rings: BoolArray) -> BoolArray:
     neighbours = np.zeros_like(rings)
     neighbours[1:] = rings[:-1]
     neighbours[:-1] |= rings[1:]

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from memscal.errors import ConvergenceError
 from memscal.mechanics.interface import Interface, NormalLaw
 from memscal.mechanics.surface import SurfaceCompliance
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.model.film import ElasticFilm
 
 
@@ -66,7 +66,7 @@ class ContactState:
     shear: FloatArray  # Pa, positive outward on the film
     depth: float  # m
     load: float  # N
-    touching: NDArray[np.bool_]
+    touching: BoolArray
     slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
     anchor: FloatArray  # outward displacement at which a sticking ring bears no shear, in m
     outward: FloatArray  # outward displacement in m
@@ -101,7 +101,7 @@ Goal = Load | Depth | Touch
 class _Status:
     """Status and trial values of the n rings while the equations are solved."""
 
-    pressing: NDArray[np.bool_]  # rings that bear a pressure
+    pressing: BoolArray  # rings that bear a pressure
     slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
     anchor: FloatArray  # outward displacement (m) at which a sticking ring bears no shear
     # Trials for a compliant interface: separation (m), pressure (Pa) and elastic stretch (m).
@@ -184,8 +184,8 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tria
 def _add_tangential_compliance(
     problem: ContactProblem,
     status: _Status,
-    pressing: NDArray[np.intp],
-    stuck: NDArray[np.intp],
+    pressing: IndexArray,
+    stuck: IndexArray,
     matrix: FloatArray,
     right: FloatArray,
 ) -> None:
@@ -249,7 +249,7 @@ def take_step(
     )
 
 
-def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> NDArray[np.bool_]:
+def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> BoolArray:
     """Return the rings whose pressure counts."""
     pressure = law.pressure(separation, problem.film)
     return np.asarray(pressure > _NEGLIGIBLE * pressure.max())
@@ -281,7 +281,7 @@ def _revise(
 
 def _revised_contact(
     status: _Status, trial: _Trial, held: int | None, *, careful: bool
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Let go of rings that pull, and catch rings that would pass through the indenter."""
     pull = -trial.pressure / np.abs(trial.pressure).max(initial=1e-300)
     overlap = -trial.separation / max(abs(trial.depth), 1e-300)
