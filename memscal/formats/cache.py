@@ -92,11 +92,6 @@ def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] |
     return arrays
 
 
-def clear_contact_tables(folder: FilePath) -> int:
-    """Remove all tables from a folder, and nothing else; return how many there were."""
-    return sum(_removed(path) for path, _ in _entries(folder))
-
-
 def _path(folder: FilePath, key: str) -> Path:
     name = f"{key}.h5"
     if not _ENTRY.fullmatch(name):

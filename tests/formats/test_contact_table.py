@@ -11,7 +11,6 @@ import pytest
 from memscal.errors import FormatError
 from memscal.formats import cache as contact_table
 from memscal.formats.cache import (
-    clear_contact_tables,
     find_contact_table,
     keep_contact_table,
     table_key,
@@ -125,16 +124,6 @@ def test_a_folder_keeps_to_its_limit_of_bytes(tmp_path: Path, monkeypatch: pytes
     for number in range(3):
         keep_contact_table(tmp_path, table_key({"number": number}), table())
     assert [path.name for path in tmp_path.iterdir()] == [f"{table_key({'number': 2})}.h5"]
-
-
-def test_clearing_removes_tables_and_nothing_else(tmp_path: Path):
-    keep_contact_table(tmp_path, KEY, table())
-    (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "scan.h5").write_text("mine too")
-    (tmp_path / f"{table_key({'a': 'folder'})}.h5").mkdir()
-    assert clear_contact_tables(tmp_path) == 1
-    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == {"notes.txt", "scan.h5"}
-    assert clear_contact_tables(tmp_path / "none") == 0
 
 
 def test_several_may_write_and_read_one_entry_at_a_time(tmp_path: Path):
