@@ -44,7 +44,7 @@ def command(
 
     accepted = {name: options[name] for name in ("override", "accept_altered")}
     data = opened_scans(scans, accept_altered=accepted["accept_altered"])
-    written = options["output"] or out.beside(scans[0], ".stress.h5")
+    written = options["output"] or out.default_name(scans[0], ".stress.h5")
     figures = options["figures"]
     report = options["report"]
     out.prove_writable([written, *figures, report], force=force, inputs=[artifact, *scans])

@@ -269,7 +269,7 @@ def command(
     """
     channel = settings["channel"]
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
-    output = output or out.beside(scans[0], ending)
+    output = output or out.default_name(scans[0], ending)
     settings = calibration_settings(reference=reference, alternative=alternative, **settings)
     data = _read(scans, reference, settings)
     outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]

@@ -243,7 +243,7 @@ class FigurePath(click.Path):
         return path
 
 
-def beside(path: Path, suffix: str) -> Path:
+def default_name(path: Path, suffix: str) -> Path:
     """Return the name of a result beside its input."""
     stem = path.stem if path.suffix.lower() in _HDF5_SUFFIXES else path.name
     return path.parent / f"{stem}{suffix}"

@@ -161,7 +161,7 @@ def report_of(result: Result) -> Report:
 
 @report_of.register(ApparatusFunction)
 @report_of.register(Calibration)
-def _of_calibration(result: Calibration | ApparatusFunction) -> Report:
+def _calibration_report(result: Calibration | ApparatusFunction) -> Report:
     data = apparatus_of(result)
     process = data.process
     alt = (
@@ -194,7 +194,7 @@ def _of_calibration(result: Calibration | ApparatusFunction) -> Report:
 
 
 @report_of.register
-def _of_stress(stress: MeasuredStress) -> Report:
+def _stress_report(stress: MeasuredStress) -> Report:
     largest = max(stress.profiles, key=lambda profile: profile.maximum)
     top = format_measured(largest.maximum / KPA, largest.maximum_uncertainty / KPA, "kPa")
     alt = (
@@ -223,7 +223,7 @@ def _of_stress(stress: MeasuredStress) -> Report:
 
 
 @report_of.register
-def _of_restoration(restored: Restoration) -> Report:
+def _restoration_report(restored: Restoration) -> Report:
     on_axis = float(restored.stress(0.0)) / KPA
     u = float(restored.stress_uncertainty(0.0)) / KPA
     alt = (
@@ -267,7 +267,7 @@ _DETAILS = {
 
 
 @report_of.register
-def _of_comparison(compared: FrictionComparison) -> Report:
+def _comparison_report(compared: FrictionComparison) -> Report:
     return Report(
         title=f"Friction of {_contact_words(compared.measured.scans[0])}",
         leading=1 + len(compared.loadings),

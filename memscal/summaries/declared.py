@@ -23,8 +23,8 @@ else:  # their libraries are imported when they are needed
 
 def total_of(budget: Mapping[str, float]) -> float:
     """Return the standard uncertainty of a budget; what correlations take away has a minus sign."""
-    squares = [np.copysign(u**2, u) for u in budget.values()]
-    return float(np.sqrt(max(sum(squares), 0.0)))
+    variances = [np.copysign(u**2, u) for u in budget.values()]
+    return float(np.sqrt(max(sum(variances), 0.0)))
 
 
 _UNCERTAINTY = "_uncertainty"

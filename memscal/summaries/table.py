@@ -74,9 +74,9 @@ def worst_checks(checks: Iterable[QualityCheck]) -> list[QualityCheck]:
     for check in checks:
         kinds.setdefault(check.kind, []).append(check)
     shown: list[QualityCheck] = []
-    for kind, of_kind in kinds.items():
-        passed = [check for check in of_kind if check.passed]
-        shown += [check for check in of_kind if not check.passed]
+    for kind, made in kinds.items():
+        passed = [check for check in made if check.passed]
+        shown += [check for check in made if not check.passed]
         if passed:
             worst = max(passed, key=lambda check: check.value / (check.limit or 1.0))
             name = f"{kind}, worst of {len(passed)}" if len(passed) > 1 else worst.name

@@ -78,43 +78,44 @@ class LaboratoryFile:
         """Return the value of a key, ``None`` where it is not stated."""
         return self.sections.get(section, {}).get(key)
 
-    def additions(self, of: Scan | ApparatusData) -> dict[str, Any]:
+    def additions(self, holder: Scan | ApparatusData) -> dict[str, Any]:
         """Return instruments, user and times with what the file adds; a contradiction is refused.
 
         The customer, and who authorises, stay in the file.
         """
-        temperature = self.stated("conditions", "temperature") or (None, None)
-        added: dict[str, Mapping[str, Any]] = {
-            "sensor": {
-                **self.sections.get("sensor", {}),
-                "temperature": temperature[0],
-                "temperature_uncertainty": temperature[1],
-            },
-            "user": {
-                "name": self.stated("person", "operator"),
-                "affiliation": self.stated("laboratory", "name"),
-            },
-        }
+        sensor = dict(self.sections.get("sensor", {}))
+        temperature = self.stated("conditions", "temperature")
+        if temperature is not None:
+            sensor["temperature"] = temperature.value
+            sensor["temperature_uncertainty"] = temperature.uncertainty
+        operator = self.stated("person", "operator")
+        user = {"name": operator, "affiliation": self.stated("laboratory", "name")}
+        parts: dict[str, Mapping[str, Any]] = {"sensor": sensor, "user": user}
         for kind, attribute in KINDS.items():
-            found = (item for item in self.equipment if item.get("kind") == kind)
-            added[attribute] = {k: v for k, v in next(found, {}).items() if k != "kind"}
+            found = [item for item in self.equipment if item.get("kind") == kind]
+            parts[attribute] = {k: v for k, v in found[0].items() if k != "kind"} if found else {}
         times = {key: self.stated("conditions", key) for key in ("start_time", "end_time")}
-        return {
-            name: replace(getattr(of, name), **self._added(getattr(of, name), stated, name))
-            for name, stated in added.items()
-        } | self._added(of, times, "measurement")
+        added = self._added(holder, times, "measurement")
+        for name, stated in parts.items():
+            part = getattr(holder, name)
+            added[name] = replace(part, **self._added(part, stated, name))
+        return added
 
     def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> dict[str, Any]:
-        added = {_NAMES.get(k, k): v for k, v in stated.items() if v not in ("", None)}
-        for name in [name for name in added if getattr(part, name) not in ("", None)]:
+        """Return what a part does not hold; what it holds must be the same."""
+        added = {}
+        for key, value in stated.items():
+            name = _NAMES.get(key, key)
             held = getattr(part, name)
-            value = added.pop(name)
-            if held != value:
+            if value in ("", None) or held == value:
+                continue
+            if held not in ("", None):
                 what = f"{name} of the {subject}".replace("_", " ")
                 raise InputError(
                     f"The {what} is {value!r} in {self.name}, {held!r} in the scan or artifact.",
                     cure="Correct one of them, or leave it out of the laboratory's file.",
                 )
+            added[name] = value
         return added
 
 
