@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from itertools import zip_longest
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.notation import printable
@@ -187,28 +187,33 @@ class Table:
 
     def plain(self, width: int = WIDTH, style: _Style = as_it_is) -> str:
         """Return aligned text; columns that have no room follow below, beside the same labels."""
-        columns = [
-            [readable(cell).replace("\n", " ") for cell in column]
-            for column in zip(self.head, *self.rows, strict=True)
-        ]
+        columns = [_column(texts) for texts in zip(self.head, *self.rows, strict=True)]
         title = [style(line, False) for line in folded(readable(self.title), width)]
-        parts = [self._part(part, style) for part in _parts(columns, self.labels, width)]
-        return "\n\n".join(["\n".join([*title, *parts[0]]), *("\n".join(p) for p in parts[1:])])
+        blocks = []
+        for part in _parts(columns, self.labels, width):
+            lines = self._part(part, _widths(part, width), style)
+            blocks.append("\n".join([*title, *lines]))
+            title = []
+        return "\n\n".join(blocks)
 
-    def _part(self, columns: Sequence[tuple[Sequence[str], int]], style: _Style) -> Iterator[str]:
+    def _part(
+        self, columns: Sequence[_Column], widths: Sequence[int], style: _Style
+    ) -> Iterator[str]:
         """Yield the lines of columns, each with its width."""
-        cells = [[folded(cell, width) for cell in column] for column, width in columns]
+        cells = []
+        for column, width in zip(columns, widths, strict=True):
+            cells.append([folded(cell, width) for cell in column.cells])
         for i, row in enumerate(zip(*cells, strict=True)):
             deepest = max(map(len, row))
             if i == 0:  # the names stand upon the rule
                 row = tuple([""] * (deepest - len(cell)) + cell for cell in row)
             for line in zip_longest(*row, fillvalue=""):
-                padded = (f"{c:<{w}}" for c, (_, w) in zip(line, columns, strict=True))
+                padded = (f"{c:<{w}}" for c, w in zip(line, widths, strict=True))
                 text = _GAP + _GAP.join(padded).rstrip()
                 if i or any(self.head):
                     yield style(text, True) if i - 1 in self.marked else text
             if i == 0 and any(self.head):
-                yield _GAP + _GAP.join("-" * width for _, width in columns)
+                yield _GAP + _GAP.join("-" * width for width in widths)
 
     def html(self, kind: str = "") -> str:
         """Return the table as HTML of a class, each row headed by its first text, marks in bold."""
@@ -235,35 +240,48 @@ def _cell(text: str) -> str:
     return escape(printable(text, _LONGEST))
 
 
-def _parts(
-    columns: Sequence[Sequence[str]], labels: int, width: int
-) -> Iterator[list[tuple[Sequence[str], int]]]:
-    """Divide columns, names first, among tables of a width; yield each with its columns' widths."""
-    tight = [max(len(s) for cell in col for s in _BETWEEN_WORDS.split(cell)) for col in columns]
-    folding = [
-        max(least, min(_PROSE, max(map(len, column[1:]), default=0)))
-        for least, column in zip(tight, columns, strict=True)
-    ]
+class _Column(NamedTuple):
+    """Cells of a column, and its width: with every break there may be, folded, unfolded."""
 
-    def widened(part: Sequence[int]) -> list[tuple[Sequence[str], int]]:
-        """Return the columns of a part with widths that use the room there is, labels first."""
-        least = folding if needed(part) <= width else tight
-        room = width - sum(least[i] + len(_GAP) for i in part)
-        widths = {i: least[i] for i in part}
-        missing = {i: max(map(len, columns[i])) - least[i] for i in part}
-        for i in sorted(part, key=lambda i: (i > 0, missing[i])):
-            more = max(min(missing[i], room), 0)
-            widths[i] += more
-            room -= more
-        return [(columns[i], widths[i]) for i in part]
+    cells: Sequence[str]
+    tight: int
+    folded: int
+    longest: int
 
-    def needed(part: Sequence[int]) -> int:
-        return sum(folding[i] + len(_GAP) for i in part)
 
-    part = [*range(labels)]
-    for j in range(labels, len(columns)):
-        if len(part) > labels and needed([*part, j]) > width:
-            yield widened(part)
-            part = [*range(labels)]
-        part.append(j)
-    yield widened(part)
+def _column(texts: Sequence[str]) -> _Column:
+    cells = [readable(text).replace("\n", " ") for text in texts]
+    chunks = [max(map(len, _BETWEEN_WORDS.split(cell))) for cell in cells]
+    tight = max(chunks)
+    prose = min(_PROSE, max(map(len, cells[1:]), default=0))
+    return _Column(cells, tight, max(tight, prose), max(map(len, cells)))
+
+
+def _parts(columns: Sequence[_Column], labels: int, width: int) -> Iterator[Sequence[_Column]]:
+    """Divide columns among tables of a width, each of which begins with the labels."""
+    part = [*columns[:labels]]
+    for column in columns[labels:]:
+        needed = _total([other.folded for other in (*part, column)])
+        if len(part) > labels and needed > width:
+            yield part
+            part = [*columns[:labels]]
+        part.append(column)
+    yield part
+
+
+def _widths(part: Sequence[_Column], width: int) -> list[int]:
+    """Return widths of columns that use the room there is, labels first."""
+    widths = [column.folded for column in part]
+    if _total(widths) > width:
+        widths = [column.tight for column in part]
+    room = width - _total(widths)
+    missing = [column.longest - least for column, least in zip(part, widths, strict=True)]
+    for i in sorted(range(len(part)), key=lambda i: (i > 0, missing[i])):
+        more = max(min(missing[i], room), 0)
+        widths[i] += more
+        room -= more
+    return widths
+
+
+def _total(widths: Sequence[int]) -> int:
+    return sum(widths) + len(_GAP) * len(widths)
