@@ -64,26 +64,6 @@ def test_a_bound_is_never_rounded_to_the_side_that_claims_more(bound: float) -> 
     assert upper - lower < 0.11 * bound
 
 
-def test_a_comparison_prints_tables_within_eighty_columns(found: FrictionComparison) -> None:
-    many = comparison(loadings=("total",), friction_grid=np.linspace(0.0, 1.0, 30))
-    for shown in (found, many, comparison(lubrications=("",), loadings=("",))):
-        assert max(map(len, str(shown).splitlines())) <= 80
-    [likelihood] = [t for t in tables(many) if t.title.startswith("-2 ln(p/p_max)")]
-    heads = [text.splitlines() for text in likelihood.plain().split("\n\n")]
-    assert len(heads) > 1
-    shown = " ".join(
-        line
-        for part in heads
-        for line in part[: part.index(next(line for line in part if line.startswith("  -")))]
-    )
-    assert set(likelihood.head[4:]) <= set(shown.split())
-    assert "1.8 [1.4, 2.3] um" in str(found)
-    for words in ("for it, very strong", "against it, positive", str(found.interface)):
-        assert words in str(found)
-    assert "0.1" in repr(found)
-    assert len(repr(found)) < 400
-
-
 def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> None:
     bound = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
     for load in json.loads(json.dumps(bound.to_dict(), allow_nan=False))["loads"]:
@@ -93,24 +73,6 @@ def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> Non
             assert "lower bound" in estimate["reason"]
     assert "Contributions" not in str(bound)
     assert "no_value" in {message.kind for message in notes(bound)}
-
-
-def test_every_load_has_both_readings_and_those_of_all_loads_the_macroscopic_one(found) -> None:
-    shown = {table.title.partition(" [")[0]: table.rows for table in tables(found)}
-    for loading, loads in found.loads.items():
-        rows = shown[f"Effective friction coefficient, {loading} loading"]
-        readings = [row[3:5] for row in rows if row[2] != "all"]
-        assert readings == [[str(load.by_maximum), str(load.by_profile)] for load in loads]
-    rows = shown["Beside the macroscopic friction coefficient, 1.60 ± 0.20"]
-    assert [row[2] for row in rows] == 4 * ["above the 95 % interval"]
-    assert "macroscopic" not in str(comparison(macroscopic=None))
-
-
-def test_what_is_not_stated_is_named() -> None:
-    unstated = comparison(lubrications=("",), loadings=("",))
-    for words in ("not stated", "profiles as given"):
-        assert words in str(unstated)
-    assert set(unstated.to_dict()["loads"][0]["by_loading"]) == {"given"}
 
 
 def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> None:
@@ -137,12 +99,6 @@ def test_coefficients_share_what_scans_share(found: FrictionComparison) -> None:
     for other in others:
         apart = math.hypot(first.std_dev, other.std_dev)
         assert abs(first.std_dev - other.std_dev) <= (first - other).std_dev <= apart * (1 + 1e-9)
-
-
-def test_a_comparison_draws_itself_and_its_laws(found: FrictionComparison) -> None:
-    assert len(found.plot().axes) == 4
-    assert len(found.interface.plot().axes) == 3
-    assert set(found.interface.messages) <= set(notes(found))
 
 
 def test_checks_of_each_profile_are_told_by_the_worst_and_failures_one_by_one() -> None:

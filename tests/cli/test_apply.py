@@ -80,8 +80,3 @@ def test_files_of_another_kind_are_refused(run: Run, artifact: Path):
     assert "memscal-scan" in run("apply", artifact, artifact).err
     assert run("apply", artifact).code == USAGE
     assert run("apply", artifact, "absent.h5").code == REFUSED
-
-
-def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path):
-    assert run("apply", artifact, dry, "--figure", "f.svg").code == 0
-    assert (folder / "f.svg").stat().st_size > 1000

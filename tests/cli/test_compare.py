@@ -1,7 +1,5 @@
 """``memscal compare``: from files to friction; exit codes, refusals, and what it writes."""
 
-import html
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +7,7 @@ from typing import Any
 
 import pytest
 from helpers.console import Run, names
-from helpers.friction_results import comparison, interface_comparison
+from helpers.friction_results import comparison
 from helpers.records import assert_same
 from helpers.scans import known_apparatus, simulate_experiment
 
@@ -116,47 +114,6 @@ def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_h
     done = compare()
     done.exits(CHECKED, "bracketing")
     assert "Effective friction coefficient" in done.out
-
-
-def test_the_options_reach_the_comparison(compare: Run, made_by_hand: Give, bench: Path):
-    asked: dict[str, Any] = {}
-    made_by_hand(asked=asked)
-    compare("--macroscopic", 1.6, "--macroscopic-uncertainty", 0.2, "--interface", "--override")
-    assert asked["loading"] == ("incremental", "total")
-    assert asked["friction"] is None
-    assert (asked["macroscopic"], asked["macroscopic_uncertainty"]) == (1.6, 0.2)
-    assert asked["interface"]
-    assert asked["override"]
-    assert asked["cache"] == bench / "cache"
-
-
-def test_a_page_and_all_figures_are_written(compare: Run, made_by_hand: Give, folder: Path):
-    found = comparison(lubrications=("dry",), loads=(1.37,), interface=interface_comparison())
-    made_by_hand(found)
-    options = ("--macroscopic", 1.6, "--interface", "--figures", "drawn", "--figure-format", "svg")
-    done = compare("--figure", "page.png", "--report", "page.html", *options).exits(0)
-    assert (folder / "page.png").read_bytes().startswith(b"\x89PNG")
-    page = (folder / "page.html").read_text(encoding="utf-8")
-    figures = [
-        "Measured and calculated profiles, dry.",
-        "Maximum of",
-        "Effective",
-        "Likelihood",
-        "Laws of the interface",
-    ]
-    captions = re.findall("<figcaption>(.*)</figcaption>", page)
-    assert [c.startswith(f) for c, f in zip(captions, figures, strict=True)] == [True] * 5
-    joint = html.escape(str(found.joint["dry"]["incremental"]))
-    assert page.count(f"All loads together: dry, incremental: {joint}") == len(captions)
-    assert names(folder / "drawn") == [
-        "effective-friction.svg",
-        "friction-set-dry.svg",
-        "interface.svg",
-        "likelihood.svg",
-        "maxima.svg",
-        "profiles-dry.svg",
-    ]
-    assert "Written: drawn/maxima.svg" in done.err.replace("\\", "/")
 
 
 def test_nothing_is_overwritten_without_force(compare: Run, made_by_hand: Give, folder: Path):

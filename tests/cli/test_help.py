@@ -8,7 +8,6 @@ from helpers.console import Run
 
 from memscal.cli import main
 from memscal.cli.commands import COMMANDS, memscal
-from memscal.version import __version__
 
 
 def commands() -> dict[str, click.Command]:
@@ -19,22 +18,6 @@ def commands() -> dict[str, click.Command]:
 
 def options(command: click.Command) -> list[click.Option]:
     return [option for option in command.params if isinstance(option, click.Option)]
-
-
-def test_the_list_of_commands_names_and_describes_each(run: Run):
-    shown = run("--help").exits(0)
-    assert list(commands()) == list(COMMANDS)
-    bare = run()
-    assert shown.out in bare.out + bare.err
-    for name, (_, about) in COMMANDS.items():
-        assert re.search(rf"^  {name} +{re.escape(about)}$", shown.out, re.MULTILINE)
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_shows_examples_that_name_it(run: Run, name):
-    shown = run(name, "--help").exits(0)
-    examples = shown.out[shown.out.index("Examples:") :]
-    assert f"memscal {name} " in examples
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -51,11 +34,6 @@ def test_every_option_with_a_unit_says_it_in_words():
     stated = [of for of in units if of[2] not in (None, "ratio")]
     assert len(stated) > 50
     assert [(name, option.name) for name, option, unit in stated if unit not in option.help] == []
-
-
-def test_version_is_that_of_the_package(run: Run):
-    shown = run("--version")
-    assert (shown.code, shown.out) == (0, f"memscal {__version__}\n")
 
 
 @pytest.mark.parametrize(("arguments", "hint"), [

@@ -102,17 +102,6 @@ def test_a_line_ends_between_words_and_never_within_a_number(text: str, lines: l
     assert folded(text, 12) == lines
 
 
-def test_prose_is_folded_before_a_column_moves_to_another_table():
-    prose = " ".join(["The content is what was written."] * 4)
-    table = Table("", ("step", "finding"), [("digest", prose)])
-    lines = table.plain(50).splitlines()
-    assert max(map(len, lines)) <= 50
-    assert (
-        " ".join(" ".join(lines[3:]).split())
-        == f"digest {'The content is what was written. ' * 4}".strip()
-    )
-
-
 def test_messages_of_a_kind_that_say_the_same_are_shown_once_with_their_number(monkeypatch):
     terminal = at_terminal(monkeypatch)
     text = "Outlier at x = {0} mm of repeat {1}: {2} mV instead of 4.756 mV."
@@ -159,13 +148,3 @@ def test_progress_is_a_line_now_and_then_where_nobody_watches(monkeypatch):
             if item == 0:
                 wait_for(written.getvalue, r"Sweeping: 1 of 3 draws, \d+ s left \(\d+ s\)\n")
     assert re.fullmatch(r"(Sweeping(: [123] of 3 draws[^\r\n]*)? \(\d+ s\)\n)+", written.getvalue())
-
-
-def test_progress_waits_between_two_lines(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(sys, "stderr", written := io.StringIO())
-    monkeypatch.setattr("memscal.cli.output._IN_LINES", (0.01, 3600.0))
-    with working("Sweeping"):
-        wait_for(written.getvalue, r"\n")
-        for _ in counted(range(3), "draws", 3):
-            time.sleep(0.05)
-    assert written.getvalue().count("\n") == 1

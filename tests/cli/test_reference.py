@@ -7,7 +7,6 @@ import pytest
 from helpers.console import Run, names
 
 import memscal
-from memscal.mechanics.press_rod import press_rod
 
 
 def test_a_depth_gives_the_load_that_gives_the_depth(run: Run):
@@ -39,28 +38,6 @@ def test_a_file_is_for_one_load(run: Run, folder: Path):
 
 def test_load_and_depth_exclude_each_other(run: Run):
     run("reference", "rod", "--load", 1, "--depth", 2).exits(2, "not both")
-
-
-def test_a_depth_beyond_linear_elasticity_is_pointed_out_with_what_a_rubber_does(run: Run):
-    noted = run("reference", "rod").err
-    assert "29% of the film's thickness" in noted
-    film = memscal.ElasticFilm(
-        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="neo-hookean"
-    )
-    rubber = press_rod(film, memscal.Rod(radius=0.25e-3), 1.0)
-    assert f"the largest base stress is {rubber.max_base_stress * 1e-3:.3g} kPa (+" in noted
-    assert "--" not in noted
-    assert run("reference", "rod", "--depth", 100).err == ""
-
-
-def test_a_rough_interface_is_named(run: Run):
-    rough = ["--greenwood-tripp", 1.82, 5000, 20, "--slip-length", 1.82]
-    done = run("reference", "sphere", "--load", 0.5, "--friction", 0.5, *rough, "--rings", 32)
-    title = " ".join(done.out.split())
-    assert "interface: Greenwood-Tripp law (roughness 1.82 um" in title
-    assert "slip length 1.82 um" in title
-    exponential = run("reference", "sphere", "--exponential", 0.8, 0.5, "--rings", 32)
-    assert "exponential law (length 0.8 um" in " ".join(exponential.out.split())
 
 
 def test_a_cone_and_a_measured_tip_go_to_a_file_and_come_back(run: Run, folder: Path):
@@ -112,13 +89,6 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
 def test_what_cannot_be_solved_and_wrong_usage_are_refused(run, folder, code, arguments, word):
     run("reference", *arguments, "-o", "out.h5").exits(code, word)
     assert names(folder) == []
-
-
-def test_a_figure_of_the_contacts_is_written(run: Run, folder: Path):
-    done = run("reference", "sphere", "--load", 0.5, "--load", 1, "--figure", "contacts.svg")
-    done.exits(0, "Written: contacts.svg")
-    assert [line.split()[0] for line in done.out.splitlines()[-2:]] == ["0.5", "1"]
-    assert Path("contacts.svg").read_bytes().startswith(b"<?xml")
 
 
 @pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])

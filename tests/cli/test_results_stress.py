@@ -2,11 +2,9 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.console import Run
 from helpers.scans import contact_scan, known_apparatus, pressed, sphere_scan
 
 import memscal
@@ -40,47 +38,12 @@ def planned() -> memscal.Design:
     return memscal.design(noise=0.01, want={"sigma": 0.028}, vary="repeats")
 
 
-@pytest.mark.parametrize(("name", "words"), [
-    ("stress", ["2.75 N", "dry", "total force", "maximum", "kPa", "applied force all"]),
-    ("restored", ["total force", "stress on the axis", "calculated", "restored force", "kPa"]),
-    ("contact", ["friction 0.3, incremental loading (hankel)", "stick", "radius", "(mm)"]),
-    ("planned", ["nothing was measured", "film thickness", "Gaussian width sigma", "resolved"]),
-])  # fmt: skip
-def test_text_mapping_notebook_figure_and_arrays(name, words, request: pytest.FixtureRequest):
+@pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])
+def test_mapping_notebook_and_arrays(name, request: pytest.FixtureRequest):
     result = request.getfixturevalue(name)
-    assert [word for word in words if word not in str(result)] == []
-    assert str(result) == result.summary()
-    assert "\n" not in repr(result)
-    assert len(repr(result)) < 200
     assert json.loads(json.dumps(result.to_dict(), allow_nan=False)) == result.to_dict()
-    assert result._repr_html_().startswith("<p>" if result.answer() else "<table>")
-    assert result.plot().axes
     assert all(variable.attrs for variable in result.to_xarray().variables.values())
     assert len(result.to_dataframe()) > 10
-
-
-def test_the_commands_print_the_results(
-    run: Run, folder: Path, apparatus: memscal.ApparatusFunction, contact: memscal.Contact
-):
-    apparatus.save(folder / "a.h5")
-    memscal.write_scan(contact_scan(1, load=LOADS), folder / "scan.h5")
-    shown = run("apply", "a.h5", "scan.h5")
-    assert shown.out.rstrip() == str(memscal.read_stress(folder / "scan.stress.h5"))
-    told = run("apply", "a.h5", "scan.h5", "--json", "--force").json
-    assert (told.pop("schema_version"), told.pop("output")) == ("1", "scan.stress.h5")
-    assert told == memscal.read_stress(folder / "scan.stress.h5").to_dict()
-    assert run("design", "--step", 0.5).out.rstrip() == str(memscal.design(step=0.5e-3))
-    assert run("reference", "sphere", "--friction", 0.3).out.rstrip() == str(
-        memscal.indent(contact.film, memscal.Sphere(radius=0.1288), load=1.0, friction=0.3)
-    )
-
-
-def test_friction_of_a_contact_is_named(restored: memscal.Restoration, contact: memscal.Contact):
-    assert restored.to_dict()["calculated"]["origin"] == "calculated without friction"
-    apparatus = restored.apparatus
-    scan = restored.scan
-    rubbed = memscal.restore(scan, apparatus, expected=contact).to_dict()["calculated"]
-    assert rubbed["origin"] == "calculated with friction 0.3"
 
 
 def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.MeasuredStress):
@@ -119,14 +82,6 @@ def test_numbers_of_a_restoration_have_their_joint_covariance(restored: memscal.
     apart = math.hypot(restored.force_uncertainty, 1e3 * restored.baseline_uncertainty)
     # A higher baseline is a smaller force.
     assert total.std_dev < apart
-
-
-def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design):
-    assert planned.to_dict()["wanted"] == {"sigma": {"value": 0.028, "unit": "1"}}
-    sigma = planned.ufloats()["gaussian_sigma"]
-    assert sigma.std_dev / sigma.nominal_value == pytest.approx(
-        planned.relative_uncertainty("gaussian_sigma")
-    )
 
 
 def test_a_contact_varies_with_its_film_and_indenter():

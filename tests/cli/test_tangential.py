@@ -32,11 +32,6 @@ def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run: Run,
     assert names(sheared.parent) == ["scan.apparatus.h5", "scan.h5", "scan.xz.apparatus.h5"]
 
 
-def test_a_report_and_a_figure_are_drawn(run: Run, sheared: Path):
-    run("calibrate", sheared, "--channel", "xz", "--report", "r.html", "--figure", "f.png").exits(0)
-    assert {"r.html", "f.png"} < set(names(sheared.parent))
-
-
 def test_a_method_that_divides_fields_is_refused_by_a_dry_run(run: Run, sheared: Path):
     done = run("calibrate", sheared, "--channel", "xz", "--method", "wiener", "--dry-run")
     done.exits(3, "bayesian")

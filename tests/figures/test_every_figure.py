@@ -136,12 +136,6 @@ def test_no_text_lies_on_another_or_leaves_the_page(figure: Figure):
     assert [pair for pair in starmap(overlap, combinations(boxes, 2)) if pair] == []
 
 
-def test_a_legend_lies_above_its_panel(figure: Figure):
-    renderer = figure.canvas.get_renderer()
-    for axes in (each for each in figure.axes if each.get_legend()):
-        assert axes.get_legend().get_window_extent(renderer).y0 >= axes.bbox.y1 - 1
-
-
 def test_an_svg_holds_the_words_as_text_and_refers_to_nothing_outside(figure: Figure):
     root = ET.fromstring(render_figure(figure, "svg"))
     texts = root.iter("{http://www.w3.org/2000/svg}text")

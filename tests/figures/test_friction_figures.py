@@ -1,8 +1,6 @@
 """Figures of a comparison: what is drawn are the comparison's numbers, and nothing is lost."""
 
 import math
-import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from memscal.figures.friction_profiles import (
     friction_set_figure,
     profile_figure,
 )
-from memscal.figures.style import load_looks, on_axis, render_figure
+from memscal.figures.style import on_axis, render_figure
 from memscal.friction.results import FrictionComparison
 
 
@@ -61,19 +59,6 @@ def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found: FrictionC
             )
 
 
-def test_every_residual_is_within_its_panel(found: FrictionComparison):
-    figure = profile_figure(found)
-    for axes, index in zip(figure.axes[2:], (0, -1), strict=True):
-        low, high = axes.get_ylim()
-        drawn = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_marker() == "o"]
-        dry = [one for one in found.loads["incremental"] if one.lubrication == "dry"]
-        assert len(dry) == len(LOADS)
-        for z, one in zip(drawn, dry, strict=True):
-            expected = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
-            np.testing.assert_allclose(z, expected)
-            assert np.all((z > low) & (z < high))
-
-
 def test_residuals_of_the_page_are_those_of_the_fitted_coefficient(found: FrictionComparison):
     axes = of_friction.comparison_figure(found).axes[2]
     drawn = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_marker() == "o"]
@@ -98,20 +83,6 @@ def test_a_logarithmic_scale_shows_every_stress_of_three_decades(found: Friction
     np.testing.assert_allclose(drawn, np.sort(expected[expected > 0]) * 1e-3)
 
 
-def test_a_load_has_one_colour_in_all_panels():
-    found = comparison()
-    fewer = {name: loads[:-2] for name, loads in found.loads.items()}
-    panels = likelihood_figure(replace(found, loads=fewer)).axes
-    colours = [
-        {line.get_label(): line.get_color() for line in axes.lines if "N" in line.get_label()}
-        for axes in panels
-    ]
-    for of_panel in colours:
-        assert of_panel.items() <= colours[0].items()
-    assert len(colours[-1]) == len(LOADS) - 2
-    assert len(set(colours[0].values())) == len(LOADS)
-
-
 def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionComparison):
     figure = friction_set_figure(found, loading="total")
     differences = figure.axes[len(LOADS) : 2 * len(LOADS)]
@@ -121,15 +92,6 @@ def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionC
         measured = one.profile.s_zz - one.calculated[0]
         np.testing.assert_allclose(change, 100 * measured / one.p0_max)
         np.testing.assert_allclose(u, 200 * one.profile.s_zz_errors / one.p0_max)
-
-
-def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest():
-    found = comparison()
-    doubled = {name: (*loads, *loads) for name, loads in found.loads.items()}
-    figure = friction_set_figure(replace(found, loads=doubled))
-    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
-    assert len(titles) == 4
-    assert (titles[0], titles[-1]) == ("0.34 N", "2.75 N")
 
 
 def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: FrictionComparison):
@@ -146,21 +108,6 @@ def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: Friction
         np.testing.assert_allclose(
             sticking.get_ydata(), [one.p_max[-1] / one.p0_max for one in of_dry]
         )
-
-
-def test_curves_that_meet_at_the_largest_load_are_named_at_the_smallest(found: FrictionComparison):
-    meeting = {
-        loading: [
-            replace(one, p_max=one.p0_max + 0 * one.p_max) if one.load == loads[-1].load else one
-            for one in loads
-        ]
-        for loading, loads in found.loads.items()
-    }
-    for loads, side in ((found.loads, "left"), (meeting, "right")):
-        figure = of_friction.maxima_figure(replace(found, loads=loads))
-        names = [t for t in figure.axes[0].texts if re.search(r"\\mu|^[≥\d]", t.get_text())]
-        assert len(names) > 2
-        assert {name.get_ha() for name in names} == {side}
 
 
 def test_both_readings_stand_within_their_intervals(found: FrictionComparison):
@@ -198,13 +145,6 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
         assert t[np.argmin(rise)] == pytest.approx(float(friction_position(reading.best)))
 
 
-def test_loads_that_were_recorded_look_as_their_neighbours():
-    looks = load_looks((1.36, 1.37, 2.75))
-    assert looks[1.36] == looks[1.37]
-    assert looks[1.37] != looks[2.75]
-    assert looks[2.75][1] == "2.75 N"
-
-
 @pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
 def test_a_profile_between_the_measured_radii_is_even_and_smooth(first):
     width = 1e-3
@@ -239,13 +179,6 @@ def test_evidence_is_drawn_below_that_of_the_best_law():
     normal = [law.log_evidence for law in laws.normal.laws]
     expected = [v - max(tangential) for v in tangential] + [v - max(normal) for v in normal]
     np.testing.assert_allclose(drawn, expected)
-
-
-def test_one_load_and_one_loading_are_enough():
-    found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
-    several = of_friction.comparison_figures(found).values()
-    for figure in (of_friction.comparison_figure(found), *(draw() for draw in several)):
-        assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
 def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionComparison):

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 
 import memscal
 from memscal.figures.stress import measured_stress_figure, restoration_figure
-from memscal.figures.style import render_figure
 from memscal.measurement.restoration import Restoration
 from memscal.model.measured_stress import MeasuredStress
 
@@ -42,39 +41,6 @@ def test_the_bars_are_two_standard_uncertainties(stress: MeasuredStress):
     for bar, profile in zip(bars, stress.profiles, strict=True):
         lengths = [segment[1, 1] - segment[0, 1] for segment in bar.get_segments()]
         np.testing.assert_allclose(lengths, 4 * profile.s_zz_errors * 1e-3)
-
-
-def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress):
-    axes = measured_stress_figure(stress).axes[1]
-    low, high = axes.get_ylim()
-    top = max(profile.s_zz.max() for profile in stress.profiles) * 1e-3
-    assert axes.get_yscale() == "log"
-    assert low == pytest.approx(1e-3 * top)
-    assert high > top
-
-
-def test_dry_and_lubricated_differ_in_line_and_share_a_colour(stress: MeasuredStress):
-    axes = measured_stress_figure(stress).axes[0]
-    curves = [line for line in axes.lines if len(line.get_xdata()) > 100]
-    styles = [line.get_linestyle() for line in curves]
-    colours = [line.get_color() for line in curves]
-    assert styles == ["-", "-", "--"]
-    assert colours[0] == colours[2] != colours[1]
-
-
-def test_the_contact_radii_are_marked(stress: MeasuredStress):
-    axes = measured_stress_figure(stress).axes[0]
-    marked = [line.get_xdata()[0] for line in axes.lines if line.get_xdata()[0] > 1.0]
-    for profile in stress.profiles:
-        assert np.any(np.isclose(marked, profile.contact_radius * 1e3))
-
-
-def test_the_legend_names_loads_and_states(stress: MeasuredStress):
-    figure = measured_stress_figure(stress)
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words[:2] == ["0.34 N", "2.75 N"]
-    assert any("dry" in word for word in words)
-    assert any("lubricated" in word for word in words)
 
 
 @pytest.fixture(scope="module")
@@ -120,9 +86,3 @@ def test_residuals_beyond_the_axis_stand_at_its_edge(restoration: Restoration):
     shown = np.concatenate(drawn)
     assert shown.size == scan.x.size
     assert np.all((shown > low) & (shown < high))
-
-
-def test_a_restoration_renders_without_a_comparison(restoration: Restoration):
-    figure = restoration_figure(replace(restoration, comparison=None))
-    assert not any("calculated" in label for label in lines(figure.axes[0]))
-    assert render_figure(figure, "png").startswith(b"\x89PNG")

@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 
-import memscal
 from memscal.extensions.certificate.certificate import Certificate, certify
 from memscal.extensions.certificate.page import certificate_page
 from memscal.model.checks import QualityCheck
@@ -57,12 +56,3 @@ def test_synthetic_data_and_failed_checks_are_said_first(apparatus, laboratory, 
     text = text_of(certify(replace(apparatus, checks=(failed,), process=process), laboratory))
     assert "SYNTHETIC" not in text
     assert "checks of the calibration that failed: symmetry." in text[:600]
-
-
-def test_scans_at_several_loads_in_another_unit_state_them(laboratory):
-    scan = replace(memscal.simulate(load=(0.1, 1.0), points=33, seed=3), unit="A")
-    bare = memscal.calibrate(replace(scan, sensor=memscal.StressSensor())).apparatus
-    kept = {k: v for k, v in laboratory.sections.items() if k != "decision"}
-    made = certify(bare, replace(laboratory, sections=kept))
-    assert "loads 0.1 to 1 N" in text_of(made)
-    assert "No statement of conformity was agreed." in text_of(made)
