@@ -61,8 +61,8 @@ def write_source(source: SourceFile) -> Group:
 
 def read_source(file: SafeFile, path: str) -> SourceFile:
     """Read the name and the checksum of a file that was read."""
-    name, checksum = (require_text(file, f"{path}/{key}") for key in ("file_name", "checksum"))
-    return SourceFile(name, checksum)
+    name = require_text(file, f"{path}/file_name")
+    return SourceFile(name, require_text(file, f"{path}/checksum"))
 
 
 KINDS = {
@@ -210,8 +210,8 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
         children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
     children |= {axis: writer.index_axis(axis, len(parameters.names)) for axis in _AXES}
-    scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions.values()])
-    numbers = parameters.covariance * scale[:, None] * scale[None, :]
+    scale = np.array([from_si(1.0, dimension)[0] for dimension in dimensions.values()])
+    numbers = parameters.covariance * scale[:, None] * scale
     children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
     if budget:
         children["budget"] = budget_group(budget, dimensions)
@@ -245,7 +245,7 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     return ParameterSet(
         names=names,
         values=np.array(values),
-        covariance=covariance * scale[:, None] * scale[None, :],
+        covariance=covariance * scale[:, None] * scale,
         units=tuple(units),
         reading=reading,
     )
@@ -262,7 +262,7 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
     for quantity, sources in budget.items():
         dimension = dimensions.get(quantity) or parameter_dimension(quantity)
         group: dict[str, Node] = {"names": to_json(f"budget of {quantity}", list(sources))}
-        group |= {source: si(float(value), dimension) for source, value in sources.items()}
+        group |= {source: si(value, dimension) for source, value in sources.items()}
         children[quantity] = Group("NXcollection", group)
     return Group("NXcollection", children)
 
@@ -373,11 +373,9 @@ def read_instrument(file: SafeFile, path: str) -> dict[str, Any]:
 
 def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
-    children = dict(write_record(records.TIMES, of).children)
     user = write_record(records.USER, of.user)
-    if user.children:
-        children["user"] = user
-    return children
+    stated: dict[str, Node] = {"user": user} if user.children else {}
+    return {**write_record(records.TIMES, of).children, **stated}
 
 
 def read_circumstances(file: SafeFile) -> dict[str, Any]:
@@ -496,8 +494,9 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
 
 def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
-    stated = {name: {"name": name, "meaning": ""} for name in text_list(file, f"{path}/names")}
-    return tuple(
-        QualityCheck(**read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults))
-        for name, defaults in stated.items()
-    )
+    checks = []
+    for name in text_list(file, f"{path}/names"):
+        defaults = {"name": name, "meaning": ""}
+        stated = read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults)
+        checks.append(QualityCheck(**stated))
+    return tuple(checks)

@@ -280,7 +280,8 @@ class ApparatusData(Checked):
 
     def require_pascals(self) -> None:
         """Refuse to state pascals by a conversion constant that is not per pascal."""
-        if (per := self.reading.per) != "Pa":
+        per = self.reading.per
+        if per != "Pa":
             whose = "relative" if per == "relative" else "per unit of a reference that is no stress"
             problem = f"The conversion constant of the artifact is {whose}."
             why = "The stress of its calibration was not known, and no reading tells another."

@@ -31,7 +31,7 @@ _SHOWN: dict[Any, Any] = {}
 
 def require_positive(name: str, value: float, unit: str = "") -> None:
     """Refuse a value that is not a finite number above zero, or no quantity at all."""
-    if not (math.isfinite(value) and value > 0):
+    if not 0 < value < math.inf:
         problem = f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero."
         raise InputError(problem, cure="Check the value and its unit.")
     require_size(name, value, unit)
@@ -61,7 +61,7 @@ def require_size(
 ) -> None:
     """Refuse numbers of a size that no quantity has, in whatever unit it was stated."""
     sizes = np.abs(values)
-    largest = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
+    largest = np.max(sizes, where=np.isfinite(sizes), initial=0.0)
     if largest and not smallest <= largest <= _LARGEST:
         raise InputError(
             f"{name} is {largest:.3g} {unit}".rstrip() + ", a size that no quantity has.",
@@ -72,20 +72,20 @@ def require_size(
 
 def require_non_negative(name: str, value: float | None) -> None:
     """Refuse a value that is stated, and is not a finite number of at least zero."""
-    if value is not None and not (math.isfinite(value) and value >= 0):
+    if value is not None and not 0 <= value < math.inf:
         raise InputError(f"{name} is {value:g}, but it must be finite and not negative.")
 
 
 def require_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     """Refuse a value outside the closed range from ``low`` to ``high``."""
-    if not (math.isfinite(value) and low <= value <= high):
+    if not low <= value <= high:
         raise InputError(
             f"{name} is {value:g} {unit}".rstrip() + f", but it must lie from {low:g} to {high:g}.",
             cure="Check the value and its unit.",
         )
 
 
-def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> FloatArray:
+def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
     """Return a read-only copy, so that a frozen dataclass stays frozen."""
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)
@@ -143,9 +143,7 @@ def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
         problem = f"{name} has shape {array.shape}, or holds values that are no whole numbers."
         raise InputError(problem, cure="Give one whole number for each point.")
-    numbers = array.astype(np.int64)
-    numbers.setflags(write=False)
-    return numbers
+    return frozen_array(array, dtype=np.int64)
 
 
 class ByContent:
@@ -160,10 +158,9 @@ class ByContent:
 
 def same_content(first: Any, second: Any) -> bool:
     """Whether two records hold the same, array by array; NaN is equal to NaN."""
-    if isinstance(first, np.ndarray):
-        return isinstance(second, np.ndarray) and np.array_equal(first, second, equal_nan=True)
-    if isinstance(first, float) and isinstance(second, float):
-        return first == second or (first != first and second != second)
+    if isinstance(first, np.ndarray | float):
+        alike = isinstance(second, np.ndarray | float | int)
+        return alike and np.array_equal(first, second, equal_nan=True)
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         return first.keys() == second.keys() and all(
             same_content(first[key], second[key]) for key in first
@@ -171,6 +168,5 @@ def same_content(first: Any, second: Any) -> bool:
     if isinstance(first, tuple | list) and isinstance(second, tuple | list):
         return len(first) == len(second) and all(map(same_content, first, second))
     if is_dataclass(first) and type(first) is type(second):
-        pairs = ((getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
-        return all(same_content(*pair) for pair in pairs)
+        return same_content(vars(first), vars(second))
     return bool(first == second)

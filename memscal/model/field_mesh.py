@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, freeze_arrays
+from memscal.model.arrays import FloatArray, freeze_arrays, frozen_array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -52,8 +52,7 @@ class FieldMesh:
 
     def __post_init__(self) -> None:
         freeze_arrays(self, "points", "displacement", "stress")
-        triangles = np.array(self.triangles, dtype=np.int64)
-        triangles.setflags(write=False)
+        triangles = frozen_array(self.triangles, dtype=np.int64)
         object.__setattr__(self, "triangles", triangles)
         count = self.points.shape[0]
         for name, columns in (("points", 2), ("displacement", 2), ("stress", 4)):

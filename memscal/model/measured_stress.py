@@ -30,7 +30,7 @@ from memscal.model.checks import (
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import LoadCell, StressSensor
-from memscal.model.notation import VOLTS, Reading, format_measured
+from memscal.model.notation import Reading, format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
 
@@ -73,7 +73,7 @@ class MeasuredScan:
     @property
     def reading(self) -> Reading:
         """The unit in which its readings are stored and shown."""
-        return Reading.fitting(self.unit) if self.unit else VOLTS
+        return Reading.fitting(self.unit or "V")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "film", _kept_record(self.film, "thickness", "roughness_rms"))
@@ -221,8 +221,8 @@ class MeasuredProfile(ByContent):
     @property
     def covariance(self) -> FloatArray:
         """Covariance of ``s_zz``, shape (n, n), in Pa^2; of very many points use ``roots``."""
-        squares = (np.diag(r**2) if r.ndim == 1 else r @ r.T for r in self.roots.values())
-        return np.asarray(sum(squares))
+        parts = (np.diag(r**2) if r.ndim == 1 else r @ r.T for r in self.roots.values())
+        return np.asarray(sum(parts))
 
     @property
     def s_zz_errors(self) -> FloatArray:
@@ -232,7 +232,7 @@ class MeasuredProfile(ByContent):
     def errors_by(self, *sources: str) -> FloatArray:
         """Standard uncertainty of ``s_zz`` by some of the sources, shape (n,), in Pa."""
         roots = [self.roots[source].reshape(self.r.size, -1) for source in sources]
-        return np.asarray(np.linalg.norm(np.hstack([np.zeros((self.r.size, 0)), *roots]), axis=1))
+        return np.asarray(np.linalg.norm(np.hstack(roots), axis=1))
 
     @property
     def force_uncertainty(self) -> float:
@@ -330,12 +330,14 @@ def _kept(value: float) -> float:
 def _kept_record(record: Record, *lengths: str) -> Record:
     """Round the lengths of a film or an indenter, and their uncertainties."""
     names = [name + end for name in lengths for end in ("", "_uncertainty")]
-    kept: Any = {n: _kept(v) for n in names if (v := getattr(record, n)) is not None}
+    stated = {name: getattr(record, name) for name in names}
+    kept: Any = {name: _kept(value) for name, value in stated.items() if value is not None}
     return replace(record, **kept)
 
 
 def _freeze(owner: object, *names: str, scale: float = 1.0) -> None:
     """Replace arrays by read-only copies, those of lengths and voltages (``scale``) rounded."""
     for name in names:
-        if (values := getattr(owner, name)) is not None:
+        values = getattr(owner, name)
+        if values is not None:
             object.__setattr__(owner, name, frozen_array(np.asarray(values) * scale / scale))

@@ -95,11 +95,14 @@ class Quantity:
         return self.stored or self.name
 
     @property
+    def _units(self) -> Dimension:
+        name = self.dimension
+        return DIMENSIONS.get(name) or Dimension(name, name, name, 1.0)
+
+    @property
     def unit(self) -> str:
         """The unit in which it is shown; that of a number of unknown dimension is its dimension."""
-        if self.shown or self.dimension not in DIMENSIONS:
-            return self.shown or self.dimension
-        return DIMENSIONS[self.dimension].shown
+        return self.shown or self._units.shown
 
     @property
     def unit_text(self) -> str:
@@ -109,27 +112,26 @@ class Quantity:
     @property
     def column(self) -> str:
         """The name of its column in a data frame: ``r (mm)``."""
-        shown = self.unit if self.dimension in DIMENSIONS else ""
-        name = self.label or self.name
-        return f"{name} ({shown})" if shown else name
+        return self._with_unit(self.label or self.name)
 
     @property
     def heading(self) -> str:
         """Its words and unit over a column of a table."""
+        return self._with_unit(self.words)
+
+    def _with_unit(self, words: str) -> str:
         shown = self.unit if self.dimension in DIMENSIONS else ""
-        return f"{self.words} ({shown})" if shown else self.words
+        return f"{words} ({shown})" if shown else words
 
     @property
     def si_unit(self) -> str:
         """The SI unit of its values in Python."""
-        return DIMENSIONS[self.dimension].si if self.dimension in DIMENSIONS else self.dimension
+        return self._units.si
 
     @property
     def scale(self) -> float:
         """How many SI units :attr:`unit` is; 1 of a count."""
-        if self.shown or self.dimension not in DIMENSIONS:
-            return _OTHER_UNITS.get(self.shown, 1.0)
-        return DIMENSIONS[self.dimension].scale
+        return _OTHER_UNITS.get(self.shown, 1.0) if self.shown else self._units.scale
 
     def read_in(self, reading: Reading) -> "Quantity":
         """Return the quantity for readings in a unit."""
@@ -157,6 +159,11 @@ class Record:
 def record(nx_class: str, *quantities: Quantity, signal: str = "") -> Record:
     """Return a record of quantities."""
     return Record(nx_class, quantities, signal)
+
+
+def required(*quantities: Quantity) -> list[Quantity]:
+    """Return quantities without which a file is refused."""
+    return [replace(quantity, required=True) for quantity in quantities]
 
 
 def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Quantity]:

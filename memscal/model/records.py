@@ -1,6 +1,6 @@
 """Records of memscal as tables of quantities, in the order in which files hold them."""
 
-from memscal.model.quantities import Quantity, Record, measured, record
+from memscal.model.quantities import Quantity, Record, measured, record, required
 
 _L = "length"
 _P = "stress"
@@ -35,8 +35,9 @@ _SLOPE = Quantity("inclination", "angle", "inclination of the face", required=Tr
 CONE = record("NXcollection", _SLOPE)
 INDENTER_FACE = record(
     "NXdata",
-    Quantity("r", _L, "radius", "r", _R, required=True),
-    Quantity("z", _L, "height of the face", "z", _R, required=True),
+    *required(
+        Quantity("r", _L, "radius", "r", _R), Quantity("z", _L, "height of the face", "z", _R)
+    ),
     signal="z",
 )
 _LOAD = measured(Quantity("load", "force", "load", "P", required=True))
@@ -117,16 +118,20 @@ SYNTHETIC = record("NXcollection", _SYNTHETIC)
 
 PROFILE = record(
     "NXdata",
-    Quantity("r", _L, "distance from the indenter's axis", "r", _R, required=True),
-    Quantity("sigma_zz", _P, "normal stress at the base", "σ_zz", _R, required=True),
+    *required(
+        Quantity("r", _L, "distance from the indenter's axis", "r", _R),
+        Quantity("sigma_zz", _P, "normal stress at the base", "σ_zz", _R),
+    ),
     Quantity("sigma_rz", _P, "radial traction on the film", "σ_rz", _R),
     Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress", axes=_R),
     signal="sigma_zz",
 )
 IDEAL_REFERENCE = record(
     "NXcollection",
-    Quantity("shape", "text", "shape of the reference", required=True),
-    Quantity("size", _L, "size of the reference", required=True),
+    *required(
+        Quantity("shape", "text", "shape of the reference"),
+        Quantity("size", _L, "size of the reference"),
+    ),
 )
 REFERENCE_DATA = record(
     "NXdata",
@@ -157,19 +162,23 @@ PROFILE_NOTES = record("NXprocess", Quantity("notes", "note", "notes", origin="r
 
 FIELD = record(
     "NXdata",
-    Quantity("x", _L, "position along x", "x", _X, required=True),
-    Quantity("y", _L, "position along y", "y", ("y",), required=True),
-    Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
-    Quantity("g_errors", _PER_AREA, _OF_G, axes=_YX, required=True),
+    *required(
+        Quantity("x", _L, "position along x", "x", _X),
+        Quantity("y", _L, "position along y", "y", ("y",)),
+        Quantity("g", _PER_AREA, "apparatus function", "G", _YX),
+        Quantity("g_errors", _PER_AREA, _OF_G, axes=_YX),
+    ),
     Quantity("g_scatter", _PER_AREA, "part of g_errors that scatters between scans", axes=_YX),
     signal="g",
 )
 RADIAL = record(
     "NXdata",
-    Quantity("r", _L, "distance from the sensor", "r", _R, required=True),
-    Quantity("g", _PER_AREA, "apparatus function", "G", _R, required=True),
-    Quantity("g_errors", _PER_AREA, _OF_G, axes=_R, required=True),
-    Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R, required=True),
+    *required(
+        Quantity("r", _L, "distance from the sensor", "r", _R),
+        Quantity("g", _PER_AREA, "apparatus function", "G", _R),
+        Quantity("g_errors", _PER_AREA, _OF_G, axes=_R),
+        Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R),
+    ),
     Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A", axes=_R),
     signal="g",
 )
@@ -199,21 +208,25 @@ RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="
 """The radial profile in files of version 1.0, which held its covariance."""
 TRANSFER = record(
     "NXdata",
-    Quantity("k", _W, "wavenumber", "k", _K, required=True),
-    Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K, required=True),
-    Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|", axes=_K, required=True),
-    Quantity("window", _ONE, "window of the regularisation", axes=_K, required=True),
-    Quantity("resolved_wavenumber", _W, "resolved up to the wavenumber", "k", required=True),
+    *required(
+        Quantity("k", _W, "wavenumber", "k", _K),
+        Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K),
+        Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|", axes=_K),
+        Quantity("window", _ONE, "window of the regularisation", axes=_K),
+        Quantity("resolved_wavenumber", _W, "resolved up to the wavenumber", "k"),
+    ),
     signal="modulus",
 )
 RECONVOLUTION = record(
     "NXdata",
-    Quantity("x", _L, "position", "x", _X, required=True),
-    Quantity("u_zz", _U, "voltage", "U", _X, required=True),
-    Quantity("u_zz_errors", _U, "noise of the voltage", axes=_X, required=True),
-    Quantity("u_zz_predicted", _U, "predicted with the deconvolved G", axes=_X, required=True),
-    Quantity("u_zz_gaussian", _U, "predicted with the Gaussian", axes=_X, required=True),
-    Quantity("residual", _U, "measured minus predicted", axes=_X, required=True),
+    *required(
+        Quantity("x", _L, "position", "x", _X),
+        Quantity("u_zz", _U, "voltage", "U", _X),
+        Quantity("u_zz_errors", _U, "noise of the voltage", axes=_X),
+        Quantity("u_zz_predicted", _U, "predicted with the deconvolved G", axes=_X),
+        Quantity("u_zz_gaussian", _U, "predicted with the Gaussian", axes=_X),
+        Quantity("residual", _U, "measured minus predicted", axes=_X),
+    ),
     Quantity("offset_x", _L, "position from the centre along x", axes=_X),
     Quantity("offset_y", _L, "position from the centre along y", axes=_X),
     Quantity("load", "force", "load at each point", "P", _X, stored="normal_load"),
@@ -224,9 +237,11 @@ RECONVOLUTION = record(
 CHECK = record(
     "NXcollection",
     Quantity("name", "text", "check"),
-    Quantity("value", _ONE, "value", required=True),
-    Quantity("limit", _ONE, "limit", required=True),
-    Quantity("passed", "truth", "whether the value is within the limit", required=True),
+    *required(
+        Quantity("value", _ONE, "value"),
+        Quantity("limit", _ONE, "limit"),
+        Quantity("passed", "truth", "whether the value is within the limit"),
+    ),
     Quantity("meaning", "text", "meaning"),
     Quantity("p_value", _ONE, "chance of such a value, or a larger one", "p"),
 )
@@ -246,11 +261,15 @@ PROCESS = record(
 # Along r; x and y are the indenter's positions.
 STRESS_PROFILE = record(
     "NXdata",
-    Quantity("r", _L, "distance from the centre", "r", _R, required=True),
-    Quantity("x", _L, "position along x", "x", _R, required=True),
+    *required(
+        Quantity("r", _L, "distance from the centre", "r", _R),
+        Quantity("x", _L, "position along x", "x", _R),
+    ),
     Quantity("y", _L, "position along y", "y", _R),
-    Quantity("s_zz", _P, "measured normal stress", "S_zz", _R, required=True),
-    Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R, required=True),
+    *required(
+        Quantity("s_zz", _P, "measured normal stress", "S_zz", _R),
+        Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R),
+    ),
     signal="s_zz",
 )
 STRESS_NUMBERS = record(
@@ -266,15 +285,19 @@ STRESS_NUMBERS = record(
 )
 STRESS_CURVE = record(
     "NXdata",
-    Quantity("curve_r", _L, "distance from the centre", "r", _R, required=True, stored="r"),
-    Quantity("curve_s_zz", _P, "fitted stress", "S_zz", _R, required=True, stored="s_zz"),
+    *required(
+        Quantity("curve_r", _L, "distance from the centre", "r", _R, stored="r"),
+        Quantity("curve_s_zz", _P, "fitted stress", "S_zz", _R, stored="s_zz"),
+    ),
     signal="s_zz",
 )
 _OF_SCALE = "relative uncertainty of all positions"
 MEASURED_SCAN = record(
     "NXcollection",
-    Quantity("width", _L, "extent of the positions", required=True),
-    Quantity("synthetic", "truth", "whether the scan is synthetic", required=True),
+    *required(
+        Quantity("width", _L, "extent of the positions"),
+        Quantity("synthetic", "truth", "whether the scan is synthetic"),
+    ),
     Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors"),
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
@@ -286,13 +309,15 @@ def points_record(channel: str) -> Record:
     point = ("point",)
     return record(
         "NXdata",
-        Quantity("x", _L, "position along x", axes=point, required=True),
-        Quantity("y", _L, "position along y", axes=point, required=True),
-        Quantity("x_errors", _L, axes=point, required=True),
-        Quantity("u", _U, "voltage", axes=point, required=True, stored=u),
-        Quantity("weight", _ONE, axes=point, required=True, stored="outlier_weight"),
-        Quantity("load", "force", axes=point, required=True, stored="normal_load"),
-        Quantity("load_errors", "force", axes=point, required=True, stored="normal_load_errors"),
+        *required(
+            Quantity("x", _L, "position along x", axes=point),
+            Quantity("y", _L, "position along y", axes=point),
+            Quantity("x_errors", _L, axes=point),
+            Quantity("u", _U, "voltage", axes=point, stored=u),
+            Quantity("weight", _ONE, axes=point, stored="outlier_weight"),
+            Quantity("load", "force", axes=point, stored="normal_load"),
+            Quantity("load_errors", "force", axes=point, stored="normal_load_errors"),
+        ),
         Quantity("noise", _U, axes=point, stored=f"{u}_errors"),
         Quantity("correlation", _ONE, axes=("point", "point_prime"), stored=f"{u}_correlation"),
         signal=u,

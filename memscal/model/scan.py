@@ -20,7 +20,7 @@ from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
-from memscal.model.notation import VOLTS, Reading
+from memscal.model.notation import Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
@@ -81,8 +81,8 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
 
 def require_plane(x: FloatArray, y: FloatArray) -> None:
     """Refuse points of a plane that lie along a line: their centre across it is not determined."""
-    spread = float(np.ptp(x)), float(np.ptp(y))
-    thin = int(np.argmin(spread))
+    spread = np.ptp(x), np.ptp(y)
+    thin = np.argmin(spread)
     if spread[thin] <= LINE * spread[1 - thin]:
         raise InputError(
             f"The points spread over {spread[0] * 1e3:.4g} mm along x and {spread[1] * 1e3:.4g} mm "
@@ -296,9 +296,12 @@ class Scan:
         load = self.load
         if film is not None and indenter is not None and load is not None:
             return SetUp(film, indenter, load, self.rod_friction)
-        names = {"sample/film": film, "indenter": indenter, "indenter/load": load}
-        absent = [name for name, value in names.items() if value is None]
-        missing = " and no ".join(f"{n.rpartition('/')[2]} (/entry/{n})" for n in absent)
+        places = {
+            "film (/entry/sample/film)": film,
+            "indenter (/entry/indenter)": indenter,
+            "load (/entry/indenter/load)": load,
+        }
+        missing = " and no ".join(place for place, stated in places.items() if stated is None)
         problem = f"{self.source.file_name if self.source else 'The scan'} states no {missing}."
         why = "The stress that an indenter makes at the base of a film is calculated from them."
         cure = "State them (memscal import --thickness, --radius, --load), or give --reference."
@@ -312,8 +315,7 @@ class Scan:
     @property
     def reading(self) -> Reading:
         """The unit in which the readings are shown."""
-        largest = float(np.nanmax(np.abs(self.u_zz), initial=0.0))
-        return VOLTS if self.unit == "V" else Reading.fitting(self.unit, largest)
+        return Reading.fitting(self.unit, np.nanmax(np.abs(self.u_zz), initial=0.0))
 
     @property
     def kind(self) -> str:
@@ -355,15 +357,13 @@ class Scan:
         else:
             keep = np.flatnonzero(np.isin(self.passes, numbers))
             for name in ("x", "y", "repeat", "x_errors"):
-                if (values := getattr(self, name)) is not None:
-                    changes[name] = values[keep]
-            if self.u_zz_correlation is not None:
-                changes["u_zz_correlation"] = of_points(self.u_zz_correlation, keep)
-        for name in ("branch", "u_zz", *LIKE_SIGNAL):
-            if (values := getattr(self, name)) is not None:
-                changes[name] = values[keep]
+                changes[name] = getattr(self, name)
+        changes |= {name: getattr(self, name) for name in ("branch", "u_zz", *LIKE_SIGNAL)}
+        chosen = {name: values[keep] for name, values in changes.items() if values is not None}
         channels = {name: values[keep] for name, values in self.channels.items()}
-        return replace(self, **changes, channels=channels)
+        if self.kind == "points" and self.u_zz_correlation is not None:
+            chosen["u_zz_correlation"] = of_points(self.u_zz_correlation, keep)
+        return replace(self, **chosen, channels=channels)
 
     def _freeze_positions(self) -> None:
         for name in ("x", "y"):
@@ -452,7 +452,7 @@ class Scan:
         arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.load is None:
             return
-        if not (np.isfinite(self.load) and self.load > 0):
+        if not 0 < self.load < math.inf:
             raise InputError(
                 f"The load of the scan is {self.load:g} N, but it must be above zero.",
                 why="A calibration divides the voltage by the stress that this load produces.",

@@ -162,7 +162,9 @@ class StressField:
                 problem = f"{name} of the field has {axis.size} values, or uneven ones"
                 cure = "Cut out what is not zero, and interpolate it to even pixels."
                 raise InputError(f"{problem}: not {_FEWEST} to {MOST_PIXELS} even ones.", cure=cure)
-        if (shape := np.shape(self.values)) != (expected := (self.y.size, self.x.size)):
+        shape = np.shape(self.values)
+        expected = (self.y.size, self.x.size)
+        if shape != expected:
             raise InputError(f"The field has shape {shape}, but y and x make it {expected}.")
         values = arrays.finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
@@ -303,7 +305,8 @@ class StressProfile:
     def __post_init__(self) -> None:
         arrays.require_positive("load of the stress profile", self.load, "N")
         for name in ("r", "sigma_zz", "sigma_rz", "sigma_zz_errors"):
-            if (stated := getattr(self, name)) is not None:
+            stated = getattr(self, name)
+            if stated is not None:
                 values = arrays.finite_vector(f"{name} of the stress profile", stated)
                 object.__setattr__(self, name, values)
                 if values.size != self.r.size:

@@ -43,7 +43,11 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
     way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
     moves = np.abs(np.diff(position)) > _MOVING * way
     dwell = np.append(0, np.cumsum(moves))
-    pressed = _timed(u, dwell) if load is None else _loaded(load)
+    if load is None:
+        pressed = _timed(u, dwell)
+    else:
+        lifted, top = np.quantile(load, [0.01, 0.99])
+        pressed = (lifted > _LIFTED * top) | (load > lifted + _PRESSED * (top - lifted))
 
     starts = np.flatnonzero(np.diff(np.where(pressed, dwell, -1), prepend=-1))
     runs = [run for run in np.split(np.arange(u.size), starts) if run.size and pressed[run[0]]]
@@ -80,8 +84,10 @@ def _averaged(
     scatter = np.array([np.std(residual, ddof=1) for residual in residuals])
     # A few rows may agree by chance: no hold counts as less noisy than the typical one.
     noise = np.maximum(scatter, np.median(scatter))
-    correlation = _correlation_of_neighbours(residuals) + 1 / np.median(size)
-    correlation = float(np.clip(correlation, 0.0, 0.95))
+    # Neighbouring rows correlate as an amplifier's filter makes them.
+    power = sum(residual @ residual for residual in residuals) or 1.0
+    neighbours = sum(residual[1:] @ residual[:-1] for residual in residuals)
+    correlation = np.clip(neighbours / power + 1 / np.median(size), 0.0, 0.95)
     errors = noise * np.sqrt((1 + correlation) / (1 - correlation)) / np.sqrt(size)
 
     thirds = [run.size // 3 for run in held]
@@ -105,18 +111,6 @@ def _averaged(
     )
     log = {name: columns[name] for name in _LOGGED if name in columns}
     return Holds(log, line, first, stop, mean, errors, reading, (averaged, scatters, changes))
-
-
-def _correlation_of_neighbours(residuals: list[FloatArray]) -> float:
-    """Correlation of neighbouring rows, such as an amplifier's filter makes (autoregression)."""
-    power = sum(float(residual @ residual) for residual in residuals)
-    return sum(float(residual[1:] @ residual[:-1]) for residual in residuals) / (power or 1.0)
-
-
-def _loaded(load: FloatArray) -> BoolArray:
-    """Tell from the load in which rows the indenter presses."""
-    lifted, held = np.quantile(load, [0.01, 0.99])
-    return np.asarray((lifted > _LIFTED * held) | (load > lifted + _PRESSED * (held - lifted)))
 
 
 def _timed(u: FloatArray, dwell: IndexArray) -> BoolArray:

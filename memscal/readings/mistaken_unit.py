@@ -63,8 +63,8 @@ def require_recorded(load: float, recorded: FloatArray) -> None:
     """Refuse a nominal load in N that lies beyond those that were recorded."""
     if np.isnan(recorded).all():
         return
-    low = float(np.nanmin(recorded))
-    high = float(np.nanmax(recorded))
+    low = np.nanmin(recorded)
+    high = np.nanmax(recorded)
     if not (1 - _BEYOND) * low <= load <= (1 + _BEYOND) * high:
         raise InputError(
             f"The load is stated as {load:.4g} N, but those recorded go from {low:.4g} to "

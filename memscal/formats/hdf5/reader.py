@@ -63,7 +63,7 @@ def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator[SafeF
     with damage_named(f"{name} cannot be opened as HDF5"):
         # The library's own copy of the bytes: no call of Python for each piece that it looks at.
         file = h5py.File(h5py.h5f.open_file_image(data))
-        opened = SafeFile(file, name, source, data, accept_altered=accept_altered)
+        opened = SafeFile(file, source, data, accept_altered=accept_altered)
     try:
         # The dataclasses check values without knowing where they come from.
         with placed(name):
@@ -76,10 +76,8 @@ def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator[SafeF
 class SafeFile:
     """An open file whose content is reached by known paths only."""
 
-    def __init__(
-        self, file: Any, name: str, source: SourceFile, data: bytes, *, accept_altered: bool = False
-    ) -> None:
-        self.name = name
+    def __init__(self, file: Any, source: SourceFile, data: bytes, *, accept_altered: bool) -> None:
+        self.name = source.file_name
         self.source = source
         self._accept_altered = accept_altered
         self._data = data
@@ -198,10 +196,14 @@ class SafeFile:
             raise UnsafeFileError(problem, why=why, cure="Copy the linked data into the file.")
         return h5py.h5o.open(folder, key)
 
-    def _dataset(self, path: str) -> Any:
+    def _existing(self, path: str) -> Any:
         item = self._open(path)
         if item is None:
             raise FormatError(f"{self.where(path)} is missing.")
+        return item
+
+    def _dataset(self, path: str) -> Any:
+        item = self._existing(path)
         if not isinstance(item, h5py.h5d.DatasetID):
             raise FormatError(f"{self.where(path)} is not a dataset.")
         return item
@@ -219,9 +221,7 @@ class SafeFile:
         self._spend(path, length)
 
     def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
-        item = self._open(path)
-        if item is None:
-            raise FormatError(f"{self.where(path)} is missing.")
+        item = self._existing(path)
         key = name.encode("ascii")
         if not h5py.h5a.exists(item, key):
             return None

@@ -66,23 +66,13 @@ class Group:
     children: Mapping[str, Node]
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
 
-    @property
-    def all_attributes(self) -> dict[str, Attribute]:
-        """The attributes, the class first, and for NXdata the index of each axis."""
-        attributes: dict[str, Attribute] = {"NX_class": self.nx_class, **self.attributes}
-        axes = self.attributes.get("axes", ())
-        if isinstance(axes, tuple):
-            attributes |= {f"{axis}_indices": i for i, axis in enumerate(axes)}
-        return attributes
-
 
 Node = Group | Number | Text | str
 
 
 def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
     """Return SI values as a number in the unit that our files use for their dimension."""
-    converted, units = from_si(values, dimension)
-    return Number(converted, units, axes)
+    return Number(*from_si(values, dimension), axes)
 
 
 def count(value: int) -> Number:
@@ -151,10 +141,17 @@ def content_digest(items: Iterable[DigestItem]) -> str:
 
 
 def _attributes(node: Node) -> dict[str, Any]:
-    if isinstance(node, Group):
-        return node.all_attributes
-    units = {"units": node.units} if isinstance(node, Number) else {}
-    return {} if isinstance(node, str) else {**units, **node.attributes}
+    """Return the attributes; a group's begin with its class, an NXdata's end with its axes."""
+    if isinstance(node, str):
+        return {}
+    if isinstance(node, Number):
+        return {"units": node.units, **node.attributes}
+    if isinstance(node, Text):
+        return dict(node.attributes)
+    axes = node.attributes.get("axes", ())
+    assert isinstance(axes, tuple)
+    indices = {f"{axis}_indices": i for i, axis in enumerate(axes)}
+    return {"NX_class": node.nx_class, **node.attributes, **indices}
 
 
 def _canonical(value: Any) -> tuple[str, list[int], bytes | memoryview]:
@@ -249,17 +246,13 @@ def _write_dataset(group: Any, name: str, node: Number | Text | str) -> None:
 
 def _write_attributes(item: Any, node: Node) -> None:
     for name, value in _attributes(node).items():
-        _write_attribute(item, name, value)
-
-
-def _write_attribute(item: Any, name: str, value: Attribute) -> None:
-    if isinstance(value, int):
-        item.attrs.create(name, value, dtype=np.int64)
-    elif isinstance(value, tuple):
-        texts = [_plain_text(text) for text in value]
-        item.attrs.create(name, np.array(texts, dtype=object), dtype=_TEXT)
-    else:
-        item.attrs.create(name, _plain_text(value), dtype=_TEXT)
+        if isinstance(value, int):
+            item.attrs.create(name, value, dtype=np.int64)
+        elif isinstance(value, tuple):
+            texts = [_plain_text(text) for text in value]
+            item.attrs.create(name, np.array(texts, dtype=object), dtype=_TEXT)
+        else:
+            item.attrs.create(name, _plain_text(value), dtype=_TEXT)
 
 
 def _plain_text(text: str | Text) -> bytes:
