@@ -146,7 +146,7 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
         return require_scalar(file, at, quantity.dimension)
     values = require_array(file, at, quantity.dimension, ndim=len(quantity.axes))
     axes = [axis.removesuffix("_prime") for axis in quantity.axes]
-    shape = tuple(lengths.setdefault(a, n) for a, n in zip(axes, values.shape, strict=True))
+    shape = tuple(map(lengths.setdefault, axes, values.shape))
     if values.shape != shape:
         problem = f"{file.where(at)} has shape {values.shape}, but its axes give {shape}."
         raise FormatError(problem, cure="Write the file again.")
@@ -305,8 +305,8 @@ def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str
     children: dict[str, Node] = {}
     if film is not None:
         children["film"] = write_record(records.FILM, film)
-    children |= write_record(records.SAMPLE, stated).children
-    return Group("NXsample", {**children, **_NOWHERE})
+    sample = write_record(records.SAMPLE, stated)
+    return Group("NXsample", {**children, **sample.children, **_NOWHERE})
 
 
 def indenter_group(
@@ -395,10 +395,8 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
         contact["film"] = write_record(records.FILM, film)
     if indenter:
         contact["indenter"] = indenter_group(indenter)
-    solution: dict[str, Node] = {}
     numerics = write_record(records.NUMERICS, profile)
-    if numerics.children:
-        solution["numerics"] = numerics
+    solution: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
     solution |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
     parameters = write_record(records.CONTACT, profile, **contact)

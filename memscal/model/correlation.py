@@ -40,13 +40,13 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
         cure = "Give the correlation of neighbours alone, (n, w), or average neighbouring readings."
         raise too_large("u_zz_correlation", size, MOST_CORRELATED, "points", why=why, cure=cure)
     symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
-    if not (symmetric and np.allclose(np.diag(correlation), 1.0)):
+    if not symmetric or not np.allclose(np.diag(correlation), 1.0):
         raise InputError(
             "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
             cure="Divide a covariance by the standard uncertainties of row and column, and "
             "give those as u_zz_errors.",
         )
-    least = float(np.linalg.eigvalsh(correlation)[0])
+    least = np.linalg.eigvalsh(correlation)[0]
     if least <= _LEAST_EIGENVALUE:
         problem = f"{_NOT_POSITIVE}: it has the eigenvalue {least:.3g}."
         raise InputError(problem, why=_WHY, cure=_CURE)
@@ -81,11 +81,8 @@ def of_points(correlation: FloatArray, kept: IndexArray) -> FloatArray:
     if is_banded(chosen):
         return chosen
     # So few points that all are neighbours.
-    whole = np.zeros_like(chosen)
-    for j in range(kept.size):
-        diagonal = np.arange(kept.size - j)
-        whole[diagonal, diagonal + j] = whole[diagonal + j, diagonal] = chosen[diagonal, j]
-    return whole
+    whole = sum(np.diag(chosen[: kept.size - j, j], -j) for j in range(kept.size))
+    return np.asarray(whole + np.tril(whole, -1).T)
 
 
 def root_of(correlation: FloatArray) -> FloatArray:

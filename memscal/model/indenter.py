@@ -172,9 +172,10 @@ class Profile(Indenter):
     z: FloatArray
 
     def __post_init__(self) -> None:
-        for name, words in (("r", "r"), ("z", "height")):
-            values = arrays.finite_vector(f"{words} of the indenter's profile", getattr(self, name))
-            object.__setattr__(self, name, values)
+        r = arrays.finite_vector("r of the indenter's profile", self.r)
+        z = arrays.finite_vector("height of the indenter's profile", self.z)
+        object.__setattr__(self, "r", r)
+        object.__setattr__(self, "z", z)
         arrays.require_increasing("r of the indenter's profile", self.r)
         if self.r.size != self.z.size or self.r.size < 4 or self.r[0] != 0:
             raise InputError(
@@ -182,11 +183,12 @@ class Profile(Indenter):
                 f"{self.z.size} heights.",
                 cure="Give a height for each of four or more radii, the first at the axis (0).",
             )
-        lowest = float(self.z.min())
-        if abs(lowest) > 1e-9 * float(np.ptp(self.z)) or np.ptp(self.z) == 0:
+        lowest = self.z.min()
+        height = np.ptp(self.z)
+        if abs(lowest) > 1e-9 * height or height == 0:
             raise InputError(
                 f"The lowest height of the indenter's profile is {lowest * 1e6:.4g} um, and its "
-                f"highest {float(self.z.max()) * 1e6:.4g} um.",
+                f"highest {self.z.max() * 1e6:.4g} um.",
                 why="Heights count from the point that touches first, and a flat end is a rod.",
                 cure="Subtract the lowest height from the table; press a Rod if it is flat.",
             )
@@ -198,7 +200,7 @@ class Profile(Indenter):
         """Return the profile of a function: ``points`` even radii up to ``extent``, all in m."""
         arrays.require_positive("extent of the indenter's profile", extent, "m")
         r = np.linspace(0.0, extent, points)
-        return cls(r=r, z=np.broadcast_to(np.asarray(height(r), dtype=np.float64), r.shape))
+        return cls(r=r, z=np.broadcast_to(height(r), r.shape))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Profile) and self._content() == other._content()

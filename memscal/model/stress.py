@@ -80,7 +80,7 @@ class IdealReference:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Return the Fourier transform at ``k`` (rad/m), in m^2; of a slit across it, in m."""
-        phase = np.asarray(k, dtype=np.float64) * self.size
+        phase = k * self.size
         square = math.pi * self.size**2
         if self.shape == "disc":
             far = phase != 0
@@ -182,15 +182,15 @@ class StressField:
 
     def __str__(self) -> str:
         """Return it in words."""
-        wide, high = (float(np.ptp(axis)) * 1e3 for axis in (self.x, self.y))
+        wide = np.ptp(self.x) * 1e3
+        high = np.ptp(self.y) * 1e3
         name = f" from {self.source.file_name}" if self.source else ""
         return f"field of {wide:.4g} mm x {high:.4g} mm{name}"
 
     @cached_property
     def _offsets(self) -> tuple[FloatArray, FloatArray]:
         """Positions along y and x from the axis of the field, in m."""
-        share = np.abs(self.values)
-        share = share / share.sum()
+        share = np.abs(self.values) / np.abs(self.values).sum()
         return self.y - share.sum(axis=1) @ self.y, self.x - share.sum(axis=0) @ self.x
 
     @property
@@ -235,7 +235,7 @@ class StressField:
     def profile(self) -> "StressProfile":
         """Return the profile that a calibration takes, with the mean over directions as table."""
         r, total, count = self._rings(1)
-        mean = np.asarray(total / count)
+        mean = total / count
         load = self.load or 1.0
         return StressProfile(r=r, sigma_zz=mean, load=load, field=self, source=self.source)
 
@@ -319,7 +319,7 @@ class StressProfile:
 
     def __repr__(self) -> str:
         """Return what it is of in place of thousands of array elements."""
-        peak = float(np.abs(self.sigma_zz).max()) * 1e-3
+        peak = np.abs(self.sigma_zz).max() * 1e-3
         return (
             f"<StressProfile: load {self.load:.4g} N, {self.r.size} radii to "
             f"{self.r[-1] * 1e3:.4g} mm, largest stress {peak:.4g} kPa>"

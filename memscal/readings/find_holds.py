@@ -53,7 +53,7 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
     runs = [run for run in np.split(np.arange(u.size), starts) if run.size and pressed[run[0]]]
     if load is not None:  # the ramps of a run are below the hold
         runs = _steady_rows(runs, load, pressed, lifted=0.0, share=0.75)
-    level = 0.0 if pressed.all() else float(np.median(u[~pressed]))
+    level = 0.0 if pressed.all() else np.median(u[~pressed])
     runs = _steady_rows(runs, u, pressed, lifted=level, share=0.5)
     held = [run for run in runs if run.size >= _FEWEST]
     if not held:
@@ -153,7 +153,7 @@ def _steady_rows(
     for run in runs:
         if not run.size:
             continue
-        held = float(np.quantile(values[run], share))
+        held = np.quantile(values[run], share)
         near = max(noise, _STEADY * abs(held - lifted))
         inside = np.flatnonzero(np.abs(values[run] - held) <= near)
         steady.append(run[inside[0] : inside[-1] + 1] if inside.size else run[:0])

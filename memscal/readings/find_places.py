@@ -28,7 +28,8 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IndexArray) -> Places:
     # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
     # an even lattice share a place too.
     close = _close(x, y, repeat)
-    columns, rows = (_clusters(values, close) for values in (x, y))
+    columns = _clusters(x, close)
+    rows = _clusters(y, close)
     # Along a line the neighbours of a place are those in order.
     index = rows if np.ptp(y) else columns
     if np.ptp(x) and np.ptp(y):
@@ -71,8 +72,8 @@ def _even_axis(positions: FloatArray) -> EvenAxis | None:
     for candidate in candidates:
         number = np.concatenate([[0], np.cumsum(np.rint(gaps / candidate))])
         centred = number - number.mean()
-        step = float(centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0))
-        start = float(ordered.mean() - step * number.mean())
+        step = centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0)
+        start = ordered.mean() - step * number.mean()
         if step > 0 and np.abs(ordered - start - step * number).max() <= _OFF_LATTICE * step:
             index = np.empty(positions.size, dtype=np.intp)
             index[order] = number
@@ -91,14 +92,14 @@ def _close(x: FloatArray, y: FloatArray, repeat: IndexArray) -> float:
         # Without an index unique() hashes, which is slower.
         places = np.unique(x[chosen] + 1j * y[chosen], return_index=True)[0]
         if places.size > 1:
-            usual.append(float(np.quantile(_nearest(places), _TWICE, method="lower")))
+            usual.append(np.quantile(_nearest(places), _TWICE, method="lower"))
     return max(_CLOSE * min(usual, default=0.0), _ROUNDING)
 
 
 def _nearest(places: NDArray[np.complex128]) -> FloatArray:
     """Return the distance of each of several distinct positions x + iy to its nearest one."""
     if not np.ptp(places.imag) or not np.ptp(places.real):
-        gaps = np.concatenate([[np.inf], np.abs(np.diff(places)), [np.inf]])
+        gaps = np.abs(np.diff(places, prepend=np.inf, append=np.inf))
         return np.asarray(np.minimum(gaps[:-1], gaps[1:]))
     from scipy.spatial import KDTree
 

@@ -4,7 +4,6 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.readings.find_places import places_of
@@ -91,7 +90,7 @@ def require_plausible(scan: Scan) -> None:
     steps = places_of(x, y, scan.passes.ravel()).steps
     lengths["step"] = min((step for step in steps if step > 0), default=0.0)
     lengths["width"] = _voltage_width(x, y, scan.u_zz.ravel())
-    h = _film(scan).thickness
+    h = _thickness(scan)
     if lengths["step"] > _LONGEST_STEP * h:
         why = f"{_WIDE}the scan misses it."
         raise _implausible(scan, lengths, "The positions' step is", lengths["step"], why)
@@ -105,9 +104,9 @@ def require_plausible(scan: Scan) -> None:
         raise _implausible(scan, lengths, words, lengths["width"], why)
 
 
-def _film(scan: Scan) -> ElasticFilm:
-    """Return the film; a scan that states none is refused."""
-    return scan.film or scan.set_up.film
+def _thickness(scan: Scan) -> float:
+    """Return the film's thickness in m; a scan that states no film is refused."""
+    return (scan.film or scan.set_up.film).thickness
 
 
 def _lengths(scan: Scan) -> dict[str, float]:
@@ -119,12 +118,12 @@ def _lengths(scan: Scan) -> dict[str, float]:
 
 
 def _refuse_short_span(scan: Scan, lengths: dict[str, float]) -> None:
-    if lengths["span"] < _SHORTEST_SPAN * _film(scan).thickness:
+    if lengths["span"] < _SHORTEST_SPAN * _thickness(scan):
         raise _implausible(scan, lengths, "The positions span", lengths["span"], _SHORT)
 
 
 def _refuse_long_span(scan: Scan, lengths: dict[str, float]) -> None:
-    if lengths["span"] > _LONGEST_SPAN * _film(scan).thickness:
+    if lengths["span"] > _LONGEST_SPAN * _thickness(scan):
         why = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
         raise _implausible(scan, lengths, "The positions span", lengths["span"], why)
 
@@ -133,7 +132,7 @@ def _implausible(
     scan: Scan, lengths: dict[str, float], words: str, length: float, why: str
 ) -> InputError:
     """Return the error of a length in m that no set-up has, with the units to check."""
-    h = _film(scan).thickness
+    h = _thickness(scan)
     place = f"{scan.source.file_name}: " if scan.source else ""
     times = f"{length / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
     problem = f"{place}{words} {length * 1e3:.4g} mm, {times}."
