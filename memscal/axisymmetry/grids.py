@@ -186,10 +186,15 @@ class Lattice:
         """Fourier transform about the central point."""
         return self.forward(scipy.fft.ifftshift(field))
 
+    @property
+    def wavenumber_axis(self) -> FloatArray:
+        """Wavenumbers along x, in rad/m."""
+        return np.asarray(self.wavenumber[0])
+
     def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, NDArray[np.complex128]]:
         """Return wavenumbers along x and the Fourier transform about the central point there."""
         line = scipy.fft.rfft(scipy.fft.ifftshift(field.sum(axis=0)))
-        return self.wavenumber[0], line * self.cell_area
+        return self.wavenumber_axis, line * self.cell_area
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a kernel centred on the central point with a field of the lattice."""

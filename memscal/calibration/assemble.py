@@ -44,10 +44,21 @@ def assemble(
     scan = solution.scan
     reference = stress_table(solution.stress)
     channel = solution.estimate.points.channel
+    other_estimate = None
+    if other is not None and solution.other is not None:
+        method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
+        radial = _radial(solution, solution.other, other)
+        other_estimate = OtherEstimate(method, other.parameters.only(_BY_ROUTE), radial)
+    quotient = solution.deconvolution.quotient
+    k, transfer = solution.fields.grid.axis_transfer(quotient.values)
+    modulus = np.abs(transfer) / solution.deconvolution.conversion_constant
+    resolved = solution.band.resolved
     return ApparatusFunction(
         plane=_plane(solution, results),
         radial_profile=_radial(solution, solution.deconvolution, results),
-        transfer=_transfer(solution, results),
+        transfer=TransferFunction(
+            k, modulus, results.transfer_errors, quotient.window[0], resolved
+        ),
         reconvolution=_reconvolution(solution),
         parameters=results.parameters,
         checks=checks,
@@ -65,7 +76,7 @@ def assemble(
         budget=results.budget,
         kernel_changes=results.kernel_changes,
         **common_circumstances(solution.scans),
-        other=_other(solution, other),
+        other=other_estimate,
     )
 
 
@@ -124,14 +135,6 @@ def _plane(solution: Solution, results: Results) -> ApparatusField:
     return ApparatusField(g.x, g.y, g.image, errors)
 
 
-def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
-    if results is None or solution.other is None:
-        return None
-    parameters = results.parameters.only(_BY_ROUTE)
-    method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
-    return OtherEstimate(method, parameters, _radial(solution, solution.other, results))
-
-
 def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:
     g = deconvolution.g
     covariance = results.radial_covariance
@@ -141,15 +144,6 @@ def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) 
     scale = errors * results.parameters.uncertainty("conversion_constant")
     correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
     return ApparatusRadial(g.r, g.radial, errors, gaussian, covariance, correlation)
-
-
-def _transfer(solution: Solution, results: Results) -> TransferFunction:
-    fields = solution.fields
-    quotient = solution.deconvolution.quotient
-    k, transfer = fields.grid.axis_transfer(quotient.values)
-    modulus = np.abs(transfer) / solution.deconvolution.conversion_constant
-    window = fields.along_axis(quotient.window)[1]
-    return TransferFunction(k, modulus, results.transfer_errors, window, solution.band.resolved)
 
 
 def _reconvolution(solution: Solution) -> Reconvolution:

@@ -317,7 +317,7 @@ def uncertainties(
     reading: Reading = VOLTS,
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
-    wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
+    wavenumbers = solution.fields.grid.wavenumber_axis
     # The derivatives of the other route, which is linear, are complete.
     drawn = drawn_scatter(solution) if deconvolution is solution.deconvolution else None
     results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)

@@ -12,7 +12,7 @@ from memscal.calibration.uncertainty import DivisionMap, Results, route_differen
 from memscal.estimation import assumptions
 from memscal.estimation import residuals as unexplained
 from memscal.estimation.band import RESOLVED
-from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.bayesian import HYPOTHESES, Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import carried_force
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
@@ -329,14 +329,23 @@ def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
 
 
 def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
-    log_factor, kind, share = assumptions.departure_test(estimate)
+    prior = HYPOTHESES[0].estimate
+    probability = estimate.weighed.probability
+    posterior = np.clip(probability[0], 1e-4, 1 - 1e-4)
+    factor = (1 - posterior) / posterior * prior / (1 - prior)
+    kinds: dict[str, float] = {}
+    for hypothesis, departure in zip(HYPOTHESES[1:], probability[1:], strict=True):
+        if hypothesis.estimate > 0:
+            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
+    kind = max(kinds, key=lambda name: kinds[name])
+    share = kinds[kind] / max(sum(kinds.values()), 1e-300)
     meaning = (
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
         "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
         "means that G is not Gaussian: use the deconvolved G. The most probable departure is "
         f"{_KINDS[kind]} ({share:.0%} of them)."
     )
-    return check("gaussian_evidence", log_factor, _LOG_BAYES_LIMIT, meaning)
+    return check("gaussian_evidence", float(np.log(factor)), _LOG_BAYES_LIMIT, meaning)
 
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:

@@ -28,17 +28,13 @@ from memscal.model.arrays import FloatArray
 _MOST = 50
 _FEWEST = 12
 _PIXELS = 1.6e6
-_LINEAR = (WhiteNoise, Tikhonov, Wiener, Bayesian)
-
-
-def is_linear(method: Method) -> bool:
-    """Whether a method multiplies the quotient of the spectra by a window of the stress alone."""
-    return isinstance(method, _LINEAR)
+#: Methods that multiply the quotient of the spectra by a window of the stress alone.
+LINEAR_METHODS = (WhiteNoise, Tikhonov, Wiener, Bayesian)
 
 
 def drawn_scatter(solution: Solution) -> DrawnScatter | None:
     """Repeat the division on drawn voltages; ``None`` for a linear method, which needs none."""
-    if is_linear(solution.method):
+    if isinstance(solution.method, LINEAR_METHODS):
         return None
     count = draw_count(solution)
     rng = np.random.default_rng([0, count])
@@ -105,6 +101,6 @@ def _divided(
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
     drawn = deconvolve(estimate, band, fields, method)
     k, spectrum = fields.grid.axis_transfer(drawn.quotient.values)
-    wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
+    wavenumbers = solution.fields.grid.wavenumber_axis
     transfer = np.interp(wavenumbers, k, np.abs(spectrum) / drawn.conversion_constant, right=0.0)
     return *read_off(drawn, solution.deconvolution.g.r), transfer

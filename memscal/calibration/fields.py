@@ -135,10 +135,6 @@ class LineFields:
         count = self.support + 1
         return Field(EvenGrid(count, self.grid.spacing), kernel[:count, :count])
 
-    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return wavenumbers along one axis and a spectral quantity there."""
-        return self.grid.wavenumber_axis, spectral[0]
-
 
 @dataclass(frozen=True, eq=False)
 class RasterFields:
@@ -279,10 +275,6 @@ class RasterFields:
         inside_y = np.abs(fine.y) <= self.support
         plane = values[np.ix_(inside_y, inside_x)]
         return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), plane)
-
-    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return wavenumbers along one axis and a spectral quantity there."""
-        return self.grid.wavenumber[0], spectral[0]
 
 
 @lru_cache(maxsize=6)

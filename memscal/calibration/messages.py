@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.calibration.drawn_scatter import draw_count, is_linear
+from memscal.calibration.drawn_scatter import LINEAR_METHODS, draw_count
 from memscal.calibration.film_inference import FilmLawComparison
 from memscal.calibration.prepare import Prepared
 from memscal.calibration.stages import Solution
@@ -147,7 +147,7 @@ def _method(solution: Solution) -> list[Message]:
     if method.name in _WINDOWS:
         return []
     how = "uncertainties are first-order through its effective window"
-    if not is_linear(method):
+    if not isinstance(method, LINEAR_METHODS):
         how = "what noise adds to the uncertainties is the scatter of "
         how += f"{draw_count(solution)} draws of the voltages"
         how += " and of its own random numbers" if hasattr(method, "seed") else ""

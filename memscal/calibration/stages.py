@@ -128,8 +128,15 @@ def deconvolve(
     # Eq. 3: A, and G of unit integral.
     a, g = fourier_ratio.normalise(fields.on_support(quotient.values, None))
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
-    # Eq. 1: the voltage that A and G predict.
-    predicted = _reconvolved(estimate, fields, quotient) + estimate.background
+    # Eq. 1: the voltage that A and G predict, of each scan through its own reference.
+    model = estimate.model
+    if estimate.points.scans == 1 and model.reference.order != ACROSS:
+        signal = fields.convolved(quotient) * estimate.points.load
+    else:
+        k, kernel = fields.grid.axis_transfer(quotient.values)
+        spectrum = np.interp(model.k, k, kernel.real, right=0.0)
+        signal = model.signal(estimate.gaussian.geometry, spectrum) + estimate.oval
+    predicted = signal + estimate.background
     return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
 
 
@@ -171,17 +178,12 @@ def prepare_fields(
     data = estimate.points
     if smoothed is not None and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
-    if divided and not _of_round_fields(estimate):
+    if divided and not (type(estimate.model) is ForwardModel or data.as_raster):
         problem = "The reference is a field that is not round, which a line does not show."
         why = "A division needs the voltage over the plane, as one raster has it."
         cure = 'Use method="bayesian" (--method bayesian), or scan one raster.'
         raise InputError(problem, why=why, cure=cure)
     return LineFields.lift(estimate, (smoothed or estimate).spectrum, choice)
-
-
-def _of_round_fields(estimate: ProfileEstimate) -> bool:
-    """Whether the fields can be divided: they are round, or those of a raster."""
-    return type(estimate.model) is ForwardModel or estimate.points.as_raster
 
 
 @dataclass(frozen=True)
@@ -226,7 +228,9 @@ class Solution:
     @property
     def comparable(self) -> bool:
         """Whether the fields can be divided, so that both routes are open."""
-        return self.smoothed is not None and self.fields.even and _of_round_fields(self.estimate)
+        estimate = self.estimate
+        round_fields = type(estimate.model) is ForwardModel or estimate.points.as_raster
+        return self.smoothed is not None and self.fields.even and round_fields
 
     @cached_property
     def other(self) -> Deconvolution | None:
@@ -264,15 +268,6 @@ class Solution:
         dk = 2 * np.pi * spectrum.wavenumbers.weights / k
         inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
         return abs(1 - inside / spectrum.integral)
-
-
-def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
-    """Signal of the quotient at the points, in V: each scan through its own reference."""
-    if estimate.points.scans == 1 and estimate.model.reference.order != ACROSS:
-        return fields.convolved(quotient) * estimate.points.load
-    k, kernel = fields.grid.axis_transfer(quotient.values)
-    spectrum = np.interp(estimate.model.k, k, kernel.real, right=0.0)
-    return estimate.model.signal(estimate.gaussian.geometry, spectrum) + estimate.oval
 
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:

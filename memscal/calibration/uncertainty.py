@@ -498,8 +498,8 @@ def _division_map(
     a = deconvolution.conversion_constant
     r = deconvolution.g.r
     reference = model.reference
-    axis, window = fields.along_axis(deconvolution.quotient.window)
-    window = np.interp(model.k, axis, window, right=0.0)
+    window = deconvolution.quotient.window[0]
+    window = np.interp(model.k, fields.grid.wavenumber_axis, window, right=0.0)
     # Where the window has closed the reference may have vanished.
     ratio = np.divide(window, reference.values, out=np.zeros_like(window), where=window > _CLOSED)
     weights = reference.wavenumbers.weights * ratio

@@ -12,7 +12,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation import residuals
-from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
+from memscal.estimation.bayesian import weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS
@@ -213,22 +213,6 @@ class ExtraColumns:
     size: float  # largest voltage that the columns add, over the largest signal
 
 
-def departure_test(estimate: ProfileEstimate) -> tuple[float, str, float]:
-    """Compare departures of any kind with the Gaussian, by their marginal likelihoods."""
-    # ln of the Bayes factor, within -8.5 and 8.5, the most probable kind of departure, and its
-    # share of all departures' probability.
-    prior = HYPOTHESES[0].estimate
-    averaged = estimate.weighed
-    posterior = np.clip(averaged.probability[0], 1e-4, 1 - 1e-4)
-    factor = (1 - posterior) / posterior * prior / (1 - prior)
-    kinds: dict[str, float] = {}
-    for hypothesis, probability in zip(HYPOTHESES[1:], averaged.probability[1:], strict=True):
-        if hypothesis.estimate > 0:
-            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(probability)
-    kind = max(kinds, key=lambda name: kinds[name])
-    return float(np.log(factor)), kind, kinds[kind] / max(sum(kinds.values()), 1e-300)
-
-
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
     points = estimate.points
@@ -330,25 +314,21 @@ _ENOUGH = 10_000
 
 def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,); of a shear none is told."""
-    clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
+    u = estimate.points.u
+    clipped = np.zeros(u.size, dtype=np.bool_)
     if estimate.model.order:
         return clipped
+    ordinary = _ordinary_noise(estimate)
     for scan in range(estimate.points.scans):
         inside = estimate.points.scan == scan
-        equal = _equal_at_top(estimate, inside)
-        clipped |= equal if equal.any() else _flattened(estimate, inside)
+        # Points of a scan that share its largest voltage to the last digit.
+        top = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
+        noise = np.median(ordinary[inside])
+        finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
+        curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
+        equal = top.sum() >= _FEWEST and (curved or finest < noise / _FINE)
+        clipped |= top if equal else _flattened(estimate, inside)
     return clipped
-
-
-def _equal_at_top(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
-    """Points of a scan that share its largest voltage to the last digit."""
-    u = estimate.points.u
-    noise = np.median(_ordinary_noise(estimate)[inside])
-    top: BoolArray = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
-    finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
-    curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
-    clipped = top.sum() >= _FEWEST and (curved or finest < noise / _FINE)
-    return top if clipped else np.zeros_like(top)
 
 
 def _flattened(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -242,6 +242,7 @@ class DepartureBasis:
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
     families: tuple[FamilyFit, ...]  # as many as fit the scan
     angular: AngularDepartures | None  # the last flat ones: theirs is a prior of unit variance
+    _tables: dict[tuple[Side, bytes], FloatArray] = field(default_factory=dict, init=False)
 
     @property
     def blocks(self) -> tuple[slice, ...]:
@@ -281,10 +282,6 @@ class DepartureBasis:
     def integrals(self) -> FloatArray:
         """Integrals of all columns over the plane, shape (p,)."""
         return np.asarray(self.kernels(np.zeros(1))[0])
-
-    @cached_property
-    def _tables(self) -> dict[tuple[Side, bytes], FloatArray]:
-        return {}
 
     def _at(self, place: FloatArray, side: Side) -> FloatArray:
         """All columns at wavenumbers or radii; those of the last few are kept."""

@@ -20,7 +20,7 @@ the sensor to the indenter,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
@@ -108,6 +108,7 @@ class Geometry:
     k: FloatArray  # (nodes,), in rad/m
     across: bool  # whether the scan crosses a slit: with cosines in place of Bessel functions
     reach: float  # of the tables, in m
+    _waves: dict[int, FloatArray] = field(default_factory=dict, init=False)  # at the points
 
     def summed(self, wave: int, spread: FloatArray, rows: Rows = slice(None)) -> FloatArray:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
@@ -131,10 +132,6 @@ class Geometry:
     def interpolation(self) -> csr_array:
         """From coefficients of the tables' splines to the points, shape (n, t), sparse."""
         return self.table(0).interpolation(self.radius)
-
-    @cached_property
-    def _waves(self) -> dict[int, FloatArray]:
-        return {}
 
 
 # An elliptic Gaussian has the second moments s^2 [[1 + e1, e2], [e2, 1 - e1]], e = |(e1, e2)| and

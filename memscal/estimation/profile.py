@@ -232,7 +232,12 @@ def estimate_profile(
     # ``start``, of nearly the same voltages at the same points, spares the search.
     model = forward_model(points, references)
     fit = start.gaussian if start else fit_gaussian_to_points(model, _stated_weights(points))
-    stated = _stated_weights(points, _position_noise(model, fit))
+    kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
+    slope = model.shift_derivative(fit.geometry, kernel)
+    # A raster's positions are uncertain along x; how much of that is radial depends on the place.
+    along = np.argmax(points.free[points.scan], axis=1), range(points.u.size)
+    # Uncertain positions make noise where U is steep.
+    stated = _stated_weights(points, slope[along] * points.x_errors)
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
     angular = angular and points.planar and not model.order
@@ -327,15 +332,6 @@ def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0
     if points.u_errors is None:
         return np.ones_like(points.u)
     return 1 / (points.u_errors**2 + position_noise**2)
-
-
-def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
-    """Voltage noise that uncertain positions make, shape (n,): most of it where U is steep."""
-    kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
-    slope = model.shift_derivative(fit.geometry, kernel)
-    # A raster's positions are uncertain along x; how much of that is radial depends on the place.
-    along = np.argmax(model.points.free[model.points.scan], axis=1), range(model.points.u.size)
-    return slope[along] * model.points.x_errors
 
 
 def _require_determined(estimate: ProfileEstimate) -> None:

@@ -209,7 +209,11 @@ def stated_differences(
     for quantity in (q for q in record.quantities if q.name in names):
         values: list[Any] = [getattr(side, quantity.name, None) for side in stated]
         spreads = [getattr(side, f"{quantity.name}_uncertainty", None) for side in stated]
-        if None in values or "" in values or _agree(values, spreads):
+        if None in values or "" in values or values[0] == values[1]:
+            continue
+        allowed = COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
+        is_text = isinstance(values[0], str)
+        if not is_text and math.isclose(*values, rel_tol=_SAME, abs_tol=allowed):
             continue
         words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
         sides = []
@@ -222,13 +226,6 @@ def stated_differences(
             sides.append(f"{shown} in {place}")
         differences.append(f"{words.strip()} {', '.join(sides)}")
     return differences
-
-
-def _agree(values: Sequence[Any], spreads: Sequence[float | None]) -> bool:
-    if isinstance(values[0], str):
-        return bool(values[0] == values[1])
-    allowed = COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
-    return math.isclose(*values, rel_tol=_SAME, abs_tol=allowed)
 
 
 def accepted_differences(

@@ -7,7 +7,6 @@ from itertools import chain
 from os import PathLike
 
 import numpy as np
-from scipy.special import erfc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
@@ -87,12 +86,7 @@ def _force(profile: MeasuredProfile) -> QualityCheck:
         f"{profile.load:.4g} N, over its standard uncertainty of {allowed * profile.load:.2g} N. "
         f"{_FORCE}"
     )
-    return check("applied_force", off, restore.FORCE_LIMIT, meaning, _two_sided(off))
-
-
-def _two_sided(off: float) -> float:
-    """Chance of a normal deviation of at least so many standard uncertainties."""
-    return float(erfc(off / math.sqrt(2)))
+    return check("applied_force", off, restore.FORCE_LIMIT, meaning, math.erfc(off / math.sqrt(2)))
 
 
 def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
@@ -106,7 +100,7 @@ def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
         f"difference from one is counted. {_FORCE}{_BLIND}"
     )
     # One check of all profiles together may be stricter than one for each.
-    return check("applied_force_all", off, 2.0, meaning, _two_sided(off))
+    return check("applied_force_all", off, 2.0, meaning, math.erfc(off / math.sqrt(2)))
 
 
 #: Messages of a restoration that the measured stress gives itself.
