@@ -86,23 +86,20 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     g = field.radial
     area = noise_area(r, g)
     noise_width = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
-    return (_gaussian_width(r, g, sigma), _half_width(r, g), noise_width)
-
-
-def noise_area(r: FloatArray, g: FloatArray) -> float:
-    """Noise-equivalent area (m^2) of G (1/m^2) at even radii: 4 pi sigma^2 of a Gaussian."""
-    return float(1 / np.sum(ring_areas(r) * g**2))
-
-
-def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
-    """Width of the Gaussian u nearest to G over the plane."""
-    # Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
+    # The Gaussian u nearest to G over the plane: where the sum of r (u - G) u' vanishes, its change
+    # by G over its change by the width.
     slope = unit_gaussian_slope(r, sigma)
     step = 1e-4 * sigma
     bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
     left = unit_gaussian(r, sigma) - g
     row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
-    return Functional("gaussian_sigma_deconvolved", sigma, row)
+    nearest = Functional("gaussian_sigma_deconvolved", sigma, row)
+    return nearest, _half_width(r, g), noise_width
+
+
+def noise_area(r: FloatArray, g: FloatArray) -> float:
+    """Noise-equivalent area (m^2) of G (1/m^2) at even radii: 4 pi sigma^2 of a Gaussian."""
+    return float(1 / np.sum(ring_areas(r) * g**2))
 
 
 def _half_width(r: FloatArray, g: FloatArray) -> Functional:

@@ -299,7 +299,14 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
     owners: list[int] = []
     for i, scan in enumerate(scans):
         groups: list[list[tuple[float, int]]] = []
-        for load, number in sorted(_loads_of_passes(scan)):
+        loads = scan.normal_load
+        means = []
+        if loads is not None:
+            stated = np.isfinite(loads)
+            for number in np.unique(scan.passes[stated]):
+                mean = float(loads[stated & (scan.passes == number)].mean())
+                means.append((mean, int(number)))
+        for load, number in sorted(means):
             if not groups or load > (1 + _SAME_LOAD) * groups[-1][0][0]:
                 groups.append([])
             groups[-1].append((load, number))
@@ -317,17 +324,6 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
 def loads_differ(loads: Sequence[float]) -> bool:
     """Whether loads (N) differ by more than repeats of one load do."""
     return max(loads) > (1 + _SAME_LOAD) * min(loads)
-
-
-def _loads_of_passes(scan: Scan) -> list[tuple[float, int]]:
-    """Mean load (N) and number of each pass that states loads."""
-    loads = scan.normal_load
-    if loads is None:
-        return []
-    passes = scan.passes
-    stated = np.isfinite(loads)
-    numbers = np.unique(passes[stated])
-    return [(float(loads[stated & (passes == n)].mean()), int(n)) for n in numbers]
 
 
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:

@@ -146,33 +146,6 @@ class ProfileFamily(FrozenArrays):
 _SMALLEST_STEP = 0.01
 
 
-def _scaled_changes(
-    film: ElasticFilm,
-    indenter: Sphere,
-    spectra: FloatArray,
-    *,
-    by_load: FloatArray,
-    by_wavenumber: FloatArray,
-    by_length: FloatArray,
-) -> dict[str, FloatArray]:
-    """Return the changes by one stated standard uncertainty, by the scales of the contact."""
-    # docs/contact_families.md; given are derivatives by the logarithms of load, wavenumber and
-    # length of the interface.
-    stiffer = spectra - by_load
-    thicker = 3 * stiffer + by_wavenumber - 2 * by_length
-    larger = by_length - stiffer
-    stated = {
-        "young_modulus": (stiffer, film.young_modulus, film.young_modulus_uncertainty),
-        "thickness": (thicker, film.thickness, film.thickness_uncertainty),
-        "indenter_radius": (larger, indenter.radius, indenter.radius_uncertainty),
-    }
-    changes = {}
-    for source, (derivative, value, uncertainty) in stated.items():
-        if uncertainty is not None:
-            changes[source] = np.asarray(derivative * (uncertainty / value))
-    return changes
-
-
 #: Neighbours of each load on the path, relative to it: their difference is its derivative.
 _NEIGHBOURS = (0.98, 1.02)
 #: Rings from the axis to the largest contact; more crowd at the edges.  Three times as many change
@@ -284,18 +257,6 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
 _REVISION = 3
 
 
-def _family_key(
-    paths: Sequence[LoadingPath], values: FloatArray, scale: float, k: FloatArray
-) -> str:
-    """Return the SHA-256 of all that a family's numbers depend on: not of the film's name."""
-    requests = [asdict(path) | {"law": type(path.interface.normal).__name__} for path in paths]
-    for request in requests:
-        request["film"].pop("name")
-    numbers = {"values": values.tolist(), "scale": scale, "paths": requests}
-    digest = hashlib.sha256(k.tobytes()).hexdigest()
-    return table_key({"version": __version__, "revision": _REVISION, "k": digest, **numbers})
-
-
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
 #: How the arrays of changes are named in a kept file.
@@ -351,7 +312,13 @@ class FamilySetup:
         if a_length:
             # Lengths scale as the film's displacements: twice the sphere's rise over its thickness.
             scale = self.film.thickness**2 / self.indenter.radius
-        key = _family_key(paths, values, scale, k)
+        # All that a family's numbers depend on: not the film's name.
+        requests = [asdict(path) | {"law": type(path.interface.normal).__name__} for path in paths]
+        for request in requests:
+            request["film"].pop("name")
+        numbers = {"values": values.tolist(), "scale": scale, "paths": requests}
+        digest = hashlib.sha256(k.tobytes()).hexdigest()
+        key = table_key({"version": __version__, "revision": _REVISION, "k": digest, **numbers})
         arrays = find_contact_table(self.cache, key)
         if arrays is None:
             arrays = self._calculated(paths, (values, scale) if a_length else None)
@@ -391,14 +358,22 @@ class FamilySetup:
         by_length = np.zeros_like(spectra)
         if lengths is not None:
             by_length = _by_log_value(spectra, *lengths)
-        changes = _scaled_changes(
-            film,
-            self.indenter,
-            spectra,
-            by_load=nominal["by_load"],
-            by_wavenumber=nominal.pop("by_wavenumber"),
-            by_length=by_length,
-        )
+        # Changes by one stated standard uncertainty, by the scales of the contact, from derivatives
+        # by the logarithms of load, wavenumber and length of the interface:
+        # docs/contact_families.md.
+        indenter = self.indenter
+        stiffer = spectra - nominal["by_load"]
+        thicker = 3 * stiffer + nominal.pop("by_wavenumber") - 2 * by_length
+        larger = by_length - stiffer
+        stated = {
+            "young_modulus": (stiffer, film.young_modulus, film.young_modulus_uncertainty),
+            "thickness": (thicker, film.thickness, film.thickness_uncertainty),
+            "indenter_radius": (larger, indenter.radius, indenter.radius_uncertainty),
+        }
+        changes = {}
+        for source, (derivative, value, uncertainty) in stated.items():
+            if uncertainty is not None:
+                changes[source] = np.asarray(derivative * (uncertainty / value))
         if sides:
             upper, lower = (side["spectra"] for side in sides)
             slope = (upper - lower) / (ratios[0] - ratios[1])
