@@ -1,6 +1,6 @@
 """Predicted uncertainties against simulated calibrations, over random designs.
 
-Set MEMSCAL_FULL_STUDY for ten designs of 40 seeds in place of three of 16.
+Set MEMSCAL_FULL_STUDY for ten designs of 40 seeds in place of two of 8.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 
-DESIGNS, SEEDS = (10, 40) if FULL else (3, 16)
+DESIGNS, SEEDS = (10, 40) if FULL else (2, 8)
 #: How near a prediction is to come.
 TOLERANCE = 0.15
 #: Least scatter of A, sigma and FWHM over the part of their uncertainty that is their own.

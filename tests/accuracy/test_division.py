@@ -1,7 +1,7 @@
 """The calibration over many scans: error of G and A by division, bands, both routes, the fit.
 
 The scans come from another forward calculation than the analysis (helpers.direct).  Set
-MEMSCAL_FULL_STUDY for 200 seeds in place of 5, of a Gaussian 24.  With --log-cli-level=INFO the
+MEMSCAL_FULL_STUDY for 200 seeds in place of 3, of a Gaussian 8.  With --log-cli-level=INFO the
 study tells medians, mean errors, coverage, and what scikit-image's Wiener filter, tuned on the
 truth, makes of the same scans.
 """
@@ -71,7 +71,7 @@ GAUSSIANS = [case for case in CASES if case.sigma is not None]
 
 
 def seeds_of(case: Case) -> int:
-    return 200 if FULL else 24 if case in GAUSSIANS else 5
+    return 200 if FULL else 8 if case in GAUSSIANS else 3
 
 
 def agreement(apparatus: memscal.ApparatusFunction) -> memscal.QualityCheck:
@@ -171,7 +171,7 @@ def test_a_ring_that_only_the_division_follows_is_told() -> None:
 
 def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
     deviates = []
-    seeds = range(50 if FULL else 6)  # a raster costs as much as twenty lines
+    seeds = range(50 if FULL else 2)  # a raster costs as much as twenty lines
     for seed in seeds:
         scan = simulated(raster=True, points=25, seed=seed, centre=(0.3e-3, -0.2e-3))
         p = memscal.calibrate(scan).apparatus.parameters
@@ -181,7 +181,7 @@ def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
     assert (scatter < root_mean_square_limit(1.15, len(seeds), CHANCE)).all()
 
 
-PASSES = 200 if FULL else 10
+PASSES = 200 if FULL else 4
 
 
 def of_repeats(noise: float, seed: int, shift: float, **options) -> memscal.ApparatusFunction:

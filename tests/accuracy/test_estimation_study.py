@@ -1,6 +1,6 @@
 """The estimator over many kernels, scans and noise draws: errors of G and A, truth of its bands.
 
-Set MEMSCAL_FULL_STUDY for all cases and 200 seeds in place of 12.  Limits are those of
+Set MEMSCAL_FULL_STUDY for all cases and 200 seeds in place of 8.  Limits are those of
 helpers.estimation_study; docs/estimation_study.csv is only compared with what its script prints.
 """
 

@@ -1,13 +1,13 @@
 """Film's law by scans at several loads, and its thickness: how often, and how surely, it is right.
 
-Set MEMSCAL_FULL_STUDY for 200 seeds in place of 2.
+They run with MEMSCAL_FULL_STUDY; tests/calibration/test_joint.py weighs laws and finds a thickness
+in scans without noise each day.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
 from helpers.direct import LOADS, RATIO, Kernel, direct_scan
 from helpers.scans import GAUSSIAN, TAILS
 from scipy.stats import binom, chi2, norm
@@ -16,9 +16,10 @@ import memscal
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.model.film import LAWS
 
-pytestmark = pytest.mark.accuracy
+pytestmark = [pytest.mark.accuracy, pytest.mark.full_study]
 
-SEEDS, CHANCE = (200, 1e-5) if FULL else (2, 1e-3)
+SEEDS = 200
+CHANCE = 1e-5
 LINEAR, RUBBER, MOONEY = LAWS
 DISC = memscal.SmoothedDisc(radius=0.9e-3, sigma=0.25e-3)
 SENSORS: dict[str, Kernel] = {"Gaussian": GAUSSIAN, "disc": DISC, "tails": TAILS}
@@ -47,8 +48,8 @@ def scans_of(
     return scans
 
 
-@pytest.mark.parametrize("truth", [LINEAR, RUBBER, MOONEY][: None if FULL else 2])
-@pytest.mark.parametrize("sensor", [*SENSORS][: None if FULL else 1])
+@pytest.mark.parametrize("truth", [LINEAR, RUBBER, MOONEY])
+@pytest.mark.parametrize("sensor", [*SENSORS])
 def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
     # Mooney-Rivlin is weighed where it is stated, and hardly told from neo-Hookean.
     stated = {"law": truth, "mooney_rivlin_ratio": RATIO} if truth == MOONEY else {}
@@ -65,13 +66,13 @@ def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
     assert strongly <= binom.isf(CHANCE, SEEDS, 0.01)
 
 
-@pytest.mark.parametrize("sensor", [*SENSORS][: None if FULL else 1])
+@pytest.mark.parametrize("sensor", [*SENSORS])
 @pytest.mark.parametrize(
     ("law", "setting"),
     [
         (RUBBER, {}),
         (LINEAR, {"loads": (1.0,), "radii": (0.15e-3, 0.35e-3)}),
-    ][: None if FULL else 1],
+    ],
 )
 def test_an_estimated_thickness_is_off_by_what_it_states(law: str, setting, sensor: str) -> None:
     # What is stated is drawn about the truth: of both, the difference is all that counts.

@@ -1,7 +1,7 @@
 """The force check over whole experiments: false alarms, and what it sees of a mistake.
 
 Everything is drawn that a laboratory does not know: noise, the loads and their scale, positions,
-film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 4.
+film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 2.
 """
 
 from functools import lru_cache
@@ -18,8 +18,8 @@ from memscal.measurement.measure_stress import pooled_force
 
 pytestmark = pytest.mark.accuracy
 
-EXPERIMENTS = 60 if FULL else 4
-CHANCE = 1e-3 if FULL else 1e-2  # or four experiments would be allowed any number of alarms
+EXPERIMENTS = 60 if FULL else 2
+CHANCE = 1e-3 if FULL else 1e-2  # or two experiments would be allowed any number of alarms
 #: Repeats and loads that are known well enough to see five percent.
 CAREFUL = {"repeats": 3, "load_uncertainty": 0.003}
 

@@ -1,7 +1,7 @@
 """Differences between halves of one scan, and between runs of one sensor, over their prediction.
 
 Halves share film, rod, load, and what prior, window and smoothing hide: their difference is noise.
-Set MEMSCAL_FULL_STUDY for 200 scans in place of 5, and 200 runs in place of 16.
+Set MEMSCAL_FULL_STUDY for 200 scans in place of 3, and 200 runs in place of 6.
 """
 
 from dataclasses import replace
@@ -24,7 +24,7 @@ from memscal.model.arrays import FloatArray
 pytestmark = pytest.mark.accuracy
 
 CHANCE = 1e-5 if FULL else 1e-3
-SCANS, RUNS = (200, 200) if FULL else (5, 16)
+SCANS, RUNS = (200, 200) if FULL else (3, 6)
 NUMBERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "fwhm")
 RADII = np.linspace(0.0, 2e-3, 9)
 ROUTES = ("division", "bayesian")

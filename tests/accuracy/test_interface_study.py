@@ -1,6 +1,7 @@
 """Virtual experiments whose interface is known: which law is preferred, and its slip length.
 
-Set MEMSCAL_FULL_STUDY for 40 experiments of each kind in place of 2 on a known film.  All inputs
+They run with MEMSCAL_FULL_STUDY, 40 of each kind; each day draws voltages of known contacts in
+tests/extensions/interface_laws/test_compliance.py.  All inputs
 are drawn from their stated uncertainties.  An experiment like the paper's does not tell a slip
 length to better than a factor; *precise* ones, of less noise, with loads that are recorded and with
 more repeats, do; those on a film that is *known* better than the paper's do within 20 %.
@@ -13,13 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
 from helpers.scans import simulate_experiment
 from scipy.stats import binom
 
 import memscal
 from memscal import ElasticFilm, Interface
-from memscal.extensions.interface_laws.families import SLIP_LENGTHS, elasto_plastic_family
+from memscal.extensions.interface_laws.families import elasto_plastic_family
 from memscal.extensions.interface_laws.model_comparison import compare_interface
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
@@ -27,9 +27,9 @@ from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import LawComparison
 
-pytestmark = pytest.mark.accuracy
+pytestmark = [pytest.mark.accuracy, pytest.mark.full_study]
 
-SEEDS = 40 if FULL else 2
+SEEDS = 40
 CHANCE = 1e-3
 MACROSCOPIC = 1.6
 SLIP_LENGTH = 16e-6
@@ -58,18 +58,13 @@ KNOWN_FILM = replace(
 @lru_cache
 def rigid(film: ElasticFilm) -> ProfileFamily:
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
-    friction = calculated.FRICTIONS if FULL else (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, math.inf)
-    return calculated.amontons_family(
-        film, PAPER_SPHERE, PAPER_LOADS, friction=friction, reach=_REACH
-    )
+    return calculated.amontons_family(film, PAPER_SPHERE, PAPER_LOADS, reach=_REACH)
 
 
 @lru_cache
 def slipping(film: ElasticFilm) -> ProfileFamily:
-    # Short lengths take the longest, and the truth of the reduced form is none.
-    lengths = SLIP_LENGTHS if FULL else (0.0, 4e-6, 1e-5, 3e-5, 1e-4, math.inf)
     return elasto_plastic_family(
-        film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
+        film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, reach=_REACH
     )
 
 
@@ -101,15 +96,15 @@ def enough(share: float) -> int:
     return int(binom.ppf(CHANCE, SEEDS, share))
 
 
-@pytest.mark.parametrize("kind", ["precise", "known"] if FULL else ["known"])
+@pytest.mark.parametrize("kind", ["precise", "known"])
 def test_a_slip_length_is_preferred_where_it_is_the_truth(kind: str) -> None:
     found = experiments(MACROSCOPIC, SLIP_LENGTH, kind)
     assert sum(one.yielding_preferred for one in found) >= enough(0.98)
 
 
 def test_an_effective_coefficient_is_not_given_up_where_it_is_the_truth() -> None:
-    for friction in (0.1, 0.2) if FULL else (0.2,):
-        found = experiments(friction, kind="precise" if FULL else "known")
+    for friction in (0.1, 0.2):
+        found = experiments(friction, kind="precise")
         assert sum(not one.yielding_preferred for one in found) >= enough(0.98)
 
 
@@ -122,7 +117,6 @@ def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 + 3.3 * 0.08 / math.sqrt(SEEDS))
 
 
-@pytest.mark.full_study
 def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
     # Stated: 10 %.  The spread over experiments is 13.5 %, as the contacts are linearised about the
     # stated film: docs/interface.md.
@@ -139,7 +133,6 @@ def test_the_effective_coefficient_grows_with_the_load() -> None:
         assert one.implied.friction[-1, 1] > 1.5 * one.implied.friction[0, 1]
 
 
-@pytest.mark.full_study
 def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
     wide = 0
     for one in experiments(MACROSCOPIC, 1.82e-6, "paper"):

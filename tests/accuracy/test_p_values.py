@@ -1,6 +1,6 @@
 """P-values of the residuals are uniform for scans that are as stated, whatever G.
 
-Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
+Set MEMSCAL_FULL_STUDY for 400 seeds in place of 16.
 """
 
 from dataclasses import replace
@@ -24,7 +24,7 @@ from memscal.estimation.residuals import (
 
 pytestmark = pytest.mark.accuracy
 
-SEEDS = 400 if FULL else 60
+SEEDS = 400 if FULL else 16
 CHANCE = 1e-5
 NOISES = (0.003, 0.02)
 SENSORS = {

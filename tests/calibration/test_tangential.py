@@ -16,6 +16,7 @@ from helpers.scans import (
     CENTRE,
     EXACT_FILM,
     EXACT_ROD,
+    LINEAR_FILM,
     SHEAR_CONVERSION,
     SHEAR_SIGMA,
     plane_error,
@@ -285,9 +286,7 @@ def test_a_reference_from_elsewhere_needs_its_shear() -> None:
 
 
 def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative() -> None:
-    scan = shear_scan(
-        seed=17, film=memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.4, thickness=2e-3)
-    )
+    scan = shear_scan(seed=17, film=replace(LINEAR_FILM, poisson_ratio=0.4))
     sticking = memscal.indent(scan.film, scan.indenter, load=1.0, friction=np.inf)
     found = memscal.calibrate(scan, alternative=sticking, channel="xz", method="bayesian")
     share = found.apparatus.budget["conversion_constant"]["model_form"] / SHEAR_CONVERSION

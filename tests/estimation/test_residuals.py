@@ -149,7 +149,7 @@ def pure_error(scan: Scan) -> TestOutcome | None:
 @pytest.mark.parametrize("scatter", [0.0, 5e-6])
 def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
     """Where the stage comes to rest elsewhere each time, as well."""
-    scans = 150
+    scans = 40
     level = 0.1
     p_values = []
     fine = simulated(points=2001, noise=0.0)

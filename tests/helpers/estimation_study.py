@@ -23,7 +23,7 @@ from memscal.model.arrays import FloatArray
 
 METHOD = "bayesian"
 FULL_SEEDS = 200
-FEW_SEEDS = 12
+FEW_SEEDS = 8
 SEEDS = FULL_SEEDS if FULL else FEW_SEEDS
 R = np.linspace(0.0, 3e-3, 121)
 RADII = R[::4]

@@ -1,6 +1,7 @@
 """Two methods that share nothing but the contact: Hankel transforms and finite elements."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ R = np.linspace(0.0, 8e-3, 60)
 AGREEMENT = 2e-3
 
 
+@cache
 def by_both(
     nu: float, indenter: Indenter, load: float, friction: float, loading: str = "incremental"
 ) -> tuple[Contact, Contact]:
@@ -33,10 +35,14 @@ def by_both(
     return ways[0], ways[1]
 
 
-@pytest.mark.parametrize("nu", [0.3, 0.5])
 @pytest.mark.parametrize(
-    ("friction", "loading"),
-    [(0.0, "incremental"), (0.3, "incremental"), (math.inf, "incremental"), (0.3, "total")],
+    ("nu", "friction", "loading"),
+    [
+        (0.5, 0.0, "incremental"),
+        (0.3, 0.3, "incremental"),
+        (0.3, math.inf, "incremental"),
+        (0.5, 0.3, "total"),
+    ],
 )
 def test_both_find_the_same_sphere(nu: float, friction: float, loading: str) -> None:
     hankel, fem = by_both(nu, SPHERE, 1.37, friction, loading)
@@ -57,7 +63,7 @@ def test_both_find_the_same_sphere(nu: float, friction: float, loading: str) -> 
 
 
 # Finite elements failed on all of these, Hankel transforms on the compressible films.
-@pytest.mark.parametrize(("nu", "load"), [(0.5, 2.75), (0.47, 0.34), (0.45, 2.75)])
+@pytest.mark.parametrize(("nu", "load"), [(0.5, 2.75), (0.45, 2.75)])
 def test_both_find_the_same_sphere_that_sticks_at_once(nu: float, load: float) -> None:
     hankel, fem, slips = (
         indent(film(nu), SPHERE, load=load, friction=mu, loading="total", backend=way, rings=64)
@@ -69,9 +75,8 @@ def test_both_find_the_same_sphere_that_sticks_at_once(nu: float, load: float) -
         assert np.max(np.abs(difference)) < agreement * hankel.max_base_stress
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.2, math.inf])
-def test_both_find_the_same_rod(friction: float) -> None:
-    hankel, fem = by_both(0.5, Rod(radius=0.25e-3), 1.0, friction)
+def test_both_find_the_same_rod() -> None:
+    hankel, fem = by_both(0.5, Rod(radius=0.25e-3), 1.0, 0.2)
     assert fem.depth == pytest.approx(hankel.depth, rel=AGREEMENT)
     difference = fem.base_stress(R) - hankel.base_stress(R)
     assert np.max(np.abs(difference)) < AGREEMENT * hankel.max_base_stress
@@ -79,7 +84,7 @@ def test_both_find_the_same_rod(friction: float) -> None:
 
 def test_a_film_that_ends_near_the_contact_is_softer() -> None:
     whole, cut = (
-        indent(film(0.5), SPHERE, load=1.37, backend="fem", film_radius=radius, rings=48)
+        indent(film(0.5), SPHERE, load=1.37, backend="fem", film_radius=radius, rings=24)
         for radius in (25e-3, 4e-3)
     )
     assert cut.depth > 1.005 * whole.depth

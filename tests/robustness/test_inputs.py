@@ -147,7 +147,7 @@ USED: dict[str, tuple[tuple[str, ...], ...]] = {
 }
 
 
-@drawn(40, 30_000)
+@drawn(24, 30_000)
 @given(kind=st.sampled_from(sorted(USED)), changes=BYTES)
 def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
     survives(folder, change_bytes(good[kind], changes), *LOOKED_AT, *USED[kind])
@@ -185,7 +185,7 @@ def test_inputs_that_once_failed_are_read_or_refused(good, folder, kind, edit, d
     survives(folder, edit_hdf5(good[kind], [edit], digest=digest), *LOOKED_AT, *USED[kind])
 
 
-@drawn(80, 50_000)
+@drawn(32, 50_000)
 @given(kind=st.sampled_from(sorted(USED)), edits=EDITS, digest=st.booleans())
 def test_edited_values_are_read_or_refused(good, folder, kind, edits, digest) -> None:
     data = edit_hdf5(good[kind], edits, digest=digest)

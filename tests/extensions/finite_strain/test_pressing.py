@@ -214,13 +214,13 @@ def test_a_frictionless_film_comes_back_the_way_it_went() -> None:
 
 
 def test_a_load_that_cannot_be_reached_gives_the_last_state_that_was() -> None:
-    depths = (Depth(0.02e-3), Depth(1.95e-3))
+    depths = (Depth(0.02e-3), Depth(1.98e-3))
     with pytest.raises(ConvergenceError, match="No equilibrium") as caught:
-        solve_finite_strain(FILM, ROD, depths, sticking=True, refinement=0.4)
+        solve_finite_strain(FILM, ROD, depths, sticking=True, refinement=0.2)
     assert f"Under the rod of radius {ROD.radius * 1e3:.4g} mm" in str(caught.value)
     assert "friction inf" not in str(caught.value)  # it sticks
     last = caught.value.last
     assert isinstance(last, Contact)
-    assert 0.02e-3 < last.depth < 1.95e-3
+    assert 0.02e-3 < last.depth < 1.98e-3
     assert last.elastic_energy > 0
     assert np.isinf(last.convergence)

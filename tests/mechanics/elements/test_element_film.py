@@ -11,7 +11,6 @@ from memscal.mechanics.elements.element_film import ElementFilm
 from memscal.mechanics.film_response import HankelFilm
 
 H = 2e-3
-RATIOS = (0.0, 0.3, 0.495, 0.5)
 
 
 @cache
@@ -29,8 +28,7 @@ def worst(found: np.ndarray, expected: np.ndarray, scale: np.ndarray) -> float:
     return float(np.max(np.abs(found - expected)) / np.max(np.abs(scale)))
 
 
-@pytest.mark.parametrize("width", [0.5, 1.7])
-@pytest.mark.parametrize("nu", RATIOS)
+@pytest.mark.parametrize(("nu", "width"), [(0.0, 0.5), (0.3, 1.7), (0.495, 0.5), (0.5, 0.5)])
 def test_surface_and_base_are_as_by_hankel_transforms(nu: float, width: float) -> None:
     ours = elements(nu, width)
     hankel = HankelFilm(ours.film, ours.r)
