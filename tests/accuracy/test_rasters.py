@@ -1,7 +1,7 @@
 """G over the plane from rasters of a sensor that is not round: error, uncertainty, prediction.
 
 The sensor is an ellipse with a tail to one side, at 0.5 % noise that is not stated; its scans are
-direct convolutions (helpers.rasters).  Set MEMSCAL_FULL_STUDY for 20 rasters in place of 1.  With
+direct convolutions (helpers.rasters).  Set MEMSCAL_FULL_STUDY for 20 rasters in place of 2.  With
 --log-cli-level=INFO the study tells the figures of docs/accuracy.md.
 """
 
@@ -25,7 +25,7 @@ from memscal.model.scan import Scan
 pytestmark = pytest.mark.accuracy
 LOG = logging.getLogger(__name__)
 
-SEEDS, SIZE = (20, {}) if FULL else (1, {"side": 41, "half": 5e-3})
+SEEDS, SIZE = (20, {}) if FULL else (2, {"side": 41, "half": 5e-3})
 AXIS = np.arange(-2 * WIDTH, 2 * WIDTH, 0.05e-3)
 INSIDE = np.hypot.outer(AXIS, AXIS) < 2 * WIDTH
 METHODS = ("white-noise", "bayesian")
