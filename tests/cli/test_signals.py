@@ -111,7 +111,7 @@ def test_a_signal_ends_the_program_wherever_it_comes(tmp_path: Path, number, cod
         "from memscal.cli import commands, main\n"
         "def stopped(*_, **__):\n"
         f"    exec({text.format(n=int(number))!r}, globals())\n"
-        "commands.import_module = stopped\n"
+        "commands.module = stopped\n"
         "sys.exit(main(['inspect', 'missing.h5']))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)

@@ -74,11 +74,11 @@ def test_a_family_holds_the_contacts_that_indent_finds(friction: float, loading:
 
 
 CASES = {
-    "smooth": (amontons(), 0.0),
-    "incremental": (amontons(), 0.2),
-    "total": (amontons("total"), 0.4),
-    "elasto-plastic": (elasto_plastic(1.6), 2.5e-6),
-    "exponential": (normal(), 3.64e-6),
+    "smooth": (amontons(), [0.0], 0.0),
+    "incremental": (amontons(), [0.2], 0.2),
+    "total": (amontons("total"), [0.4], 0.4),
+    "elasto-plastic": (elasto_plastic(1.6), [2.5e-6], 2.5e-6),
+    "exponential": (normal(), list(LENGTHS[[0, 2, 4, 6]]), 3.64e-6),
 }
 UNCERTAIN_FILM = replace(
     FILM,
@@ -102,10 +102,10 @@ def with_a_changed(source: str, share: float) -> tuple[ElasticFilm, Sphere]:
 
 @pytest.mark.parametrize("case", CASES)
 def test_sensitivities_are_the_differences_of_contacts_with_other_properties(case: str) -> None:
-    build, value = CASES[case]
+    build, grid, value = CASES[case]
     load = 1.37
     step = 0.004
-    family = build(UNCERTAIN_FILM, UNCERTAIN_SPHERE, [load], [value])
+    family = build(UNCERTAIN_FILM, UNCERTAIN_SPHERE, [load], grid)
     member = family.at(value)
     for source in ("young_modulus", "thickness", "indenter_radius"):
         upper, lower = (build(*with_a_changed(source, d), [load], [value]) for d in (step, -step))
@@ -128,7 +128,7 @@ def test_sensitivities_are_the_differences_of_contacts_with_other_properties(cas
 
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_by_the_load_are_those_of_nearer_neighbours(case: str) -> None:
-    build, value = CASES[case]
+    build, _, value = CASES[case]
     load = 1.37
     step = 0.005
     family = build(FILM, SPHERE, [load], [value])
