@@ -130,7 +130,7 @@ def more_and_less(record: Any, name: str) -> tuple[Any, Any, float] | None:
     u = getattr(record, f"{name}_uncertainty", None)
     if not u:
         return None
-    more = min(value + u, 0.5) if name == "poisson_ratio" else value + u
+    more = min(value + u, 0.5 if name == "poisson_ratio" else math.inf)
     less = max(value - u, 0.0)
     if more == less:
         return None

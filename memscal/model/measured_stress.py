@@ -216,7 +216,7 @@ class MeasuredProfile(ByContent):
     @property
     def axis(self) -> int:
         """0 or 1: along which of x and y the scan ran; 0 of a raster."""
-        return 0 if np.ptp(self.x) > 0 else 1
+        return int(np.ptp(self.x) == 0)
 
     @property
     def covariance(self) -> FloatArray:

@@ -43,8 +43,13 @@ INDENTER_FACE = record(
 _LOAD = measured(Quantity("load", "force", "load", "P", required=True))
 _ROD_FRICTION = Quantity("rod_friction", _ONE, "friction of the rod", stored="friction_coefficient")
 LOAD = record("NXcollection", *_LOAD, _ROD_FRICTION)
-_SHAPE = Quantity("shape", "text", "shape of the indenter", required=True)
-INDENTER = record("NXcollection", _SHAPE, *_RADIUS, _SLOPE, *_LOAD, _ROD_FRICTION)
+INDENTER = record(
+    "NXcollection",
+    Quantity("shape", "text", "shape of the indenter", required=True),
+    *_RADIUS,
+    _SLOPE,
+    *LOAD.quantities,
+)
 """What the group of an indenter may hold, by its shape."""
 
 SAMPLE = record(
@@ -113,8 +118,10 @@ SCAN_DATA = record(
     Quantity("u_yz_errors", _U, "noise of the channel yz", axes=_X),
     signal="u_zz",
 )
-_SYNTHETIC = Quantity("description", "text", "what is synthetic", origin="synthetic")
-SYNTHETIC = record("NXcollection", _SYNTHETIC)
+SYNTHETIC = record(
+    "NXcollection",
+    Quantity("description", "text", "what is synthetic", origin="synthetic"),
+)
 
 PROFILE = record(
     "NXdata",
@@ -151,8 +158,10 @@ CONTACT = record(
     Quantity("friction_coefficient", _ONE, "friction coefficient", "μ"),
     Quantity("loading", "text", "incremental or total loading"),
 )
-_PROGRAM = Quantity("solver", "text", "program", stored="program", origin="program")
-SOLVER = record("NXprocess", _PROGRAM)
+SOLVER = record(
+    "NXprocess",
+    Quantity("solver", "text", "program", stored="program", origin="program"),
+)
 NUMERICS = record(
     "NXparameters",
     Quantity("convergence", _ONE, "estimated relative error of the largest stress"),

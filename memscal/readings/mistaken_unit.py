@@ -160,7 +160,7 @@ def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
         return 0.0
     distance = np.hypot(x - np.median(x[above]), y - np.median(y[above]))
     # Of points spread evenly over +-w half lie within w/2; over a disc of radius w, within 0.71 w.
-    half = float(np.median(distance[above])) * (np.sqrt(2) if np.ptp(x) and np.ptp(y) else 2.0)
+    half = np.median(distance[above]) * (np.sqrt(2) if np.ptp(x) and np.ptp(y) else 2.0)
     # In noise the points above are scattered among others.
     return 2 * half if above[distance <= half].mean() > _CROWDED else 0.0
 

@@ -211,15 +211,17 @@ class Layout(NamedTuple):
 
 def check_layout(where: str, dataset: Any, data: bytes, *, text: bool) -> Layout:
     """Refuse a dataset whose storage could read other files, run code or exhaust memory."""
-    kind, shape, claimed = of = Layout.of(where, dataset)
+    of = Layout.of(where, dataset)
+    kind, shape, claimed = of
     check_type(where, kind, text=text)
     if len(shape) > (0 if text else _MAX_RANK):
         expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
         raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
-    limit, held = (MAX_TEXT_BYTES, claimed) if text else (MOST_ARRAY_BYTES, of.held)
-    if max(claimed, held) > limit:
+    limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
+    size = claimed if text else max(claimed, of.held)
+    if size > limit:
         why = f"More than {limit:,} bytes are not read, however small the file is."
-        raise refuse(where, f"claims {max(claimed, held):,} bytes", why)
+        raise refuse(where, f"claims {size:,} bytes", why)
     plist = dataset.get_create_plist()
     layout = plist.get_layout()
     if layout == h5py.h5d.VIRTUAL:
