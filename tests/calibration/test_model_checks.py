@@ -77,19 +77,6 @@ def test_the_bayes_factor_favours_a_gaussian_that_is_one() -> None:
     assert np.mean(np.array(values) > np.log(10)) < 0.4
 
 
-@pytest.mark.parametrize("method", ["bayesian", "white-noise"])
-def test_meanings_speak_of_the_method_that_was_used(method: str) -> None:
-    apparatus = memscal.calibrate(simulated(), method=method).apparatus
-    found = {check.name: check for check in apparatus.checks}
-    text = " ".join(check.meaning for check in found.values())
-    assert ("width of G by division of the fields" in text) == (method == "white-noise")
-    assert ("posterior mean" in text) == (method == "bayesian")
-    assert all("failure means" in check.meaning for check in found.values())
-    # The band's criterion stands in words beside its number.
-    assert "less than 1/3 of it" in found["resolved_band"].meaning
-    assert f"{apparatus.resolved_wavenumber * 1e-3:.3g} rad/mm" in found["resolved_band"].meaning
-
-
 def test_a_constraint_that_the_scan_contradicts_is_found_and_one_that_it_meets_is_not() -> None:
     ring = simulated(noise=2e-4, repeats=4, kernel=RING)
     assert not checks(ring, monotone=True)["constraint"].passed

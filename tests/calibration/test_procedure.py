@@ -201,21 +201,6 @@ def test_a_method_may_be_an_object_and_options_reach_it() -> None:
         memscal.calibrate(scan, method=Tikhonov(), amplitude=2.0)
 
 
-def test_a_failed_check_marks_the_result_and_is_said_first() -> None:
-    calibration = memscal.calibrate(simulated(kernel=TAILS, noise=0.001))
-    assert not calibration.passed
-    assert not check(calibration, "gaussian_misfit").passed
-    assert check(calibration, "reconvolution").passed
-    assert "gaussian_misfit failed" in calibration.apparatus.process.messages[0].text
-    second = calibration.answer().splitlines()[1]
-    assert second.startswith("Use G(r), for the Gaussian fails the check gaussian")
-    # With a third of its noise stated, the scan of a Gaussian sensor is explained by no G.
-    scan = simulated(noise=0.01)
-    low = memscal.calibrate(replace(scan, u_zz_errors=scan.u_zz_errors / 3), method="bayesian")
-    assert not check(low, "gaussian_misfit").passed
-    assert "G(r) explains the scan no better" in low.answer().replace("\n", " ")
-
-
 def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
     calibration = memscal.calibrate(simulated(noise=0.002))
     sweep = calibration.sweep(amplitudes=9, draws=2, seed=11)

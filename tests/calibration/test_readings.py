@@ -7,9 +7,7 @@ import pytest
 from helpers.scans import simulate
 
 import memscal
-from memscal.cli import main
 from memscal.errors import InputError
-from memscal.formats.reference import write_reference
 from memscal.formats.scan import read_scan, write_scan
 
 FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="linear")
@@ -130,20 +128,6 @@ CALIBRATED = memscal.calibrate(SCAN).apparatus
 def test_readings_of_another_unit_than_the_artifact_are_refused():
     with pytest.raises(InputError, match="in A, those of the artifact in V"):
         memscal.restore(replace(SCAN, unit="A"), CALIBRATED)
-
-
-def test_a_new_user_imports_and_calibrates_currents(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    table = np.stack([SCAN.x * 1e3, SCAN.u_zz * 1e4], axis=1)
-    np.savetxt("scan.csv", table, delimiter=",", header="x/mm,current/pA", comments="")
-    write_reference(BARE, "table.h5")
-    assert main(["import", "scan.csv", "-o", "scan.h5", "--x", "x", "--u", "current"]) == 0
-    capsys.readouterr()
-    assert main(["calibrate", "scan.h5", "--reference", "table.h5", "--figure", "scan.png"]) == 0
-    assert "pA/Pa" in capsys.readouterr().out.partition("\n")[0]
-    assert main(["inspect", "scan.apparatus.h5"]) == 0
-    assert main(["calibrate", "scan.h5", "-o", "none.h5"]) == 3
-    assert "--reference" in capsys.readouterr().err
 
 
 def test_currents_are_turned_into_stress_and_come_back(tmp_path):

@@ -13,7 +13,6 @@ from memscal.cli.failures import CHECK_FAILED
 LOADS = (0.69, 2.75)
 REFUSED = 3
 EXISTS = 4
-USAGE = 2
 
 
 @pytest.fixture
@@ -74,9 +73,3 @@ def test_an_input_is_never_overwritten(run: Run, artifact: Path, dry: Path):
     before = dry.read_bytes()
     assert run("apply", artifact, dry, "-o", dry, "--force").code == EXISTS
     assert dry.read_bytes() == before
-
-
-def test_files_of_another_kind_are_refused(run: Run, artifact: Path):
-    assert "memscal-scan" in run("apply", artifact, artifact).err
-    assert run("apply", artifact).code == USAGE
-    assert run("apply", artifact, "absent.h5").code == REFUSED

@@ -111,11 +111,6 @@ def test_an_altered_artifact_or_reference_is_recorded_in_what_is_written(
     assert "was changed after it was written" in run("inspect", "out.h5", "--json").out
 
 
-@pytest.mark.parametrize("command", ["apply", "restore", "compare"])
-def test_files_in_the_wrong_order_are_refused(run: Run, scan: Path, command):
-    assert run(command, scan, scan).exits(3, "memscal-artifact").out == ""
-
-
 @pytest.mark.parametrize(
     ("scan", "words"),
     [

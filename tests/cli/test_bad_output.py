@@ -121,20 +121,6 @@ def test_where_one_output_cannot_be_replaced_all_stay(
     assert names(folder) == before
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["simulate", "-o", ""],
-        ["simulate", "--experiment", "sphere", "-o", ""],
-        ["calibrate", ""],
-        ["batch", "", "-o", "results"],
-    ],
-)
-def test_an_empty_name_is_a_wrong_usage(run: Run, folder: Path, arguments):
-    run(*arguments).exits(2, "The name of the file is empty")
-    assert names(folder) == []
-
-
 @pytest.mark.parametrize(("arguments", "code"), [
     (["calibrate", "scan.h5", "-o", "loop", "--force"], 4), (["batch", "loop", "-o", "new"], 3),
     (["calibrate", "scan.h5", "--figure", "loop.svg"], 4), (["calibrate", "loop"], 3),

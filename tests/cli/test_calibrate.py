@@ -93,23 +93,6 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
     assert "--seed changes nothing" in run("calibrate", scan, "--seed", 3).err
 
 
-@pytest.mark.parametrize(("arguments", "hint"), [
-    (["--brief", "--json"], "Give --brief or --json, not both."),
-    (["--method", "magic"], "white-noise"), (["--option", "amplitude"], "NAME=VALUE"),
-    (["--option", "amplitudes=1"], "amplitude"), (["--option", "seed=1"], "--seed"),
-    (["--option", "amplitude=much"], "amplitude is a number"),
-    (["--option", "amplitude=NaN"], "amplitude is a number"),
-    (["--method", "richardson-lucy"], "docs/own_method.md"),
-    (["--figure", "a.jpg"], ".png"),
-    (["--figure", "a.png", "--sweep-figure", "./a.png"], "Two outputs"),
-    (["--report", "scan.apparatus.h5"], "Two outputs"), (["--seed", "x"], "--seed"),
-    (["--colour"], "--colour"), *((["--monte-carlo", n], "--monte-carlo") for n in (1, "many")),
-])  # fmt: skip
-def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path, arguments, hint):
-    assert run("calibrate", scan, *arguments).exits(2, hint, "--help").out == ""
-    assert names(folder) == ["scan.h5"]
-
-
 def test_repeats_that_moved_are_given_centres_of_their_own_and_that_is_said(run: Run, folder: Path):
     scan = memscal.simulate(repeats=2, points=33)
     x = np.append(scan.x, scan.x + 5e-5)

@@ -16,7 +16,6 @@ from memscal.cli.compare import cache_from, user_cache_folder
 from memscal.cli.failures import CHECK_FAILED
 
 CHECKED = CHECK_FAILED
-USAGE = 2
 REFUSED = 3
 NOT_WRITTEN = 4
 Give = Callable[..., None]
@@ -93,20 +92,6 @@ def test_stress_of_another_sensor_is_refused(run: Run, compare: Run, bench: Path
     memscal.measure_stress(bench / "lubricated.h5", known).save(folder / "wet.stress.h5")
     both = (str(written), str(folder / "wet.stress.h5"))
     compare(*QUICK, scans=both).exits(REFUSED, "other.apparatus.h5")
-
-
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["--friction", "-0.1"], "of at least 0"),
-    (["--friction", "0.1", "--friction", "0.1"], "twice"),
-    (["--loading", "sideways"], "incremental"),
-    (["--macroscopic-uncertainty", "0.1"], "--macroscopic"), (["--interface"], "--macroscopic"),
-    (["--reference", "a.h5", "--friction", "0", "--friction", "inf"], "--reference"),
-    (["--cache", "here", "--no-cache"], "not both"), (["--figure", "table.txt"], ".png"),
-])  # fmt: skip
-def test_options_that_do_not_go_together_are_exit_code_2(run: Run, bench: Path, arguments, words):
-    done = run("compare", bench / "sensor.apparatus.h5", bench / "dry.h5", *arguments).exits(USAGE)
-    assert done.out == ""
-    assert words in done.err
 
 
 def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_hand: Give):

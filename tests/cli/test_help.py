@@ -6,7 +6,6 @@ import click
 import pytest
 from helpers.console import Run
 
-from memscal.cli import main
 from memscal.cli.commands import COMMANDS, memscal
 
 
@@ -36,36 +35,6 @@ def test_every_option_with_a_unit_says_it_in_words():
     assert [(name, option.name) for name, option, unit in stated if unit not in option.help] == []
 
 
-@pytest.mark.parametrize(("arguments", "hint"), [
-    (["calibrat", "scan.h5"], "Did you mean calibrate?"),
-    (["import", "t.csv", "-o", "a.h5", "--x-units", "mm"], "--x-unit"),
-    (["reference", "cone"], "rod"), (["reference", "rod", "--load", "0"], "above 0"),
-    (["reference", "rod", "--load", "nan"], "(in N)"),
-    (["reference", "rod", "--radius", "a quarter"], "(in mm)"),
-    (["reference", "rod", "--poisson-ratio", "0.7"], "at most 0.5"), (["calibrate"], "SCAN"),
-    (["completion", "tcsh"], "fish"), (["--verbose"], "--version"),
-])  # fmt: skip
-def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments, hint):
-    assert run(*arguments).exits(2, hint).out == ""
-
-
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_gets_its_completion_script(run: Run, shell):
     assert f"_MEMSCAL_COMPLETE={shell}_complete" in run("completion", shell).exits(0).out
-
-
-@pytest.mark.parametrize(("words", "expected"), [
-    (["memscal", "ca"], {"calibrate"}), (["memscal", "calibrate", "--met"], {"--method"}),
-    (["memscal", "calibrate", "--method", "white"], {"white-noise", "white-noise-draw"}),
-    (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
-])  # fmt: skip
-def test_words_are_completed(
-    words, expected, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    monkeypatch.setenv("_MEMSCAL_COMPLETE", "bash_complete")
-    monkeypatch.setenv("COMP_WORDS", " ".join(words))
-    monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
-    with pytest.raises(SystemExit):
-        main([])
-    lines = capsys.readouterr().out.splitlines()
-    assert {line.partition(",")[2] for line in lines} == expected

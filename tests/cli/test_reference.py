@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.console import Run, names
+from helpers.console import Run
 
 import memscal
 
@@ -29,15 +29,6 @@ def test_options_of_the_film_and_the_rod_reach_the_file(run: Run, folder: Path):
     # The table carries the load, to what a sum by trapezia makes of it.
     assert profile.force == pytest.approx(0.7, rel=1e-3)
     assert np.all(np.diff(profile.r) > 0)
-
-
-def test_a_file_is_for_one_load(run: Run, folder: Path):
-    run("reference", "rod", "--load", 1, "--load", 2, "-o", "rod.h5").exits(2, "one load")
-    assert names(folder) == []
-
-
-def test_load_and_depth_exclude_each_other(run: Run):
-    run("reference", "rod", "--load", 1, "--depth", 2).exits(2, "not both")
 
 
 def test_a_cone_and_a_measured_tip_go_to_a_file_and_come_back(run: Run, folder: Path):
@@ -67,28 +58,6 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
     run("reference", "profile", "--profile-table", "tip.csv").exits(3, "tip.csv")
     Path("tip.csv").write_text("r,z\n1,0\n2,1\n3,4\n4,9\n", encoding="utf-8")
     assert "first at the axis" in run("reference", "profile", "--profile-table", "tip.csv").err
-
-
-@pytest.mark.parametrize(("code", "arguments", "word"), [
-    (3, ["rod", "--depth", "3000"], "would sink 3000 um"),
-    (3, ["sphere", "--strain", "finite", "--friction", "0.3"], "slides freely (friction 0) or"),
-    (3, ["sphere", "--backend", "fem", "--film-radius", "1"], "the film's edge at 1 mm"),
-    (3, ["profile", "--profile-table", "absent.csv"], "absent.csv"),
-    (2, ["rod", "--strain", "finite", "--film-law", "linear"], "leave --strain out"),
-    (2, ["rod", "--film-law", "mooney-rivlin"], "--mooney-rivlin-ratio"),
-    (2, ["cone"], "needs --inclination"), (2, ["profile"], "needs --profile-table"),
-    (2, ["cone", "--inclination", "5", "--radius", "1"], "--radius does not describe a cone"),
-    (2, ["rod", "--inclination", "5"], "--inclination does not describe a rod"),
-    (2, ["sphere", "--thickness", "-2"], "-2"),
-    (2, ["sphere", "--friction", "-0.1"], "-0.1"), (2, ["sphere", "--rings", "4"], "4"),
-    (2, ["sphere", "--mesh", "film.vtu"], "--backend fem"),
-    (2, ["sphere", "--backend", "fem", "--mesh", "film.png"], ".vtu"),
-    (2, ["sphere", "--figure", "film.txt"], ".png"),
-    (2, ["sphere", "--exponential", "1", "1", "--greenwood-tripp", "1", "1", "1"], "normal law"),
-])  # fmt: skip
-def test_what_cannot_be_solved_and_wrong_usage_are_refused(run, folder, code, arguments, word):
-    run("reference", *arguments, "-o", "out.h5").exits(code, word)
-    assert names(folder) == []
 
 
 @pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])

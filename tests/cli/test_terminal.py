@@ -22,4 +22,3 @@ def test_a_load_of_several_is_restored_by_its_number(run: Run, folder: Path) -> 
 def test_explain_knows_each_check_by_the_names_of_tables_and_files(run: Run) -> None:
     assert run("explain", "joint_chi_square_dry").out.startswith("joint chi square\n")
     assert run("explain", "applied-force").out == run("explain", "applied_force_12").out
-    run("explain", "gausian_misfit").exits(2, "Did you mean gaussian_misfit?")

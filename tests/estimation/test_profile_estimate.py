@@ -1,6 +1,5 @@
 """The estimated profile: noise, outliers, departures from a Gaussian, and refusals."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ import memscal
 from memscal.errors import FitError
 from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
 from memscal.estimation.departures import ReducedScan
-from memscal.estimation.profile import point_messages
 
 
 def test_the_noise_is_found_from_the_scatter_alone() -> None:
@@ -50,19 +48,6 @@ def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> No
     assert shift < np.sqrt(
         spoilt.basis.integrals @ spoilt.weighed.covariance @ spoilt.basis.integrals
     )
-
-
-def test_ten_outliers_are_listed_the_largest_first_and_the_others_counted() -> None:
-    scan = simulated(noise=0.002, repeats=9)
-    u = scan.u_zz.copy()
-    sizes = np.linspace(0.4, 1.6, 13)
-    u[:, ::16].flat[: sizes.size] -= sizes * u.max()
-    listed = [m.text for m in point_messages(estimated(replace(scan, u_zz=u)))]
-    assert len(listed) == 11
-    voltages = [re.findall(r"(-?[\d.]+) mV", text) for text in listed[:10]]
-    departures = [float(expected) - float(measured) for measured, expected in voltages]
-    assert departures == sorted(departures, reverse=True)
-    assert listed[10].startswith("3 more outliers")
 
 
 def test_gross_outliers_leave_the_noise_as_it_is() -> None:

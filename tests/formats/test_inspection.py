@@ -15,7 +15,6 @@ from memscal.formats.inspection import check, describe
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
 from memscal.model.provenance import timestamp
-from memscal.model.scan import StressSensor
 
 
 @pytest.fixture
@@ -34,14 +33,6 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: P
     found = describe(path)
     assert (found["file"], found["schema"]) == (f"{name}.h5", f"memscal-{name}")
     assert json.loads(json.dumps(found, allow_nan=False)) == found
-
-
-@pytest.mark.parametrize(
-    ("name", "title"), [("S1", "Apparatus function of S1"), ("", "Apparatus function")]
-)
-def test_an_artifact_is_titled_by_its_sensor_alone(tmp_path: Path, name, title):
-    write_artifact(make_artifact(sensor=StressSensor(name=name)), tmp_path / "a.h5")
-    assert describe(tmp_path / "a.h5")["title"] == title
 
 
 @pytest.mark.parametrize(("name", "passed"), [("scan", True), ("artifact", False)])

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from helpers.builders import make_film
 from helpers.tables import imported
-from hypothesis import given
-from hypothesis import strategies as st
 
 from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, import_table
-from memscal.formats.tables.stated import ScanConditions, TableLayout
+from memscal.formats.tables.stated import TableLayout
 from memscal.formats.tables.text_table import TextTable
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod, Sphere
@@ -87,21 +85,6 @@ def test_what_is_missing_is_counted(tmp_path: Path):
     texts = [note.text for note in found.messages]
     assert "u_zz is missing (NaN) in line 3." in texts
     assert "1 more would make every repeat complete." in texts
-
-
-def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path):
-    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n0,3\n1,4\n")
-    assert (found.kind, found.u_zz.tolist()) == ("line", [1e-3, 2e-3, 3e-3, 4e-3])
-    (note,) = [note.text for note in found.messages if "--repeat COLUMN" in note.text]
-    assert "2 of 4 positions" in note
-
-
-@given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))
-def test_a_line_has_no_note_of_repeats(tmp_path_factory: pytest.TempPathFactory, seed, spread):
-    rng = np.random.default_rng(seed)
-    x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
-    found = scan_table(tmp_path_factory.mktemp("t"), rows(x.tolist(), [1.0] * 33, header="x,u"))
-    assert not any("--repeat COLUMN" in note.text for note in found.messages)
 
 
 @pytest.mark.parametrize("numbered", [True, False])
@@ -512,15 +495,3 @@ def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):
     found = scan_table(tmp_path, "x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
     assert found.x[0] == -1e-3
     assert np.isnan(found.u_zz).sum() == 1
-
-
-def test_fields_of_the_records_are_keywords_for_one_version_more():
-    table = {"x": [0.0, 1.0], "u [mV]": [1.0, 2.0]}
-    with pytest.warns(DeprecationWarning, match="becomes import_table") as caught:
-        old = import_table(table, x="x", u="u", x_unit="mm", load=0.5)
-    layout = TableLayout(x_unit="mm")
-    new = import_table(table, x="x", u="u", layout=layout, conditions=ScanConditions(load=0.5))
-    assert (old.load, old.x.tolist(), old.notes) == (0.5, new.x.tolist(), new.notes)
-    assert {warning.filename for warning in caught} == {__file__}
-    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
-        import_table(table, x="x", u="u", colour="red")

@@ -17,7 +17,6 @@ from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import load_points, predict, sensor_of
 
 FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
-LOADINGS = ("incremental", "total")
 TRUTH = 0.2
 
 
@@ -65,19 +64,6 @@ def scaled(scan: Scan, factor: float, noise: float = 1.0) -> Scan:
 
 def failed(found: memscal.FrictionComparison) -> set[str]:
     return {check.name for check in found.checks if not check.passed}
-
-
-def test_every_load_meets_every_loading(found: memscal.FrictionComparison) -> None:
-    assert found.loadings == LOADINGS
-    for loading in LOADINGS:
-        kinds = [(one.lubrication, one.load) for one in found.loads[loading]]
-        assert kinds == [("dry", 0.69), ("dry", 2.75), ("lubricated", 0.69), ("lubricated", 2.75)]
-        assert {one.loading for one in found.loads[loading]} == {loading}
-    assert {kind: set(by) for kind, by in found.joint.items()} == {
-        "dry": set(LOADINGS),
-        "lubricated": set(LOADINGS),
-    }
-    assert "dry, incremental: " in repr(found)
 
 
 def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made) -> None:

@@ -195,14 +195,6 @@ def test_a_rod_is_measured_like_a_sphere() -> None:
     assert 0.4 * low < np.mean(np.square(z)) < high
 
 
-def test_profiles_of_several_scans_know_theirs() -> None:
-    found = memscal.measure_stress(
-        [made.contact_scan(1), made.contact_scan(2, load=(0.69,), lubrication="lubricated")], SENSOR
-    )
-    assert [found.scans.index(profile.scan) for profile in found.profiles] == [0, 0, 0, 0, 1]
-    assert [p.lubrication for p in found.profiles] == ["dry"] * 4 + ["lubricated"]
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -307,21 +299,6 @@ def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads: tupl
             np.testing.assert_allclose(signal.voltage[i], at, atol=2e-4 * at.max())
             by_load = (above - below) / 0.02
             np.testing.assert_allclose(signal.by_load[i], by_load, atol=1e-3 * by_load.max())
-
-
-def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:
-    scan = tmp_path / "sphere.h5"
-    sensor = tmp_path / "sensor.apparatus.h5"
-    memscal.write_scan(made.contact_scan(3, load=(1.37,)), scan)
-    SENSOR.save(sensor)
-    read = memscal.read_scan(scan)
-    known = memscal.load_apparatus(sensor)
-    of_path = memscal.measure_stress(scan, sensor)
-    of_scan = memscal.measure_stress(read, known)
-    assert of_path.profiles == of_scan.profiles
-    by_path = memscal.restore(str(scan), sensor)
-    by_scan = memscal.restore(read, known)
-    assert by_path.force == pytest.approx(by_scan.force, rel=1e-12)
 
 
 def test_stresses_measured_one_by_one_are_those_measured_together() -> None:

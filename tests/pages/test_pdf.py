@@ -105,17 +105,6 @@ def test_nothing_is_fetched_for_the_pdf(certificate, monkeypatch):
     assert certificate_pdf(certificate, page, b"<a/>").startswith(b"%PDF")
 
 
-def test_scans_at_several_loads_get_two_pages_too(laboratory):
-    import pypdf
-
-    scan = replace(memscal.simulate(load=(0.1, 1.0), points=33, seed=3), unit="A")
-    bare = memscal.calibrate(replace(scan, sensor=memscal.StressSensor())).apparatus
-    kept = {k: v for k, v in laboratory.sections.items() if k != "decision"}
-    made = certify(bare, replace(laboratory, sections=kept))
-    pdf = certificate_pdf(made, certificate_page(made), certificate_xml(made))
-    assert len(pypdf.PdfReader(io.BytesIO(pdf)).pages) == 2
-
-
 def test_the_command_writes_the_pdf(tmp_path):
     artifact = str(DATA / "rod_scan_65.apparatus.h5")
     output = tmp_path / "c.pdf"

@@ -143,18 +143,6 @@ def test_the_profile_is_that_of_the_page(root, certificate):
     assert len(g.findall(".//si:columnXMLList", NAMES)) == certificate.profile.r.size
 
 
-def test_conditions_conformity_and_people_stand_where_a_dcc_has_them(root, others, certificate):
-    influences = root.iterfind(".//dcc:influenceCondition//si:value", NAMES)
-    assert [float(e.text or "") for e in influences] == pytest.approx([23.0, 45.0])
-    core = "dcc:administrativeData/dcc:coreData/dcc:uniqueIdentifier"
-    assert found(root, core).text == certificate.number
-    assert found(root, ".//dcc:metaData/dcc:conformity").text == "pass"
-    assert found(ET.fromstring(others[0]), ".//dcc:metaData/dcc:conformity").text == "noPass"
-    assert ET.fromstring(others[1]).find(".//dcc:conformity", NAMES) is None
-    names = [e.text for e in root.iterfind(".//dcc:measuringEquipment/dcc:name/dcc:content", NAMES)]
-    assert names == [item["name"] for item in certificate.equipment]
-
-
 def test_the_artifact_in_it_is_whole_and_says_the_same(root, apparatus, tmp_path: Path):
     held = found(root, ".//dcc:byteData/dcc:dataBase64").text
     assert held is not None

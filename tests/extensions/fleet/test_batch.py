@@ -21,7 +21,6 @@ from scipy.stats import binom
 import memscal
 from memscal.extensions.fleet.results import FleetResults
 from memscal.extensions.fleet.results_summary import outliers
-from memscal.extensions.fleet.shards import read_fleet
 
 COUNT = 12
 SHARD = 2
@@ -240,22 +239,6 @@ def test_ctrl_c_ends_a_batch_at_once(fleet: Path, folder: Path) -> None:
     assert process.wait(timeout=30) == 130
 
 
-def test_a_summary_has_distributions_reasons_and_the_map(results: Path, folder: Path, run: Run):
-    page = folder / "page.html"
-    picture = folder / "fleet.svg"
-    shown = run("summary", results, "-o", page, "--figure", picture).exits(0, "Written")
-    text = page.read_text(encoding="utf-8")
-    rows = pd.read_parquet(results / "shards")
-    assert all(word not in text.lower() for word in ("<script", "href=", 'src="http'))
-    passed = int(rows["passed"].sum())
-    assert f"{passed} of {COUNT} sensors passed every check" in text
-    for words in ("baseline drift", "Every voltage of the scan", "above the median"):
-        assert words in " ".join(shown.out.split())
-        assert words in text
-    assert "wafer (mm)" in picture.read_text(encoding="utf-8")
-    run("summary", results, "-o", page).exits(4, "exists already")
-
-
 def test_the_report_of_a_batch_is_its_summary(copy: Path, folder: Path, run: Run) -> None:
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--report")
     page = copy / "results" / "page.html"
@@ -299,17 +282,6 @@ def test_a_summary_of_no_batch_or_of_several_units_is_refused(copy: Path, run: R
     run("summary", copy / "results").exits(3, "mV/Pa (as scans/", "nA/Pa (as scans/")
     path.write_bytes(b"PAR1")
     run("summary", copy / "results").exits(3, "is damaged", "--resume")
-
-
-def test_a_figure_of_a_fleet_without_places_or_results_is_drawn(results: Path) -> None:
-    fleet = read_fleet(results)
-    nowhere = np.full(COUNT, np.nan)
-    along = replace(fleet, wafer_x=nowhere, wafer_y=nowhere).plot()
-    assert "place in the batch" in [axes.get_xlabel() for axes in along.axes]
-    names = ("conversion_constant", "gaussian_sigma")
-    empty = replace(fleet, **dict.fromkeys(names, nowhere), failed={}, errors={})
-    assert len(empty.plot().axes) == len(fleet.plot().axes)
-    assert "Distributions" not in empty.summary()
 
 
 @pytest.mark.parametrize("count", [4, 8, 20, 100])

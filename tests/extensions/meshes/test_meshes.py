@@ -8,19 +8,15 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from helpers.builders import make_film
 from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, write
 
 from memscal.errors import FormatError, InputError, UnitError
 from memscal.extensions.meshes.mesh_files import read_mesh, write_mesh
 from memscal.extensions.meshes.reference_mesh import read_reference_mesh
-from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress
-from memscal.model.checks import marked_texts
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
 
 DATA = Path(__file__).parents[2] / "data"
 QUADRATIC = [(0, 1), (1, 2), (2, 0)]
@@ -263,22 +259,6 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
     np.testing.assert_allclose(again.point_data["displacement_mm"][:, :2], 1e-3 * points)
     np.testing.assert_array_equal(again.point_data["displacement_mm"][:, 2], 0.0)
     assert b"E = 2.2 MPa" in (tmp_path / "film.vtu").read_bytes()
-
-
-def test_what_was_taken_for_what_stays_with_the_profile(tmp_path: Path):
-    path = saved(section(), tmp_path / "film.vtu")
-    film = make_film()
-    rod = Rod(radius=0.25e-3)
-    found = imported(path, film=film, indenter=rod, solver="a program")
-    write_reference(found.profile, tmp_path / "rod.h5")
-    again = read_reference(tmp_path / "rod.h5")
-    assert again.notes.splitlines() == marked_texts(found.notes)
-    assert "tension" not in again.notes
-    assert found.profile.source.sha256 in again.notes
-    assert (again.film, again.indenter, again.solver) == (film, rod, "a program")
-    assert again.discretisation == "164 nodes, 120 cells, 41 nodes on the base"
-    for words in ("y = 0 mm, its lowest level: 41 nodes", "component yy", "compression negative"):
-        assert words in again.notes
 
 
 def test_units_and_signs_are_those_that_are_given(tmp_path: Path):

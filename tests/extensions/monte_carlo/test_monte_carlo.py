@@ -166,13 +166,6 @@ def test_the_shortest_interval_of_a_skewed_distribution_is_to_one_side() -> None
     np.testing.assert_allclose(shortest_interval(draws), [0.0, -np.log(0.05)], atol=0.01)
 
 
-def test_what_regularisation_hides_is_said_not_to_scatter(hundred: memscal.MonteCarlo) -> None:
-    width = hundred["fwhm"]
-    assert width.first_order < width.stated
-    (hidden,) = [m for m in hundred.messages if m.kind == "regularisation"]
-    assert "fwhm" in hidden.text
-
-
 def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle() -> None:
     scan = simulated(film=LINEAR_FILM, rod=PAPER_ROD, load_uncertainty=0.01, noise=0.003)
     film = replace(LINEAR_FILM, poisson_ratio=0.45)

@@ -23,14 +23,6 @@ def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
     assert found.rod_friction == np.inf
 
 
-def test_the_scan_is_labelled_as_synthetic_wherever_it_is_shown(run: Run, folder: Path):
-    done = run("simulate", "-o", "scan.h5")
-    assert "Synthetic scan" in done.out
-    assert "nothing in it was measured" in done.err
-    assert "synthetic" in run("inspect", "scan.h5").out
-    assert "synthetic" in run("calibrate", "scan.h5").err
-
-
 def test_options_mean_their_units(run: Run, folder: Path):
     options = [
         *("--sigma", 400, "--conversion-constant", 2e-4, "--load", 0.5, "--radius", 0.3),
@@ -55,14 +47,6 @@ def test_options_mean_their_units(run: Run, folder: Path):
     assert done.json["truth"]["conversion_constant"]["value"] == pytest.approx(2e-4)
 
 
-def test_repeats_loads_and_rasters_have_their_shapes(run: Run, folder: Path):
-    loads = ["--load", 0.5, "--load", 1, "--repeats", 2]
-    assert run("simulate", "-o", "loads.h5", *loads, "--points", 9).code == 0
-    assert memscal.read_scan("loads.h5").u_zz.shape == (4, 9)
-    assert run("simulate", "-o", "raster.h5", "--raster", "--points", 9).code == 0
-    assert memscal.read_scan("raster.h5").kind == "raster"
-
-
 def test_a_sum_of_gaussians_is_stored_as_truth(run: Run, folder: Path):
     ring = ["--sigma", 700, "--weight", 1.5, "--sigma", 400, "--weight", -0.5]
     assert run("simulate", "-o", "ring.h5", *ring).code == 0
@@ -85,16 +69,3 @@ def test_a_linear_film_and_its_rod_are_simulated_on_request(run: Run, folder: Pa
     assert (shown["truth"]["film_law"], shown["truth"]["rod_friction"]["value"]) == ("linear", 0.0)
     assert "sliding freely" in run("calibrate", "scan.h5", "--dry-run").out
     assert FILM_LAWS == LAWS
-
-
-@pytest.mark.parametrize(("arguments", "code"), [
-    (["--sigma", 700, "--sigma", 400], 2),
-    (["--disc-radius", 800, "--sigma", 300, "--sigma", 200], 2),
-    (["--disc-radius", 800, "--sigma", 300, "--weight", 1], 2), (["--disc-radius", 0], 2),
-    (["--raster", "--repeats", 2], 2), (["--points", 1], 2), (["--noise", -1], 2),
-    (["--sigma", 700, "--weight", 0.5], 3), (["--film-law", "mooney-rivlin"], 2),
-    (["--mooney-rivlin-ratio", 0.1], 2), (["--rod-friction", 0.3], 2),
-])  # fmt: skip
-def test_what_makes_no_scan_is_refused(run: Run, folder: Path, arguments, code):
-    run("simulate", "-o", "scan.h5", *arguments).exits(code)
-    assert names(folder) == []

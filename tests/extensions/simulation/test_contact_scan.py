@@ -139,27 +139,6 @@ def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -
     np.testing.assert_array_equal(heavy.normal_load, np.ones(33))
 
 
-def test_the_scan_and_its_truth_say_what_was_pressed() -> None:
-    scan = simulate_contacts(
-        load=[0.34, 0.69],
-        repeats=2,
-        friction=0.4,
-        points=9,
-        spacing=1e-3,
-        lubrication="lubricated",
-        lubricant="glycerol",
-        seed=5,
-    )
-    assert scan.kind == "repeats"
-    np.testing.assert_array_equal(scan.normal_load[:, 0], [0.34, 0.34, 0.69, 0.69])
-    np.testing.assert_allclose(scan.x, np.arange(-4, 5) * 1e-3, atol=1e-18)
-    assert (scan.lubrication, scan.lubricant) == ("lubricated", "glycerol")
-    assert "synthetic" in scan.title.lower()
-    told = truth(scan)
-    assert (told["friction"], told["load_1"], told["load_2"]) == (0.4, 0.34, 0.69)
-    assert (told["young_modulus"], told["indenter_radius"]) == (2.2e6, 128.8e-3)
-
-
 @pytest.mark.parametrize(
     ("options", "error", "problem"),
     [

@@ -9,10 +9,8 @@ from helpers.records import assert_same
 
 import memscal
 from memscal.extensions.simulation.command import FILES
-from memscal.formats.inspection import check
 
 SPHERE = ("simulate", "--experiment", "sphere")
-ROD = ("--experiment", "rod")
 FEW = ("--load", 0.69, "--lubricated-load", 0.69, "--contacts", 9, "--spacing", 2)
 
 
@@ -69,20 +67,6 @@ def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, fol
         assert told["reference_pressure"] == pytest.approx(0.5e6)
 
 
-def test_the_experiment_is_labelled_as_synthetic_wherever_it_is_shown(run: Run, folder: Path):
-    done = run(*SPHERE, "-o", "run", *FEW, "--draw-inputs", "--record-loads").exits(0)
-    assert "Synthetic experiment (calculated, not measured)" in done.out
-    assert "friction coefficient" in done.out
-    assert "nothing in them was measured" in done.err
-    for name in FILES:
-        assert "synthetic" in run("inspect", f"run/{name}").out
-        assert [finding for finding in check(f"run/{name}") if not finding.passed] == []
-    assert "lubricated" in run("inspect", "run/sphere_lubricated.h5").out
-    told = memscal.read_scan("run/sphere_dry.h5").synthetic
-    assert told["thickness"] != 2e-3
-    assert f"{told['thickness'] * 1e3:.6g} mm" in done.out
-
-
 def test_existing_scans_are_replaced_only_if_it_is_asked_for(run: Run, folder: Path):
     assert run(*SPHERE, "-o", "run", *FEW).code == 0
     before = {name: (folder / "run" / name).read_bytes() for name in FILES}
@@ -104,22 +88,3 @@ def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path):
     assert "sphere" in done.stderr
     assert "Traceback" not in done.stderr
     assert names(folder) == []
-
-
-@pytest.mark.parametrize(("arguments", "code", "hint"), [
-    (["--raster"], 2, "--raster belongs to --experiment rod"),
-    (["--half-range", 5, "--raster"], 2, "--half-range, --raster belong"),
-    (["--load", 1, "--load", 1], 2, "given twice"),
-    (["--lubricated-load", 1, "--lubricated-load", 1], 2, "given twice"),
-    (["--greenwood-tripp", 1, 1, 1, "--exponential", 1, 1], 2, "one normal law"),
-    (["--load-scatter", 11], 2, "(in percent)"), (["--friction", -1], 2, "of at least 0"),
-    (["--contacts", 1], 2, "2<=x<=4096"), (["--load", 1e7], 3, "film"),
-    (["-o", "no/such/folder"], 4, "Create the folder first"), (["-o", "file"], 4, "not a folder"),
-    ([*ROD, "--friction", 0.2], 2, "--friction belongs to --experiment sphere"),
-    ([*ROD, "--gain", 1, "--slip-length", 2], 2, "--slip-length, --gain belong"),
-])  # fmt: skip
-def test_what_makes_no_experiment_is_refused(run: Run, folder: Path, arguments, code, hint):
-    (folder / "file").write_text("mine")
-    refused = run(*SPHERE, *arguments)
-    assert (refused.code, hint in refused.err) == (code, True), refused.err
-    assert names(folder) == ["file"]
