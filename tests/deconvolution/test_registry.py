@@ -54,17 +54,6 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("name", regulariser_names())
-def test_every_name_creates_a_method_that_says_what_it_is(name: str) -> None:
-    regulariser = create_regulariser(name)
-    assert regulariser.name == name
-    # Sentences, not words.
-    for statement in (regulariser.assumes, regulariser.fails):
-        assert len(statement.split()) > 3
-        assert statement.endswith(".")
-    assert regulariser.assumes != regulariser.fails
-
-
-@pytest.mark.parametrize("name", regulariser_names())
 def test_a_seed_reaches_only_those_that_draw(name: str) -> None:
     regulariser = create_regulariser(name, seed=41)
     draws = name == "white-noise-draw"

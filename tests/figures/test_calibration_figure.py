@@ -283,14 +283,6 @@ def test_a_line_along_y_says_so_and_stands_at_its_centre():
     assert centre == pytest.approx(1e3 * calibration.apparatus.parameters["centre_y"])
 
 
-def test_no_line_joins_the_points_of_several_scans(make_apparatus):
-    data = make_apparatus(points=33)
-    configuration = {**data.process.configuration, "further_scans": [None]}
-    joint = replace(data, process=replace(data.process, configuration=configuration))
-    found = curve(panels(calibration_figure(joint))["scan"], "reconvolved, G")
-    assert found.get_linestyle() == "None"
-
-
 @pytest.fixture(scope="module")
 def sheared() -> ApparatusData:
     """An artifact of channel xz."""
