@@ -170,13 +170,6 @@ def test_a_voltage_is_the_blurred_stress_times_the_constant(apparatus: Apparatus
     np.testing.assert_allclose(apparatus.stress(volts), apparatus.convolve(RADII, stress))
 
 
-@pytest.mark.parametrize("shape", [(), (3,), (2, 5)])
-def test_a_measured_stress_has_the_shape_of_its_voltage(apparatus, shape) -> None:
-    found = apparatus.stress(np.full(shape, 6e-3))
-    assert np.shape(found) == shape
-    np.testing.assert_allclose(found, 6e-3 / CONVERSION)
-
-
 def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus) -> None:
     r = np.linspace(-SUPPORT, SUPPORT, 997).reshape(-1, 1)
     g = unit_gaussian(r, SIGMA)
@@ -217,14 +210,6 @@ def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, proble
             method(r, sigma)
         if "12 m" in problem:
             assert "metres, not millimetres" in caught.value.cure
-
-
-def test_an_artifact_keeps_its_arrays_and_names_its_parameters():
-    apparatus = with_kernel(lambda r: unit_gaussian(r, SIGMA))
-    with pytest.raises(ValueError, match="read-only"):
-        apparatus.radial_profile.g[0] = 1.0
-    with pytest.raises(InputError, match="There is no parameter conversion"):
-        apparatus.parameters["conversion"]
 
 
 def test_a_compact_artifact_is_half_as_large_and_convolves_the_same(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Long work tells how much of it is done: to callbacks, to the log, and as a bar."""
 
-import logging
 import math
 import types
 
@@ -8,7 +7,6 @@ import pytest
 from helpers.scans import contact_scan, known_apparatus
 
 import memscal
-from memscal import progress
 from memscal.progress import counted, counter, reporting
 
 FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
@@ -82,29 +80,6 @@ def test_public_functions_tell_their_callback(tmp_path) -> None:
         memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")
     assert {one.task for one in heard} == {"plans"}
     assert 2 <= heard[-1].done <= heard[-1].total
-
-
-def test_what_takes_long_within_a_step_counts_its_parts() -> None:
-    heard: list[memscal.Progress] = []
-    table = {"x [mm]": [-1.0, 0.0, 1.0], "U [mV]": [1.0, 3.0, 1.0]}
-    memscal.import_table(table, x="x", u="U", progress=heard.append)
-    assert told(heard) == [("rows", 3, 3)]
-    raster = memscal.simulate(seed=1, points=17, raster=True, half_range=3e-3)
-    memscal.calibrate(raster, progress=heard.append)
-    memscal.indent(FILM, SPHERE, load=0.2, rings=24, backend="fem", progress=heard.append)
-    for task, least in (("kernels", 10), ("tractions", 2 * 24)):
-        last = [one for one in heard if one.task == task][-1]
-        assert last.done == last.total >= least
-
-
-def test_the_log_has_a_line_now_and_then(caplog, monkeypatch) -> None:
-    with caplog.at_level(logging.INFO, "memscal"):
-        list(counted("abc", "short ones", 3))
-        monkeypatch.setattr(progress, "_EVERY", 0.0)
-        list(counted("ab", "long ones", 2))
-    assert [record.name for record in caplog.records] == ["memscal"] * 2
-    assert caplog.messages[0].startswith("1 of 2 long ones, ")
-    assert caplog.messages[1] == "2 of 2 long ones"
 
 
 def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) -> None:

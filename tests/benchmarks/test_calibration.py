@@ -15,7 +15,7 @@ from scipy.optimize import curve_fit
 import memscal
 from memscal import EvenGrid, Scan, StressProfile
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.deconvolution.division import DivisionProblem, WhiteNoise
+from memscal.deconvolution.division import DivisionProblem
 from memscal.model.arrays import FloatArray
 from memscal.parallel import worker_pool
 
@@ -36,33 +36,6 @@ def division_problem(pixels: int) -> DivisionProblem:
     return DivisionProblem(grid, voltage, stress, WEAKEST**1.4, WEAKEST)
 
 
-class PlainDivision:
-    """The same division on the whole plane by numpy's complex transform."""
-
-    def __init__(self, problem: DivisionProblem) -> None:
-        # One period: the last row and column are the first ones again.
-        self.voltage = problem.grid.to_image(problem.voltage)[:-1, :-1]
-        self.stress = problem.grid.to_image(problem.reference)[:-1, :-1]
-        self.cell_area = problem.grid.cell_area
-        self.noise2 = (0.1 * WEAKEST / self.cell_area) ** 2
-
-    def __call__(self) -> FloatArray:
-        z = np.fft.fft2(self.stress)
-        window = -np.expm1(-(z.real**2 + z.imag**2) / self.noise2)
-        quotient = np.fft.fft2(self.voltage) * (window / np.where(z == 0, 1.0, z))
-        return np.fft.fftshift(np.fft.ifft2(quotient).real) / self.cell_area
-
-
-@pytest.fixture(scope="module")
-def problem() -> DivisionProblem:
-    return division_problem(512)
-
-
-@pytest.fixture(scope="module")
-def plain(problem: DivisionProblem) -> PlainDivision:
-    return PlainDivision(problem)
-
-
 @pytest.fixture(scope="module")
 def scan() -> Scan:
     return simulate(film=LINEAR_FILM, points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4)
@@ -71,36 +44,6 @@ def scan() -> Scan:
 @pytest.fixture(scope="module")
 def reference(scan: Scan) -> StressProfile:
     return memscal.indent(scan.film, scan.indenter, load=scan.load).profile()
-
-
-def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(problem, plain) -> None:
-    quarter = WhiteNoise().divide(problem).field
-    exact = unit_gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
-    np.testing.assert_allclose(quarter, exact, atol=0.05 * exact.max())
-    # The central pixel is the axis; the quarter lies to the lower right, less the last edge.
-    np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=1e-6 * quarter.max())
-
-
-def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(problem, plain) -> None:
-    # Even against the bare quotient, without window or way back.
-    def bare() -> FloatArray:
-        return np.fft.fft2(plain.voltage) / (np.fft.fft2(plain.stress) + plain.noise2)
-
-    ratio = turns(lambda: WhiteNoise().divide(problem), plain, rounds=15)
-    show("division of a quarter plane, over a complex one", ratio, 0.8)
-    ratio = turns(lambda: WhiteNoise().divide(problem), bare, rounds=15)
-    show("division of a quarter plane, over the bare quotient", ratio, 1.0)
-
-
-def test_a_division_costs_as_many_steps_as_its_transforms(problem: DivisionProblem) -> None:
-    # N log N from 512 to 2048 is 19.6 times the work; three times that allows for caches.
-    # Anything that went as N^1.5 would cost 64 times, as N^2 256 times.
-    large = division_problem(2048)
-    steps = 16 * np.log(2048**2) / np.log(512**2)
-    ratio = turns(
-        lambda: WhiteNoise().divide(large), lambda: WhiteNoise().divide(problem), rounds=5
-    )
-    show("division at 2048, over that at 512", ratio, 3 * steps, gross=3.0)  # N^2: 256
 
 
 def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:

@@ -1,14 +1,10 @@
 """Speed of the contact mechanics, each beside the plain way to the same numbers."""
 
-import math
-
 import numpy as np
 import pytest
 from helpers.machine import show, turns
 from helpers.paper import FILM, LOADS, SPHERE
-from scipy.integrate import quad
 from scipy.optimize import nnls
-from scipy.special import ellipk
 
 from memscal import Interface
 from memscal.mechanics.film_response import HankelFilm
@@ -63,27 +59,6 @@ def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smoot
     show("frictionless contact, over a dense solution", ratio, 40)
     ratio = turns(lambda: contact(smooth), lambda: plain_contact(smooth, depth), 3)
     show("frictionless contact, over non-negative least squares", ratio, 1)
-
-
-def adaptive_entry(x: float, start: float, end: float) -> float:
-    """One half-space entry of the compliance, by adaptive quadrature."""
-
-    def density(s: float) -> float:
-        m = min(x, s) / max(x, s)
-        return 2 / math.pi / max(x, s) * float(ellipk(m**2)) * s * (s - start) / (end - start)
-
-    return quad(density, start, end, epsrel=1e-8)[0]
-
-
-def test_a_compliance_is_built_far_faster_than_entry_by_entry() -> None:
-    rings = np.linspace(0.0, 4e-3, 401)
-
-    def few_entries() -> float:
-        # 100 of the 160,000 entries of one of its four parts.
-        return sum(adaptive_entry(rings[i], rings[390], rings[391]) for i in range(10, 110))
-
-    ratio = turns(lambda: HankelFilm(FILM, rings).compliance, few_entries, rounds=3)
-    show("compliance, over 100 of its entries", ratio, 4 * 160_000 / 100 / 20)
 
 
 def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:

@@ -10,15 +10,12 @@ from time import process_time
 from typing import Any
 
 import pytest
-from helpers.linear_contacts import Laboratory
 from helpers.machine import once, show
 from helpers.paper import FILM, SPHERE
 
 import memscal
 from memscal.friction.calculated import amontons_family
-from memscal.friction.effective import fit_friction
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import likelihood
 from memscal.mechanics.solver import refinement
 from memscal.mechanics.solver.refinement import solve_on_rings
 
@@ -82,23 +79,3 @@ def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path: Path
     for what, (seconds, stated) in ratios.items():
         ratio = seconds / calibration
         sys.stdout.write(f"{what}: {ratio:.3g} calibrations (stated: below {stated})\n")
-
-
-def test_a_whole_profile_likelihood_costs_less_than_its_values_separately() -> None:
-    laboratory = Laboratory.of()
-    points = laboratory.measured(0.2, seed=1)
-    channel = laboratory.channel(points)
-    members = fit_friction(channel).fine
-    values = members.family.values
-    single = [channel.at(value) for value in values]
-
-    def together() -> None:
-        assert likelihood(members).chi_square.all()
-
-    def separately() -> None:
-        for member in single:
-            assert likelihood(member).chi_square.all()
-
-    pairs = [(once(separately), once(together)) for _ in range(3)]
-    ratio = median(whole / apart for apart, whole in pairs)
-    show("likelihood of all values at once, over one by one", ratio, 1 / 3)

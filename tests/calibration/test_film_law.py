@@ -1,7 +1,6 @@
 """The film's law: counted where it is not stated, taken as known where it is."""
 
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -109,15 +108,3 @@ def test_the_law_of_a_reference_counts_as_stated(deep: Scan) -> None:
     assert not check(calibration, "indentation").passed
     with pytest.raises(InputError, match=r"law \(neo-hookean\) and a reference"):
         memscal.calibrate(deep, reference=linear, film_law="neo-hookean")
-
-
-def test_what_hangs_on_a_film_that_states_no_uncertainty_is_told(deep: Scan) -> None:
-    calibration = memscal.calibrate(deep)
-    text = message(calibration, "uncertainty_unstated")
-    (slope,) = re.findall(r"d ln sigma/d ln h = ([+-][\d.]+)", text)
-    step = 0.02
-    pair = [replace(deep, film=replace(LAWLESS, thickness=2e-3 * (1 + s))) for s in (step, -step)]
-    more, less = (memscal.calibrate(scan).apparatus.gaussian_sigma for scan in pair)
-    assert float(slope) == pytest.approx(math.log(more / less) / (2 * step), abs=0.1)
-    assert "d ln A/d ln nu" in text
-    assert "Young's modulus" not in text  # of which a linear film's stress does not depend

@@ -69,22 +69,6 @@ def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent) ->
     np.testing.assert_allclose(changed.radial(R), usual.radial(R), atol=2e-4 * usual.radial(0.0))
 
 
-def test_the_messy_scan_is_the_normal_case() -> None:
-    clean = simulated(points=65, repeats=3, centre=(1.2e-3, 0.0), seed=4)
-    u = clean.u_zz.copy()
-    u[0, 10] = np.nan
-    u[1, 20:24] = np.nan
-    u[2, 40] += 0.4 * np.nanmax(u)
-    order = np.random.default_rng(7).permutation(65)
-    messy = replace(clean, x=clean.x[order], u_zz=u[:, order], u_zz_errors=None)
-    apparatus = memscal.calibrate(messy).apparatus
-    bounds = cramer_rao(0.005, repeats=3, centre=(1.2e-3, 0.0))
-    assert_as_stated(apparatus.parameters, clean.synthetic, bounds)
-    text = "\n".join(map(str, apparatus.process.messages))
-    assert "5 points of the scan are missing" in text
-    assert f"Outlier at x = {clean.x[40] * 1e3:.4g} mm" in text
-
-
 def test_the_reference_may_be_a_contact_a_table_or_a_file(tmp_path: Path) -> None:
     scan = simulated(noise=0.001)
     contact = memscal.indent(scan.film, scan.indenter, load=1.0)
@@ -125,21 +109,6 @@ def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
     # Not lifted: the field keeps the noise of its own points, which no two directions share.
     g = raster.apparatus.field.g
     assert not np.allclose(g, g[:, ::-1], atol=1e-6 * g.max())
-
-
-def test_a_raster_s_points_are_kept_with_place_and_baseline() -> None:
-    scan = simulated(raster=True, points=17, noise=0.005)
-    apparatus = memscal.calibrate(scan).apparatus
-    shown = apparatus.reconvolution
-    parameters = apparatus.parameters
-    np.testing.assert_allclose(np.hypot(shown.offset_x, shown.offset_y), shown.x)
-    rows = np.unique(np.round(shown.offset_y + parameters["centre_y"], 9))
-    np.testing.assert_allclose(rows, np.unique(scan.y), atol=1e-9)
-    assert shown.background.mean() == pytest.approx(parameters["baseline"])
-    drift = abs(parameters["drift"]) + abs(parameters["drift_y"])
-    assert np.ptp(shown.background) == pytest.approx(drift)
-    assert set(shown.load) == {scan.load}
-    assert 0 < np.linalg.norm(apparatus.field.g_scatter) < np.linalg.norm(apparatus.field.g_errors)
 
 
 def test_a_raster_off_its_lattice_is_refused() -> None:

@@ -11,7 +11,7 @@ import pytest
 from memscal.cli.output import emit_tables, show_messages, working
 from memscal.model.checks import Message
 from memscal.progress import counted
-from memscal.summaries.table import Table, folded
+from memscal.summaries.table import Table
 
 
 class Terminal(io.StringIO):
@@ -89,17 +89,6 @@ def test_columns_wrap_beside_their_labels_and_none_is_lost(width: int):
             f"0.{row}{i}" for i in range(9)
         ]
     assert len(parts) == {40: 9, 60: 9, 80: 5, 120: 3}[width]
-
-
-@pytest.mark.parametrize(("text", "lines"), [
-    ("a width of (0.560 ± 0.014) mm suffices", ["a width of", "(0.560 ± 0.014) mm", "suffices"]),
-    ("χ²/ν = 1.07, p = 0.5 or so", ["χ²/ν = 1.07,", "p = 0.5 or", "so"]),
-    ("0.178 [0.164, inf]", ["0.178 [0.164, inf]"]), ("no limit", ["no limit"]),
-    ("/a/long/path with spaces.h5 is whole", ["/a/long/path", "with", "spaces.h5 is", "whole"]),
-    ("above 0.12 (95 %)", ["above", "0.12 (95 %)"]), ("first\nsecond", ["first", "second"]),
-])  # fmt: skip
-def test_a_line_ends_between_words_and_never_within_a_number(text: str, lines: list[str]):
-    assert folded(text, 12) == lines
 
 
 def test_messages_of_a_kind_that_say_the_same_are_shown_once_with_their_number(monkeypatch):

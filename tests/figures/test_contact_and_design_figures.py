@@ -43,16 +43,6 @@ def test_one_contact_shows_its_tractions_and_its_base():
     assert places >= {contact.contact_radius * 1e3, contact.stick_radius * 1e3}
 
 
-def test_several_contacts_show_load_against_depth():
-    contacts = indent(FILM, SPHERE, load=[0.5, 1.0, 2.0])
-    figure = contact_figure(contacts[0], beside=contacts[1:])
-    loading = figure.axes[2]
-    points = loading.collections[0].get_offsets()
-    np.testing.assert_allclose(points, [[c.depth * 1e6, c.load] for c in contacts])
-    named = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
-    assert {"0.5 N", "1 N", "2 N", "contact radius"} <= named
-
-
 @pytest.fixture(scope="module")
 def planned() -> Design:
     return memscal.design(step=0.5e-3, repeats=2)

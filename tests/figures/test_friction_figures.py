@@ -7,7 +7,6 @@ import pytest
 from helpers.friction_results import LOADS, comparison, interface_comparison, stress
 from matplotlib.axes import Axes
 
-from memscal.cli.compare import figure_stems
 from memscal.errors import InputError
 from memscal.figures import friction as of_friction
 from memscal.figures.friction import effective_friction_figure, likelihood_figure
@@ -16,7 +15,7 @@ from memscal.figures.friction_profiles import (
     friction_set_figure,
     profile_figure,
 )
-from memscal.figures.style import on_axis, render_figure
+from memscal.figures.style import render_figure
 from memscal.friction.results import FrictionComparison
 
 
@@ -71,16 +70,6 @@ def test_residuals_of_the_page_are_those_of_the_fitted_coefficient(found: Fricti
             z, (one.profile.s_zz - expected) / one.profile.s_zz_errors, atol=close
         )
     assert f"{best:.3g}" in axes.get_ylabel()
-
-
-def test_a_logarithmic_scale_shows_every_stress_of_three_decades(found: FrictionComparison):
-    axes = profile_figure(found).axes[1]
-    low, high = axes.get_ylim()
-    assert high / low > 1e3
-    drawn = np.sort(np.concatenate([s for _, s, _ in bars(axes)]))
-    measured = [one.profile.s_zz for one in found.loads["total"] if one.lubrication == "dry"]
-    expected = np.concatenate(measured)
-    np.testing.assert_allclose(drawn, np.sort(expected[expected > 0]) * 1e-3)
 
 
 def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionComparison):
@@ -143,24 +132,6 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
         t, rise = (np.asarray(values) for values in curves[label].get_data())
         np.testing.assert_allclose(rise, reading.deviance - reading.least, atol=1e-9)
         assert t[np.argmin(rise)] == pytest.approx(float(friction_position(reading.best)))
-
-
-@pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
-def test_a_profile_between_the_measured_radii_is_even_and_smooth(first):
-    width = 1e-3
-    r = np.concatenate([[first], np.sort(np.r_[0.25e-3:6e-3:0.3e-3, 0.4e-3:6e-3:0.3e-3])])
-    fine = np.linspace(0.0, r[-1], 500)
-    (found,) = on_axis(r, np.exp(-0.5 * (r[None] / width) ** 2), fine)
-    np.testing.assert_allclose(found, np.exp(-0.5 * (fine / width) ** 2), atol=2e-3)
-
-
-def test_all_figures_have_the_names_that_the_command_line_proves():
-    for lubrications in (("dry", "lubricated"), ("lubricated",), ("",)):
-        found = comparison(lubrications=lubrications)
-        assert list(of_friction.comparison_figures(found)) == figure_stems(lubrications)
-    found = comparison(interface=interface_comparison())
-    stems = figure_stems(["dry", "lubricated"], interface=True)
-    assert list(of_friction.comparison_figures(found)) == stems
 
 
 def test_the_likelihood_of_a_slip_length_touches_zero_at_it():

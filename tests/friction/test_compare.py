@@ -102,12 +102,6 @@ def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionCompa
             assert sources <= set(reading.budget)
 
 
-def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against_it(found) -> None:
-    kinds = [message.kind for message in found.messages]
-    assert kinds.count("synthetic") == 1
-    assert kinds.count("macroscopic") == len(found.loadings)
-
-
 def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> None:
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
@@ -131,16 +125,6 @@ def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus) -> None
     (reading,) = found.joint["dry"].values()
     assert found.friction.tolist() == [0.0, 0.3]
     assert reading.interval.low > 0
-
-
-def test_dry_against_lubricated_is_the_same_along_y(made, apparatus, found, kept) -> None:
-    scans = [replace(scan, direction="y") for scan in (made.dry, made.lubricated)]
-    along_y = memscal.compare(scans, apparatus, friction=FRICTION, cache=kept)
-    for one, other in zip(
-        along_y.dry_against_lubricated, found.dry_against_lubricated, strict=True
-    ):
-        np.testing.assert_allclose(one.difference, other.difference, atol=1e-6 * other.maximum)
-        assert one.chi_square == pytest.approx(other.chi_square, rel=1e-6)
 
 
 def test_a_contact_over_a_plane_is_refused(made: Experiment, apparatus) -> None:

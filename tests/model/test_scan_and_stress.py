@@ -88,12 +88,6 @@ def test_a_scan_keeps_its_own_copy_of_its_data() -> None:
         assert not array.flags.writeable
 
 
-@pytest.mark.parametrize("thing", [make_scan("raster"), make_profile()])
-def test_scans_and_profiles_are_shown_in_one_short_line(thing) -> None:
-    assert len(repr(thing)) < 200
-    assert "\n" not in repr(thing)
-
-
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [

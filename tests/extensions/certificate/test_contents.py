@@ -10,10 +10,7 @@ from hypothesis import strategies as st
 import memscal
 from memscal.errors import InputError
 from memscal.extensions.certificate.certificate import CertifiedValue, Conformity, certify
-from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.laboratory import NEEDED, LaboratoryFile
-from memscal.extensions.certificate.page import certificate_page
-from memscal.model.checks import Message
 from memscal.model.quantities import ESTIMATED
 
 LIMITS = "conversion_constant"
@@ -81,23 +78,6 @@ def test_an_artifact_without_pascals_gets_no_certificate(laboratory):
     relative = memscal.calibrate(memscal.simulate(seed=1, points=33), relative=True).apparatus
     with pytest.raises(InputError, match="relative"):
         certify(relative, laboratory)
-
-
-def test_the_number_is_the_artifact_s_unless_the_file_gives_one(apparatus, laboratory, certificate):
-    assert certificate.number == "EXAMPLE-" + apparatus.content_digest[:10].upper()
-    assert certify(replace(apparatus, load=2.0), laboratory).number != certificate.number
-    given_one = stating(laboratory, "laboratory", number="2026/17")
-    assert certify(apparatus, given_one).number == "2026/17"
-
-
-def test_what_was_overridden_is_said_first(apparatus, laboratory, certificate):
-    text = "Overridden: rod_scan_65.h5 was changed after it was written."
-    messages = (*apparatus.process.messages, Message("override", text, "warning"))
-    changed = replace(apparatus, process=replace(apparatus.process, messages=messages))
-    found = certify(changed, laboratory)
-    assert found.warnings == [*certificate.warnings, text]
-    assert text in certificate_page(found)
-    assert text in certificate_xml(found).decode()
 
 
 def test_values_and_profile_are_those_of_the_artifact(apparatus, certificate):

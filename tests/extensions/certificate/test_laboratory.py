@@ -105,11 +105,3 @@ def test_the_file_belongs_to_scans_and_is_not_written_over(tmp_path: Path):
     assert imported(tmp_path, "--format", "reference") == 2
     mine = written(tmp_path, SHIPPED.read_text(encoding="utf-8"))
     assert imported(tmp_path, "--lab", str(mine), "-o", str(mine)) == 4
-
-
-def test_a_simulated_rod_scan_takes_the_file_and_an_experiment_does_not(tmp_path: Path):
-    path = tmp_path / "scan.h5"
-    assert main(["simulate", "-o", str(path), "--points", "9", "--lab", str(SHIPPED)]) == 0
-    assert memscal.read_scan(path).load_cell.serial_number == "LC-PLACEHOLDER"
-    assert memscal.read_scan(path).sensor.name == "a simulated sensor"
-    assert main(["simulate", "--experiment", "sphere", "--lab", str(SHIPPED)]) == 2

@@ -44,13 +44,3 @@ def test_the_right_hand_axis_is_zero_percent_at_the_rules_amplitude():
     at_rule = sweep.gaussian_sigma_deconvolved[4] * 1e3
     assert to_percent(at_rule) == pytest.approx(0.0, abs=1e-12)
     assert to_percent(1.05 * at_rule) == pytest.approx(5.0)
-
-
-def test_draws_that_failed_are_left_out_and_no_seeds_are_no_error():
-    sweep = make_sweep()
-    sweep.seed_conversion_constant[2, :] = np.nan
-    x, median = line(sweep_figure(sweep).axes[0], "median of draws")
-    assert x.size == 8
-    assert np.all(np.isfinite(median))
-    none = sweep_figure(make_sweep(seeds=0)).axes[0]
-    assert [each.get_label() for each in none.lines if each.get_label() == "one draw"] == []

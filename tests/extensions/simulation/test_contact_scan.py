@@ -17,7 +17,6 @@ from memscal.extensions.simulation.contact_scan import PAPER_SPHERE
 from memscal.extensions.simulation.experiment import Reality, drawn
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.extensions.simulation.sensor import blurred_stress
-from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
 STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
@@ -81,21 +80,6 @@ def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads() -> None:
         assert scan.u_zz[i] == pytest.approx(1e-7 * float(np.sum(weight * stress)), rel=1e-4)
 
 
-def test_the_noise_is_the_same_voltage_at_every_load(seed: int) -> None:
-    options: dict[str, Any] = {"repeats": 40, "load": [0.34, 2.75], "load_scatter": 0.0}
-    noisy, clean = (simulate_contacts(noise=s, seed=seed, **options) for s in (0.01, 0.0))
-    stated = noisy.u_zz_errors
-    assert np.ptp(stated) == 0
-    largest = simulate_contacts(load=[2.75], **EXACT).u_zz.max()
-    assert stated.flat[0] == pytest.approx(0.01 * largest, rel=1e-4)
-    scaled = (noisy.u_zz - clean.u_zz) / stated
-    for rows in (scaled[:40], scaled[40:]):
-        low, high = chi2.ppf([RARE, 1 - RARE], rows.size)
-        assert low < np.sum(rows**2) < high
-    for products in (scaled[:, 1:] * scaled[:, :-1], scaled[1:] * scaled[:-1]):
-        assert abs(products.mean()) < 7 / np.sqrt(products.size)
-
-
 def test_loads_and_places_scatter_as_stated_and_are_seen_in_the_voltage(seed: int) -> None:
     options: dict[str, Any] = {"load": [0.69], "repeats": 80, **STILL, "seed": seed}
     exact = simulate_contacts(load_scatter=0.0, position_error=0.0, **options)
@@ -117,19 +101,6 @@ def test_loads_and_places_scatter_as_stated_and_are_seen_in_the_voltage(seed: in
     low, high = chi2.ppf([RARE, 1 - RARE], away.size)
     # A slope by differences of half a millimetre is good to some percent here.
     assert 0.85 * low < np.sum((away / 20e-6) ** 2) < 1.15 * high
-
-
-def test_each_source_of_error_has_numbers_of_its_own(seed: int) -> None:
-    def noise(seed: int, **changes: float) -> FloatArray:
-        options: dict[str, Any] = {"load": [0.69], "seed": seed, "points": 17, **changes}
-        noisy, still = (simulate_contacts(noise=s, **options) for s in (0.01, 0.0))
-        return noisy.u_zz - still.u_zz
-
-    own = noise(seed)
-    exact = noise(seed, load_scatter=0.0, position_error=0.0)
-    # Its scale, the largest signal, is solved on other rings, to the solver's own 1e-4.
-    np.testing.assert_allclose(own, exact, rtol=1e-4)
-    assert not np.allclose(own, noise(seed + 1), atol=1e-6)
 
 
 def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -> None:
@@ -169,27 +140,6 @@ def test_what_cannot_be_scanned_is_refused(options, error, problem) -> None:
 
 FEW: dict[str, Any] = {"loads": [0.69], "lubricated_loads": [0.69], "points": 9, "spacing": 2e-3}
 NOMINAL = Reality(film=PAPER_FILM, rod=PAPER_ROD, sphere=PAPER_SPHERE)
-
-
-def test_an_experiment_is_a_calibration_and_contacts_dry_and_lubricated() -> None:
-    found = memscal.simulate_experiment()
-    assert list(found.scans) == ["rod_scan", "sphere_dry", "sphere_lubricated"]
-    assert [scan.indenter.shape for scan in found.scans.values()] == ["rod", "sphere", "sphere"]
-    assert [scan.lubrication for scan in found.scans.values()] == ["", "dry", "lubricated"]
-    assert (found.dry.u_zz.shape, found.lubricated.u_zz.shape) == ((4, 33), (2, 33))
-    assert (truth(found.dry)["friction"], truth(found.lubricated)["friction"]) == (0.2, 0.0)
-    for scan in found.scans.values():
-        assert (scan.sensor, scan.film) == (found.rod.sensor, PAPER_FILM)
-        assert "synthetic" in scan.title.lower()
-        assert (truth(scan)["gaussian_sigma"], truth(scan)["seed"]) == (561e-6, 0)
-
-
-def test_another_load_of_one_scan_changes_no_number_of_another() -> None:
-    less = simulate_experiment(**FEW, seed=8)
-    more = simulate_experiment(**FEW | {"loads": [0.34, 0.69], "repeats": 1}, seed=8)
-    assert_same_to_rounding(less.rod.u_zz, more.rod.u_zz)
-    assert_same_to_rounding(less.lubricated.u_zz, more.lubricated.u_zz)
-    assert less.dry.u_zz.shape != more.dry.u_zz.shape
 
 
 def test_the_scans_of_one_seed_share_no_noise() -> None:

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from memscal import GaussianMixture, RadialKernel, SmoothedDisc
 from memscal.errors import InputError
-from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.model.arrays import FloatArray
 
 LINEAR = replace(PAPER_FILM, law="linear")
@@ -42,18 +42,6 @@ def test_a_line_is_the_middle_row_of_a_raster() -> None:
     np.testing.assert_allclose(raster.u_zz[16], line.u_zz, rtol=1e-9)
 
 
-def test_offset_and_drift_are_shares_of_the_largest_signal() -> None:
-    options: dict[str, Any] = {"noise": 0.0, "half_range": 20e-3, "points": 41, "film": LINEAR}
-    largest = simulate(**{**options, **STILL}).u_zz.max()
-    scan = simulate(baseline=0.02, drift=0.01, **options)
-    added = scan.u_zz - simulate(**{**options, **STILL}).u_zz
-    assert added.mean() == pytest.approx(0.02 * largest, rel=1e-9)
-    assert added[-1] - added[0] == pytest.approx(0.01 * largest, rel=1e-9)
-    np.testing.assert_allclose(np.diff(added, 2), 0.0, atol=1e-12 * largest)
-    assert scan.synthetic["baseline"] == pytest.approx(0.02 * largest)
-    assert scan.synthetic["drift"] == pytest.approx(0.01 * largest)
-
-
 @pytest.mark.parametrize("noise", [0.001, 0.05])
 def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed: int) -> None:
     options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR}
@@ -70,12 +58,6 @@ def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed:
     scaled = residual / stated
     for products in (scaled[:, 1:] * scaled[:, :-1], scaled[1:] * scaled[:-1]):
         assert abs(products.mean()) < 7 / np.sqrt(products.size)
-
-
-def test_noise_is_stated_only_if_there_is_some_and_it_is_wanted() -> None:
-    assert simulate(points=9).u_zz_errors is not None
-    assert simulate(points=9, state_noise=False).u_zz_errors is None
-    assert simulate(points=9, noise=0.0).u_zz_errors is None
 
 
 def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int) -> None:
@@ -124,23 +106,6 @@ def test_the_scan_states_its_law_if_it_has_one_and_it_is_wanted(film, law, frict
     assert (silent.film, silent.rod_friction) == (replace(film, law=""), None)
     assert scan.synthetic == silent.synthetic
     assert (scan.synthetic["film_law"], scan.synthetic.get("rod_friction")) == (law, friction)
-
-
-def test_repeats_at_one_load_share_their_signal_but_not_their_noise() -> None:
-    scan = simulate(repeats=3, points=17)
-    assert scan.u_zz.shape == (3, 17)
-    assert scan.normal_load is None
-    assert np.unique(scan.u_zz).size == 51
-    assert np.ptp(simulate(repeats=3, points=17, **STILL).u_zz, axis=0).max() == 0
-
-
-def test_the_truth_travels_with_the_scan() -> None:
-    scan = simulate(conversion_constant=2e-8, centre=(0.1e-3, 0.2e-3), seed=11, points=9)
-    truth = scan.synthetic
-    assert (truth["conversion_constant"], truth["gaussian_sigma"]) == (2e-8, 561e-6)
-    assert (truth["centre"], truth["centre_y"], truth["seed"]) == (0.1e-3, 0.2e-3, 11)
-    assert (scan.film, scan.indenter) == (PAPER_FILM, PAPER_ROD)
-    assert "Synthetic" in scan.notes
 
 
 @pytest.mark.parametrize(("options", "problem"), [
