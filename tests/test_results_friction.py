@@ -3,18 +3,17 @@
 import json
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison
+from helpers.friction_results import LOADS, comparison, interface_comparison
 
-from memscal import BoundedEstimate, ElasticFilm, FrictionComparison, Interval, Sphere
-from memscal.friction.checks import comparison_checks, comparison_messages
+from memscal import BoundedEstimate, FrictionComparison, Interval
+from memscal.friction.checks import comparison_checks
 from memscal.friction.effective import bracketed_share
-from memscal.model.checks import Message, QualityCheck
-from memscal.summaries.comparison import notes, tables
+from memscal.model.checks import QualityCheck
+from memscal.summaries.comparison import notes
 
 
 @pytest.fixture(scope="module")
@@ -37,23 +36,6 @@ def reading(
         p_value=0.4,
     )
     return replace(made, **fields)
-
-
-@pytest.mark.parametrize(
-    ("found", "text"),
-    [
-        (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
-        (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
-        (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
-        (reading(None, 12.51, None), "above 12 (95 %)"),
-        (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
-        (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
-        (reading(None, 0.0, None), "not identifiable"),
-    ],
-)
-def test_an_estimate_prints_its_interval_or_a_bound(found: BoundedEstimate, text: str) -> None:
-    assert str(found) == text
-    assert text in repr(found)
 
 
 @pytest.mark.parametrize("bound", [0.0999, 0.1001, 0.2451, 0.98765, 1.234, 9.99, 99.6])
@@ -99,66 +81,6 @@ def test_coefficients_share_what_scans_share(found: FrictionComparison) -> None:
     for other in others:
         apart = math.hypot(first.std_dev, other.std_dev)
         assert abs(first.std_dev - other.std_dev) <= (first - other).std_dev <= apart * (1 + 1e-9)
-
-
-def test_checks_of_each_profile_are_told_by_the_worst_and_failures_one_by_one() -> None:
-    def check(name: str, value: float) -> QualityCheck:
-        return QualityCheck(name, value, 1.0, value <= 1.0, "meaning")
-
-    checks = [check("force_1", 0.3), check("noise_1", 0.2), check("force_2", 0.8)]
-    table = tables(comparison(checks=tuple(checks)))[-1]
-    assert [row[:2] for row in table.rows] == [("force, worst of 2", "0.8"), ("noise 1", "0.2")]
-    failing = tables(comparison(checks=(*checks, check("force_3", 1.4))))[-1]
-    assert [row[0] for row in failing.rows] == ["force 3", "force, worst of 2", "noise 1"]
-    assert failing.marked == {0}
-
-
-def test_a_wide_gap_between_coefficients_and_a_missing_frictionless_profile_are_told() -> None:
-    def told(*friction: float) -> str:
-        return " ".join(map(str, notes(comparison(friction_grid=np.array(friction)))))
-
-    assert "between the friction coefficients 0 and 0.2" in told(0.0, 0.2, 0.3, math.inf)
-    assert "p0_max is that of friction 0.1" in told(0.1, 0.2, 0.3, math.inf)
-    # Past the friction at which a contact sticks nearly wholly, little changes.
-    assert told(*FRICTION) == told(0.0, 0.1, 0.2, 0.3, math.inf) == ""
-
-
-def messages(
-    incremental: BoundedEstimate, total: BoundedEstimate, macroscopic: float | None = None
-) -> str:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    scan = SimpleNamespace(synthetic=False, film=film, indenter=Sphere(radius=0.1))
-    profiles = (SimpleNamespace(scan=scan, load_uncertainty=None),)
-    told = (Message("measured", "from the measured stress"),)
-    measured: Any = SimpleNamespace(scans=(scan,), profiles=profiles, messages=told)
-    joint = {"dry": {"incremental": incremental, "total": total}}
-    sliding = None if macroscopic is None else (macroscopic, None)
-    return "\n".join(map(str, comparison_messages(measured, {}, joint, (), sliding)))
-
-
-def test_definitions_of_the_loading_that_disagree_are_told() -> None:
-    near = reading(0.25, 0.2, 0.3)
-    far = reading(0.29, 0.24, 0.36)
-    assert "disagree for the dry loads by 0.04" in messages(near, far)
-    assert "disagree" not in messages(near, reading(0.26, 0.21, 0.31))
-    bound = reading(None, 0.2, None)
-    # A bound and a value agree where the interval of the value reaches beyond the bound.
-    assert "disagree" not in messages(bound, far)
-    assert "disagree" not in messages(bound, bound)
-    text = messages(reading(None, 0.4, None), far)
-    assert "loads: above 0.40 (95 %) by incremental loading, 0.29 [0.24, 0.36] by total" in text
-
-
-def test_the_macroscopic_coefficient_is_held_against_the_interval() -> None:
-    one = reading(0.12, 0.08, 0.17)
-    assert "is smaller than the macroscopic one, 1.6" in messages(one, one, 1.6)
-    assert "is larger than the macroscopic one, 0.05" in messages(one, one, 0.05)
-    assert "agrees with the macroscopic one, 0.1" in messages(one, one, 0.1)
-    bound = reading(None, 0.2, None)
-    assert "does not contradict the macroscopic one, 1.6" in messages(bound, bound, 1.6)
-    text = messages(one, one)
-    assert "Young's modulus, Poisson's ratio, film thickness, sphere radius, load" in text
-    assert "from the measured stress" in text
 
 
 def test_points_within_both_extremes_and_their_uncertainty_are_bracketed() -> None:

@@ -13,27 +13,14 @@ from helpers.scans import LINEAR_FILM, simulate
 from scipy.optimize import curve_fit
 
 import memscal
-from memscal import EvenGrid, Scan, StressProfile
+from memscal import Scan, StressProfile
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.deconvolution.division import DivisionProblem
 from memscal.model.arrays import FloatArray
 from memscal.parallel import worker_pool
 
 pytestmark = pytest.mark.benchmark
 
 WIDTH = 16e-3
-STRESS_WIDTH = 0.9e-3
-BLURRED_WIDTH = 1.06e-3
-WEAKEST = 1e-3
-
-
-def division_problem(pixels: int) -> DivisionProblem:
-    """Two Gaussians on a plane of ``pixels`` by ``pixels``, of which a quarter is kept."""
-    grid = EvenGrid(pixels // 2 + 1, WIDTH / pixels)
-    voltage, stress = (unit_gaussian(grid.radius, w) for w in (BLURRED_WIDTH, STRESS_WIDTH))
-    # Grids remember their wavenumbers; neither side of a comparison is to compute them.
-    assert grid.wavenumber.size == voltage.size
-    return DivisionProblem(grid, voltage, stress, WEAKEST**1.4, WEAKEST)
 
 
 @pytest.fixture(scope="module")

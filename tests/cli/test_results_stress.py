@@ -109,9 +109,3 @@ def test_a_contact_that_was_unloaded_is_not_varied(contact: memscal.Contact):
     released = memscal.indent(contact.film, sphere, load=[1.0, 0.4], friction=0.3)[1]
     with pytest.raises(InputError, match="not reached by loading alone"):
         released.ufloats()
-
-
-def test_a_contact_tabulates_its_stress(contact: memscal.Contact):
-    table = contact.to_dataframe()
-    assert table["sigma_zz (kPa)"].max() == pytest.approx(contact.max_base_stress / 1e3)
-    assert contact.to_dict()["depth"] == {"value": pytest.approx(contact.depth * 1e6), "unit": "um"}
