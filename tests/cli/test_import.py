@@ -158,6 +158,21 @@ def test_the_table_itself_is_never_replaced(run: Run, table: Path):
     assert table.read_bytes() == before
 
 
+@pytest.mark.parametrize(("arguments", "code", "words"), [
+    (["--load", 80, "--load-unit", "g"], 3, "80 g weigh 0.785 N"),
+    (["--load", 1, "--sheet", "A"], 3, "--sheet) has no effect on a text"),
+    (["--load", 1, "--indenter", "sphere"], 2, "--radius"), (["--figure", "a.png"], 2, "--holds"),
+    ([*SET_UP, "--thickness", 1500], 3, "Probably 1.5 mm was meant"),
+    ([*SET_UP, "--thickness", 0.02], 3, "times the film's thickness of 0.02 mm"),
+])  # fmt: skip
+@pytest.mark.filterwarnings("default::memscal.errors.UnitWarning")
+def test_an_option_without_effect_or_of_no_set_up_is_refused(
+    run: Run, table: Path, folder: Path, arguments, code, words
+):
+    run("import", table, "-o", "scan.h5", *COLUMNS, *arguments).exits(code, words)
+    assert names(folder) == ["scan.csv"]
+
+
 def test_a_log_of_presses_is_averaged_and_drawn(run: Run, folder: Path):
     x = np.repeat(np.linspace(-8, 8, 17), 20)
     load = np.tile(np.repeat([0.0, 1.0], 10), 17)

@@ -8,8 +8,6 @@ from helpers.console import Run, names
 from helpers.records import assert_same
 
 import memscal
-from memscal.cli.options import FILM_LAWS
-from memscal.model.film import LAWS
 
 
 def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
@@ -45,27 +43,3 @@ def test_options_mean_their_units(run: Run, folder: Path):
     assert truth["baseline"] == pytest.approx(0.02 * largest)
     assert truth["drift"] == pytest.approx(-0.01 * largest)
     assert done.json["truth"]["conversion_constant"]["value"] == pytest.approx(2e-4)
-
-
-def test_a_sum_of_gaussians_is_stored_as_truth(run: Run, folder: Path):
-    ring = ["--sigma", 700, "--weight", 1.5, "--sigma", 400, "--weight", -0.5]
-    assert run("simulate", "-o", "ring.h5", *ring).code == 0
-    truth = memscal.read_scan("ring.h5").synthetic
-    assert (truth["kernel_weights"], truth["kernel_sigmas_um"]) == ("1.5, -0.5", "700, 400")
-
-
-def test_noise_and_law_may_be_left_unstated(run: Run, folder: Path):
-    silent = ["--no-state-noise", "--no-state-law"]
-    assert "neo-hookean" in run("simulate", "-o", "scan.h5", *silent).exits(0).out
-    scan = memscal.read_scan("scan.h5")
-    assert (scan.u_zz_errors, scan.film.law, scan.rod_friction) == (None, "", None)
-
-
-def test_a_linear_film_and_its_rod_are_simulated_on_request(run: Run, folder: Path):
-    linear = ["--film-law", "linear", "--rod-friction", "0"]
-    shown = run("simulate", "-o", "scan.h5", "--points", 9, *linear, "--json").exits(0).json
-    scan = memscal.read_scan("scan.h5")
-    assert (scan.film.law, scan.rod_friction) == ("linear", 0.0)
-    assert (shown["truth"]["film_law"], shown["truth"]["rod_friction"]["value"]) == ("linear", 0.0)
-    assert "sliding freely" in run("calibrate", "scan.h5", "--dry-run").out
-    assert FILM_LAWS == LAWS

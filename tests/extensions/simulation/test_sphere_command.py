@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.console import Run, names, run_program
-from helpers.records import assert_same
 
 import memscal
 from memscal.extensions.simulation.command import FILES
@@ -16,19 +15,6 @@ FEW = ("--load", 0.69, "--lubricated-load", 0.69, "--contacts", 9, "--spacing", 
 
 def scans(folder: Path) -> dict[str, memscal.Scan]:
     return {name: memscal.read_scan(folder / name) for name in FILES}
-
-
-def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
-    run(*SPHERE).exits(0)
-    assert names(folder) == ["synthetic_experiment"]
-    assert names(folder / "synthetic_experiment") == sorted(FILES)
-    own = memscal.simulate_experiment()
-    assert list(FILES) == [f"{name}.h5" for name in own.scans]
-    found = scans(folder / "synthetic_experiment")
-    # The options of a film have no roughness.
-    but = ("source", "roughness_rms", "roughness_rms_uncertainty")
-    for scan, expected in zip(found.values(), own.scans.values(), strict=True):
-        assert_same(scan, expected, but=but, rtol=1e-12)
 
 
 def test_options_mean_their_units(run: Run, folder: Path):
@@ -51,20 +37,6 @@ def test_options_mean_their_units(run: Run, folder: Path):
     assert [item["scan"] for item in done.json["scans"]] == [f"run/{name}" for name in FILES]
     assert done.json["synthetic"] is True
     assert done.json["scans"][1]["truth"]["position_error"]["value"] == pytest.approx(5.0)
-
-
-def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, folder: Path):
-    still = [*FEW, "--load-scatter", 0]
-    slip = ["--friction", "inf", "--slip-length", 3]
-    done = run(*SPHERE, "-o", "slip", *still, *slip, "--json").exits(0)
-    told = memscal.read_scan("slip/sphere_dry.h5").synthetic
-    assert (told["friction"], told["slip_length"]) == (np.inf, pytest.approx(3e-6))
-    assert done.json["scans"][1]["truth"]["friction"] == "inf"
-    run(*SPHERE, "-o", "rough", *still, "--exponential", 1, 0.5).exits(0)
-    for name in FILES[1:]:
-        told = memscal.read_scan(f"rough/{name}").synthetic
-        assert told["decay_length"] == pytest.approx(1e-6)
-        assert told["reference_pressure"] == pytest.approx(0.5e6)
 
 
 def test_existing_scans_are_replaced_only_if_it_is_asked_for(run: Run, folder: Path):
