@@ -6,9 +6,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.builders import scan_points
-from helpers.scans import shear_scan, simulated
+from helpers.scans import shear_scan
 from matplotlib.collections import PolyCollection, QuadMesh
-from matplotlib.patches import Rectangle
 
 import memscal
 from memscal.figures.calibration import calibration_figure
@@ -136,17 +135,6 @@ def test_an_outlier_is_drawn_at_the_edge_and_does_not_stretch_the_axis(make_appa
     assert any(x in np.asarray(xs) and np.all(low < ys) and np.all(ys < high) for xs, ys in shown)
 
 
-def test_without_uncertainties_the_residuals_say_what_they_are_divided_by(make_apparatus):
-    data = make_apparatus()
-    record = data.reconvolution
-    exact = replace(record, u_zz_errors=np.zeros_like(record.u_zz_errors))
-    data = replace(data, reconvolution=exact)
-    axes = panels(calibration_figure(data))["residuals"]
-    assert "own rms" in axes.get_ylabel()
-    _, z = line(axes, "G: rms")
-    assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0)
-
-
 def test_the_band_of_g_is_two_standard_uncertainties_either_way(make_apparatus, drawn):
     data = make_apparatus()
     axes = panels(drawn())["radial"]
@@ -219,34 +207,6 @@ def test_a_raster_has_maps_of_voltage_residual_and_g(make_apparatus):
         assert unit in bar.get_ylabel()
 
 
-def test_points_on_no_lattice_are_dots_at_their_places(make_apparatus):
-    data = make_apparatus("radii", 25)
-    scan = data.reconvolution
-    shifted = scan.offset_x + np.random.default_rng(1).uniform(-3e-4, 3e-4, scan.x.size)
-    data = replace(data, reconvolution=replace(scan, offset_x=shifted))
-    (dots,) = panels(calibration_figure(data))["voltage map"].collections
-    wanted = np.stack([shifted, scan.offset_y], axis=1) * 1e3
-    np.testing.assert_allclose(np.asarray(dots.get_offsets()), wanted)
-
-
-def test_each_of_several_loads_has_a_panel_and_a_colour(make_apparatus):
-    data = make_apparatus(points=33, loads=(0.5, 1.0, 2.0))
-    figure = calibration_figure(data)
-    named = [a for a in figure.axes if any(t.get_text().endswith(" N") for t in a.texts)]
-    assert [a.texts[0].get_text() for a in named] == ["0.5 N", "1 N", "2 N"]
-    for i, axes in enumerate(named):
-        drawn = axes.containers[0].lines[0].get_ydata()
-        np.testing.assert_allclose(drawn, data.reconvolution.u_zz[33 * i : 33 * i + 33] * 1e3)
-    residuals = panels(figure)["residuals"]
-    marks = [curve(residuals, f"{load} N: rms") for load in ("0.5", "1", "2")]
-    looks = [(each.get_color(), each.get_marker()) for each in marks]
-    assert len(set(looks)) == 3
-    for axes, points in zip(named, panels(figure)["scan_log"].containers, strict=True):
-        shown = (points.lines[0], axes.containers[0].lines[0])
-        assert [(each.get_color(), each.get_marker()) for each in shown] == [looks.pop(0)] * 2
-    assert "0.5 N to 2 N" in texts(figure)
-
-
 @pytest.mark.parametrize(
     "name", ["$x_{$ \\frac", "<b>&amp;</b>", "传感器 \x07", "a" * 400, "", "line\nbreak"]
 )
@@ -272,15 +232,6 @@ def test_the_settings_of_matplotlib_are_given_back(make_apparatus):
         figure = calibration_figure(make_apparatus())
         assert dict(mpl.rcParams) == before
     assert panels(figure)["scan"].get_facecolor() == (1.0, 1.0, 1.0, 1.0)
-
-
-def test_a_line_along_y_says_so_and_stands_at_its_centre():
-    calibration = memscal.calibrate(replace(simulated(points=33), direction="y"))
-    axes = panels(calibration.plot())["scan_log"]
-    assert axes.get_xlabel() == "position $y$ (mm)"
-    (rod,) = [each for each in axes.patches if isinstance(each, Rectangle)]
-    centre = rod.get_x() + rod.get_width() / 2
-    assert centre == pytest.approx(1e3 * calibration.apparatus.parameters["centre_y"])
 
 
 @pytest.fixture(scope="module")
