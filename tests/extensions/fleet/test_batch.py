@@ -268,28 +268,33 @@ def test_a_summary_of_no_batch_or_of_several_units_is_refused(copy: Path, run: R
     run("summary", copy / "results").exits(3, "is damaged", "--resume")
 
 
+def fleet_of(a: np.ndarray, sigma: np.ndarray, error: float | np.ndarray) -> FleetResults:
+    """Return results of sensors without places, of these A and widths."""
+    errors = error * np.ones(a.size)
+    blank = np.full(a.size, np.nan)
+    return FleetResults(
+        paths=["scan.h5"] * a.size,
+        conversion_constant=a,
+        conversion_constant_errors=errors,
+        gaussian_sigma=sigma,
+        gaussian_sigma_errors=errors,
+        wafer_x=blank,
+        wafer_y=blank,
+        failed={},
+        errors={},
+        unit="mV/Pa",
+    )
+
+
 @pytest.mark.parametrize("count", [4, 8, 20, 100])
 def test_sensors_that_scatter_by_chance_are_no_outliers(count: int) -> None:
     rng = np.random.default_rng(count)
     batches = 400
-    alarms = 0
-    for _ in range(batches):
-        values = rng.normal(1.0, 0.02, (2, count))
-        blank = np.full(count, np.nan)
-        names = ("conversion_constant", "gaussian_sigma")
-        fleet = FleetResults(
-            paths=["scan.h5"] * count,
-            **dict(zip(names, values, strict=True)),
-            **{f"{name}_errors": 0.02 + 0 * blank for name in names},
-            wafer_x=blank,
-            wafer_y=blank,
-            failed={},
-            errors={},
-            unit="mV/Pa",
-        )
-        alarms += bool(outliers(fleet))
+    drawn = [rng.normal(1.0, 0.02, (2, count)) for _ in range(batches)]
+    alarms = sum(bool(outliers(fleet_of(*values, 0.02))) for values in drawn)
     assert alarms <= binom.ppf(1 - 1e-3, batches, 0.02)
-    assert outliers(replace(fleet, conversion_constant=np.append(values[0][1:], 9.0)))
+    a, sigma = drawn[-1]
+    assert outliers(fleet_of(np.append(a[1:], 9.0), sigma, 0.02))
 
 
 def test_a_summary_says_what_is_missing_mixed_repeated_and_overridden(
@@ -367,20 +372,7 @@ def test_a_list_of_which_no_scan_is_there_is_refused(folder: Path, run: Run) -> 
 
 def test_a_sensor_apart_from_equal_ones_is_an_outlier() -> None:
     values = np.array([1.0] * 9 + [2.0])
-    blank = np.full(10, np.nan)
-    errors = {f"{n}_errors": 0.01 * values for n in ("conversion_constant", "gaussian_sigma")}
-    fleet = FleetResults(
-        paths=["scan.h5"] * 10,
-        conversion_constant=values,
-        gaussian_sigma=values,
-        **errors,
-        wafer_x=blank,
-        wafer_y=blank,
-        failed={},
-        errors={},
-        unit="mV/Pa",
-    )
-    assert list(outliers(fleet)) == [9]
+    assert list(outliers(fleet_of(values, values, 0.01 * values))) == [9]
 
 
 def test_a_manifest_that_may_not_be_read_is_refused(
