@@ -73,7 +73,9 @@ def run_pytest(session: nox.Session, *arguments: str) -> None:
 def tests(session: nox.Session) -> None:
     """Test the built wheel: unit tests and doctests."""
     with outside_the_checkout(session, requirements=group("test")):
-        everything = ("tests", "--pyargs", "memscal")
+        rooms = ("accuracy", "benchmarks", "judges", "pages")  # they have sessions of their own
+        elsewhere = [f"--ignore=tests/{room}" for room in rooms]
+        everything = ("tests", *elsewhere, "--pyargs", "memscal")
         run_pytest(session, *IN_PARALLEL, "--durations=20", *(session.posargs or everything))
 
 
@@ -81,7 +83,7 @@ def tests(session: nox.Session) -> None:
 def studies(session: nox.Session) -> None:
     """Run the statistical studies, and those against other programs, in reduced form."""
     with outside_the_checkout(session, requirements=group("test")):
-        run_pytest(session, *IN_PARALLEL, "tests/accuracy", "-m", "accuracy", *session.posargs)
+        run_pytest(session, *IN_PARALLEL, "tests", "-m", "accuracy", *session.posargs)
 
 
 @nox.session
@@ -104,10 +106,11 @@ def benchmarks(session: nox.Session) -> None:
 
 @nox.session(default=False)
 def accuracy(session: nox.Session) -> None:
-    """Run the statistical studies in full, over every seed."""
+    """Run studies and tests in full: over every seed, in every case."""
     with outside_the_checkout(session, requirements=group("test")):
         session.env["MEMSCAL_FULL_STUDY"] = "1"
-        run_pytest(session, *IN_PARALLEL, "tests/accuracy", "-m", "accuracy", *session.posargs)
+        every = ("tests", "-m", "not benchmark and not judges and not pages")
+        run_pytest(session, *IN_PARALLEL, *every, *session.posargs)
 
 
 @nox.session(default=False)

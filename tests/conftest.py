@@ -50,6 +50,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [item for item in items if item not in full]
 
 
+def pytest_collection_finish() -> None:
+    """Keep what was collected out of later searches for garbage, of which each would visit it."""
+    gc.freeze()
+
+
 @pytest.fixture
 def seed() -> int:
     """Return another seed in every run; the log of a failed test names it."""
@@ -78,6 +83,18 @@ def _every_file_is_valid(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(writer, "tree_to_bytes", validated)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _contacts_are_kept_for_this_run_alone(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[None]:
+    """Share calculated contacts among tests and workers, and begin from cold."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", os.fspath(shared / "cache"))
         yield
 
 

@@ -184,11 +184,8 @@ def test_the_page_on_mechanics_prints_what_it_shows(folder: Path, run: Run) -> N
     assert run_examples("mechanics.md")["down"].load == pytest.approx(1.37)
 
 
-def test_the_way_from_contacts_to_friction_prints_what_is_shown(
-    folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The whole chain, from files only; in a cache of its own, so that it starts from cold."""
-    monkeypatch.setenv("XDG_CACHE_HOME", os.fspath(folder / "cache"))
+def test_the_way_from_contacts_to_friction_prints_what_is_shown(folder: Path, run: Run) -> None:
+    """The whole chain, from files only."""
     printed = follow("measured_stress.md", run) | follow("friction.md", run)
     assert {"contacts.stress.h5", "contacts.png", "friction.png"} <= set(os.listdir(folder))
     for command, page in (("apply", "measured_stress.md"), ("compare", "friction.md")):

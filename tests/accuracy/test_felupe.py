@@ -125,4 +125,4 @@ def test_the_film_under_a_rod_agrees_with_felupe(friction, loads, fold) -> None:
     linear = indent(FILM, ROD, load=loads[-1], friction=friction, strain="linear")
     difference = spectrum / linear.base_spectrum(WAVENUMBERS * 1e3) - 1
     # More is compared than a linear film.
-    assert np.max(difference) > 0.3 * loads[-1] if sticking else 0.015
+    assert np.max(difference) > (0.3 * loads[-1] if sticking else 0.015)

@@ -3,8 +3,8 @@
 Each experiment is a rod scan and the scans of a sphere, dry and lubricated, with noise, scatter of
 loads and positions, and film, radii and loads drawn from their uncertainties.  Its contacts are
 solved with rings that are refined load by load, those of the analysis with 56.  Set
-MEMSCAL_FULL_STUDY for the 400 seeds and four coefficients of docs/accuracy.md in place of 4 and 2,
-by which a coverage of two thirds is found; tests/friction/test_effective.py counts that of drawn
+MEMSCAL_FULL_STUDY for the 400 seeds and four coefficients of docs/accuracy.md in place of 12 and
+two, by which a coverage of 70 % is found; tests/friction/test_effective.py counts that of drawn
 voltages by the hundred.
 """
 
@@ -30,8 +30,8 @@ from memscal.friction.results import FrictionComparison
 
 pytestmark = pytest.mark.accuracy
 
-SEEDS = 400 if FULL else 4
-FEW = 50 if FULL else 2  # of coefficients that no interval is counted at
+SEEDS = 400 if FULL else 12
+FEW = 50 if FULL else 3  # of coefficients that no interval is counted at
 FRICTIONS = (0.0, 0.1, 0.2) if FULL else (0.0, 0.2)
 CHANCE = 1e-3 if FULL else 1e-2
 

@@ -23,6 +23,7 @@ from memscal.model.checks import QualityCheck
 
 pytestmark = pytest.mark.filterwarnings("ignore::memscal.errors.UnitWarning")
 
+FULL = pytest.mark.full_study
 SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
 SCAN = memscal.simulate(film=LINEAR_FILM, seed=65)
 
@@ -58,11 +59,11 @@ ELSEWHERE = replace(
 @pytest.mark.parametrize(
     ("scan", "options", "words", "truth", "within"),
     [
-        (altered(film=1.25), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
+        pytest.param(altered(film=1.25), {}, r"thickness\) of NUMBER mm", 2.0, 0.1, marks=FULL),
         (altered(film=2), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
         (altered(film=10), {}, r"thickness\) of NUMBER mm .*mm stated as cm", 2.0, 0.1),
-        (altered(x=0.8), {}, r"data/x\) NUMBER times", 1.25, 0.1),
-        (altered(x=0.5), {}, r"data/x\) NUMBER times", 2.0, 0.1),
+        pytest.param(altered(x=0.8), {}, r"data/x\) NUMBER times", 1.25, 0.1, marks=FULL),
+        pytest.param(altered(x=0.5), {}, r"data/x\) NUMBER times", 2.0, 0.1, marks=FULL),
         (altered(x=0.1), {}, r"data/x\) NUMBER times .*cm stated as mm", 10.0, 0.1),
         (altered(THICK_ROD, rod=1e-3), {}, r"radius\) of NUMBER mm", 0.7, 0.1),
         # A rod much narrower than the film is thick leaves no trace: a limit is all there is.
@@ -79,7 +80,13 @@ def test_a_narrow_scan_is_refused_with_the_value_at_which_it_fits(
     assert float(value[1]) == pytest.approx(truth, rel=within)
 
 
-@pytest.mark.parametrize("method", regulariser_names())
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(name, marks=[] if name in ("bayesian", "white-noise") else FULL)
+        for name in regulariser_names()
+    ],
+)
 def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
     path = Path(shutil.copy(SHIPPED, tmp_path / "scan.h5"))
     with h5py.File(path, "r+") as file:

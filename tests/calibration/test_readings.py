@@ -56,7 +56,12 @@ def test_a_film_that_the_reference_does_not_need_changes_nothing(bare, thickness
 
 @pytest.mark.parametrize(
     ("unit", "factor", "shown"),
-    [("A", 1e-9, "pA/Pa"), ("T", 1e-4, "uT/Pa"), ("Pa", 1e6, ""), ("1", 1e5, "1/Pa")],
+    [
+        ("A", 1e-9, "pA/Pa"),
+        ("Pa", 1e6, ""),
+        pytest.param("T", 1e-4, "uT/Pa", marks=pytest.mark.full_study),
+        pytest.param("1", 1e5, "1/Pa", marks=pytest.mark.full_study),
+    ],
 )
 def test_readings_in_another_unit_are_volts_times_a_factor(bare, tmp_path, unit, factor, shown):
     scan = without_set_up(scaled(factor, unit))

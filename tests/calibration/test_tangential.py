@@ -1,6 +1,6 @@
 """A tangential channel's calibration: its truth found, its parity and sign held, its refusals.
 
-Set MEMSCAL_FULL_STUDY for 300 seeds in place of 60.
+Set MEMSCAL_FULL_STUDY for 300 seeds in place of 21.
 """
 
 import os
@@ -28,7 +28,7 @@ import memscal
 from memscal import Calibration, GaussianMixture, QualityCheck, Scan
 from memscal.errors import InputError
 
-SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
+SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 21
 CHANCE = 1e-4
 RING = GaussianMixture((1.5, -0.5), (500e-6, 300e-6))
 OTHERS = {

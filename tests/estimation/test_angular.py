@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.rasters import tailed_raster
+from helpers.bounds import FULL
 from helpers.scans import estimated, simulated
 from scipy.signal import fftconvolve
 
@@ -12,14 +12,24 @@ import memscal
 from memscal.estimation.angular import ORDERS, AngularDepartures, AngularRings
 from memscal.estimation.outliers import raster_noise
 from memscal.estimation.points import measured_points
+from memscal.model.scan import Scan
 
 RADII = np.array([0.3e-3, 0.8e-3])
 ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
 
 
+def tailed_raster(*, seed: int, side: int) -> Scan:
+    """Raster of a sensor with a tail along x, and of noise that it does not state."""
+    clean = simulated(raster=True, points=side, half_range=6e-3, noise=0.0)
+    u = clean.u_zz + 0.3 * np.roll(clean.u_zz, side // 8, axis=1)
+    noise = 0.005 * float(u.max())
+    u += np.random.default_rng(seed).normal(0.0, noise, u.shape)
+    return replace(clean, u_zz=u, u_zz_errors=None, synthetic={"noise": noise})
+
+
 def test_kernels_are_blurred_rings_of_their_order() -> None:
     blur = 0.25e-3
-    axis = np.arange(-60, 61) * 0.05e-3
+    axis = np.arange(-30, 31) * 0.1e-3
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
     departures = AngularDepartures(AngularRings(RADII, blur), ONE_EACH)
     kernels = departures.at(x, y, np.eye(departures.count))
@@ -39,9 +49,9 @@ def test_signals_are_the_convolutions_of_the_kernels() -> None:
     model = estimated(scan).model
     step = 0.05e-3
     axis = step * np.arange(-240, 241)
-    stress = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(
-        np.hypot.outer(axis, axis)
-    )
+    r = np.linspace(0.0, 17e-3, 2001)
+    radial = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(r)
+    stress = np.interp(np.hypot.outer(axis, axis), r, radial)
     departures = AngularDepartures(AngularRings(RADII, 0.3e-3), ONE_EACH)
     unit = np.eye(departures.count)
     x, y = (a.ravel() for a in np.meshgrid(axis, axis))
@@ -54,10 +64,11 @@ def test_signals_are_the_convolutions_of_the_kernels() -> None:
         np.testing.assert_allclose(signal, field[rows, columns], atol=2e-4 * field.max())
 
 
-@pytest.mark.parametrize("side", [33, 49])
+@pytest.mark.parametrize("side", [33, pytest.param(49, marks=pytest.mark.full_study)])
 def test_noise_of_a_raster_is_not_what_is_not_round(side: int) -> None:
     ratios = []
-    for seed in range(10):
+    seeds = 10 if FULL else 3
+    for seed in range(seeds):
         scan = tailed_raster(seed=seed, side=side)
         points = measured_points(scan)
         # What is not round is left over: many times the noise.
@@ -66,7 +77,7 @@ def test_noise_of_a_raster_is_not_what_is_not_round(side: int) -> None:
         ratios.append((raster_noise(points, residual) or np.nan) / scan.synthetic["noise"])
         if seed == 0:
             assert np.abs(estimate.oval).max() > 10 * scan.synthetic["noise"]
-    assert np.mean(ratios) == pytest.approx(1.0, abs=0.03)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 * np.sqrt(10 / seeds))
 
 
 def test_noise_by_repeats_is_that_within_each_place() -> None:

@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.scans import CONVERSION, SIGMA, estimated, simulated
 from scipy.signal import fftconvolve
 from scipy.stats import chi2
@@ -14,29 +15,28 @@ from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.estimation.ellipse import elliptic_columns, elliptic_departure
 from memscal.model.scan import Scan
 
-SEEDS = 8
-
-
+SEEDS = 40 if FULL else 8
 AXIS = np.arange(-240, 241) * 0.05e-3
+BASE = {"raster": True, "points": 17, "half_range": 4e-3}
 
 
 @lru_cache
-def stress() -> np.ndarray:
-    """The rod's stress on the fine grid."""
-    base = simulated()
-    distances, places = np.unique(np.hypot.outer(AXIS, AXIS), return_inverse=True)
+def unblurred() -> tuple[Scan, np.ndarray]:
+    """The layout of the raster, and the rod's stress on a fine grid."""
+    base = simulated(**BASE, noise=0.0, baseline=0.0, drift=0.0)
     contact = memscal.indent(base.film, base.indenter, load=base.load)
-    return contact.base_stress(distances)[places].reshape(AXIS.size, AXIS.size)
+    r = np.linspace(0.0, 17e-3, 2001)
+    return base, np.interp(np.hypot.outer(AXIS, AXIS), r, contact.base_stress(r))
 
 
 @lru_cache
 def clean_scan(e: tuple[float, float]) -> Scan:
     """A raster through an elliptic Gaussian, convolved on a fine grid: not by harmonics."""
-    base = simulated(raster=True, points=17, half_range=4e-3, noise=0.0, baseline=0.0, drift=0.0)
+    base, stress = unblurred()
     step = AXIS[1] - AXIS[0]
     kernel = elliptic_departure(AXIS, AXIS, SIGMA, np.array(e))
     kernel = kernel + unit_gaussian(np.hypot.outer(AXIS, AXIS), SIGMA)
-    field = CONVERSION * fftconvolve(stress(), kernel, mode="same") * step**2
+    field = CONVERSION * fftconvolve(stress, kernel, mode="same") * step**2
     # The raster's points lie on the fine grid, but for the centre: 0.15 mm, three of its steps.
     places = np.rint((base.x - 0.15e-3) / step).astype(int) + 240
     return replace(base, u_zz=field[np.ix_(places, places)], synthetic=None)
@@ -54,7 +54,7 @@ def elliptic_scan(e: tuple[float, float], noise: float, seed: int = 0) -> Scan:
 def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian() -> None:
     e = (0.3, 0.2)
     scan = elliptic_scan(e, noise=0.0)
-    estimate = estimated(simulated(raster=True, points=17, half_range=4e-3))
+    estimate = estimated(simulated(**BASE))
     geometry = estimate.model.geometry(np.array([0.15e-3, 0.15e-3]))
     found = CONVERSION * elliptic_columns(estimate.model, geometry, SIGMA, np.array(e))[0][:, 0]
     np.testing.assert_allclose(found, scan.u_zz.ravel(), atol=2e-4 * scan.u_zz.max())

@@ -6,6 +6,7 @@ import sys
 import tracemalloc
 import zlib
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ path = pathlib.Path(sys.argv[1])
 good = path.read_bytes()
 heap = good.rfind(b"GCOL")
 read = refused = 0
-for i in range(8, len(good), 97):
+for i in range(8, len(good), 293):
     flipped = good[i] ^ (0xFF if i % 2 else 0x04)
     path.write_bytes(good[:i] + bytes([flipped]) + good[i + 1 :])
     try:
@@ -161,6 +162,12 @@ def test_a_dataset_that_cannot_be_read_safely_is_refused(edited: Edit, make, wor
     assert_refused_cheaply(path, words)
 
 
+@lru_cache
+def compressed(size: int) -> bytes:
+    """Zeros, compressed."""
+    return zlib.compress(bytes(size))
+
+
 @pytest.mark.parametrize(
     "filters",
     [
@@ -175,7 +182,7 @@ def test_a_chunk_that_does_not_unpack_to_its_size_is_refused(edited: Edit, filte
 
     def make(group: h5py.Group) -> h5py.Dataset:
         dataset = group.create_dataset("u_zz", (1024,), "f8", chunks=(1024,), **filters)
-        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(8 * number)))
+        dataset.id.write_direct_chunk((0,), compressed(8 * number))
         return dataset
 
     path = edited(make)
@@ -392,7 +399,7 @@ def test_every_flipped_byte_of_a_heap_of_texts_is_met_without_hanging(path: Path
         del file["/entry/title"], file["/entry/data/x"].attrs["units"]
         file["/entry/title"] = "a title"
         file["/entry/data/x"].attrs["units"] = "mm"
-    sweep = SWEEP.replace("range(8, len(good), 97)", "range(heap, heap + 160)")
+    sweep = SWEEP.replace("range(8, len(good), 293)", "range(heap, heap + 160)")
     assert sum(run_sweep(path, sweep)) == 160
 
 
@@ -451,7 +458,7 @@ def artifact_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1), dense=st.booleans(), bit=st.integers(0, 7))
 def test_a_flipped_bit_of_an_artifact_is_refused_or_harmless(
     artifact_bytes: bytes, tmp_path: Path, where, dense, bit

@@ -206,7 +206,7 @@ def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):
 finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else 0.0)
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     x=hnp.arrays(np.float64, st.integers(1, 700), elements=finite, unique=True),
     missing=st.floats(0, 1),

@@ -50,7 +50,9 @@ def normal() -> Build:
         (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
         (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
         (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
-        (normal(), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+        pytest.param(
+            normal(), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6], marks=pytest.mark.full_study
+        ),
     ],
     ids=["incremental", "total", "elasto-plastic", "exponential"],
 )
@@ -77,8 +79,8 @@ CASES = {
     "smooth": (amontons(), [0.0], 0.0),
     "incremental": (amontons(), [0.2], 0.2),
     "total": (amontons("total"), [0.4], 0.4),
-    "elasto-plastic": (elasto_plastic(1.6), [2.5e-6], 2.5e-6),
-    "exponential": (normal(), list(LENGTHS[[0, 2, 4, 6]]), 3.64e-6),
+    "elasto-plastic": (elasto_plastic(1.6), [1e-6, 2e-6, 3e-6, 4e-6], 2.5e-6),
+    "exponential": (normal(), [1.82e-6, 3.64e-6, 7.28e-6], 3.64e-6),
 }
 UNCERTAIN_FILM = replace(
     FILM,

@@ -137,6 +137,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
     np.testing.assert_allclose(found.slope, (outward[0] - outward[1]) / (2 * step), rtol=1e-5)
 
 
+@pytest.mark.accuracy
 def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(cache) -> None:
     held = []
     held_by_both = []

@@ -14,7 +14,11 @@ RUBBER = replace(FILM, law="neo-hookean")
 
 @pytest.mark.parametrize(
     ("nu", "radius", "depths", "sticking"),
-    [(0.5, 0.125, [0.06], True), (0.495, 0.48, [0.06], False)],
+    [
+        (0.5, 0.125, [0.06], True),
+        (0.495, 0.48, [0.06], False),
+        pytest.param(0.46, 0.56, [0.02, 0.28], True, marks=pytest.mark.full_study),
+    ],
 )
 def test_a_tabulated_rod_is_that_which_is_solved(nu: float, radius, depths, sticking) -> None:
     compare_with_the_table(nu, radius, depths, sticking=sticking)

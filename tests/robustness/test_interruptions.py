@@ -49,14 +49,15 @@ def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def timed(folder: Path) -> float:
-    """How long a run takes; what it writes is removed."""
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> float:
+    """How long a run takes."""
+    folder = tmp_path_factory.mktemp("timed")
+    write_scan(simulate(noise=0.005, seed=1, points=33), folder / "scan.h5")
     begin = time.monotonic()
     process = start(folder, *COMMAND)
     process.communicate()
     assert process.returncode in (0, 1)
-    for name in OUTPUTS:
-        (folder / name).unlink()
     return time.monotonic() - begin
 
 
@@ -71,10 +72,9 @@ def interrupted(folder: Path, number: signal.Signals, delay: float) -> tuple[int
 
 
 def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
-    folder: Path, seed: int
+    folder: Path, seed: int, whole: float
 ) -> None:
     draw = random.Random(seed)
-    whole = timed(folder)
     for _ in range(number(2, 250)):
         code, _ = interrupted(folder, signal.SIGKILL, draw.uniform(0, 1.1 * whole))
         assert code in (0, 1, -signal.SIGKILL)
@@ -91,9 +91,10 @@ def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
     assert {*names(folder)} == OUTPUTS | {"scan.h5"}
 
 
-def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(folder: Path, seed: int) -> None:
+def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(
+    folder: Path, seed: int, whole: float
+) -> None:
     draw = random.Random(seed)
-    whole = timed(folder)
     for _ in range(number(1, 84)):
         for sent, expected in list(CODES.items())[:: 1 if SHARE else 2]:
             code, said = interrupted(folder, sent, draw.uniform(0, whole))
@@ -145,7 +146,7 @@ def test_no_flipped_bit_of_a_file_goes_unnoticed(tmp_path: Path, seed: int) -> N
         path = tmp_path / name
         good = path.read_bytes()
         known = described(path)
-        for _ in range(number(25, 500)):
+        for _ in range(number(12, 500)):
             damaged = bytearray(good)
             at = draw.randrange(len(good))
             damaged[at] ^= 1 << draw.randrange(8)

@@ -84,7 +84,7 @@ def test_entities_neither_grow_nor_open_a_file(tmp_path: Path, name, document_ty
     assert "secret" not in refused(path)
 
 
-@pytest.mark.parametrize("text", ["<a>" * 10**6, f"<VTKFile>{'<b/>' * 10**6}</VTKFile>"])
+@pytest.mark.parametrize("text", ["<a>" * 10**5, f"<VTKFile>{'<b/>' * 10**5}</VTKFile>"])
 def test_absurd_xml_is_refused(tmp_path: Path, text):
     path = tmp_path / "film.vtu"
     path.write_text(text)
@@ -433,7 +433,7 @@ def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path: Path, name):
     else:
         small(path)
     good = path.read_bytes()
-    for i in np.linspace(20, len(good) - 20, 3).astype(int):
+    for i in np.linspace(20, len(good) - 20, 2).astype(int):
         path.write_bytes(good[:i])
         refused(path)
         path.write_bytes(good[:i] + bytes([good[i] ^ 0x15]) + good[i + 1 :])

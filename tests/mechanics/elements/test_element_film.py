@@ -11,6 +11,8 @@ from memscal.mechanics.elements.element_film import ElementFilm
 from memscal.mechanics.film_response import HankelFilm
 
 H = 2e-3
+RATIOS = (0.0, 0.3, 0.495, 0.5)
+FULL = pytest.mark.full_study
 
 
 @cache
@@ -28,7 +30,14 @@ def worst(found: np.ndarray, expected: np.ndarray, scale: np.ndarray) -> float:
     return float(np.max(np.abs(found - expected)) / np.max(np.abs(scale)))
 
 
-@pytest.mark.parametrize(("nu", "width"), [(0.0, 0.5), (0.3, 1.7), (0.495, 0.5), (0.5, 0.5)])
+@pytest.mark.parametrize(
+    ("nu", "width"),
+    [
+        pytest.param(nu, width, marks=[] if (nu, width) in ((0.3, 0.5), (0.5, 1.7)) else FULL)
+        for nu in RATIOS
+        for width in (0.5, 1.7)
+    ],
+)
 def test_surface_and_base_are_as_by_hankel_transforms(nu: float, width: float) -> None:
     ours = elements(nu, width)
     hankel = HankelFilm(ours.film, ours.r)
@@ -86,9 +95,9 @@ def test_finer_triangles_agree_better_with_hankel_transforms() -> None:
 
 def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer() -> None:
     soft = film(0.25)
-    wide = ElementFilm(soft, np.linspace(0, 20 * H, 61), radius=30 * H)
+    wide = ElementFilm(soft, np.linspace(0, 20 * H, 31), radius=30 * H)
     modulus = soft.shear_modulus * 2 * 0.75 / 0.5
-    pressure = np.full(61, 1e4)
+    pressure = np.full(31, 1e4)
     field = wide.field(pressure, 0 * pressure)
     r = np.array([0.0, 2 * H, 5 * H])
     np.testing.assert_allclose(field.surface(r, 0), 1e4 * H / modulus, rtol=1e-6)
