@@ -51,7 +51,7 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
         found.save(f"{channel}.apparatus.h5")
     measured = memscal.measure_stress(made.dry, "zz.apparatus.h5")
     measured.save("dry.stress.h5")
-    ways = ("--friction", 0.1, "--loading", "total", "--no-cache")
+    ways = ("--friction", 0.1, "--loading", "total", "--cache", "kept")
     shear = ("compare", "xz.apparatus.h5", "dry.stress.h5", "--channel", "xz", *ways)
     normal = ("compare", "zz.apparatus.h5", "dry.stress.h5", *ways)
     alone = memscal.compare(

@@ -10,7 +10,7 @@ from scipy.stats import binom, kstest
 from memscal.friction.effective import with_loading
 from memscal.friction.results import BoundedEstimate
 
-SEEDS = 60
+SEEDS = 40
 CHANCE = 1e-4
 TRUTHS = (0.0, 0.1, 0.2, 0.3)
 

@@ -159,7 +159,7 @@ def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> Non
     laboratory = Laboratory.of()
     errors = []
     t = bounded(friction, laboratory.family.scale)
-    for seed in range(100):
+    for seed in range(40):
         along = laboratory.drawn(friction, seed).whole
         i = int(np.argmin(along.deviance))
         errors.append((along.coordinates[i] - t) * np.sqrt(along.information[i]))

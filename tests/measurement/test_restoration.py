@@ -39,8 +39,7 @@ def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> R
     return memscal.restore(scan, EXACT, expected=contact)
 
 
-@pytest.mark.parametrize("load", [0.34, 1.0, 2.75])
-@pytest.mark.parametrize("friction", [0.0, np.inf])
+@pytest.mark.parametrize(("load", "friction"), [(0.34, np.inf), (2.75, 0.0)])
 def test_without_noise_the_calculated_stress_comes_back(load: float, friction: float) -> None:
     found = restored(load, friction, 0, 0.0)
     contact = made.pressed(load, friction)

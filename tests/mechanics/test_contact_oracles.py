@@ -38,8 +38,9 @@ def test_a_cone_on_a_thick_film_is_sneddon_s() -> None:
     assert contact.contact_radius == pytest.approx(2 * contact.depth / (math.pi * slope), rel=5e-4)
 
 
-@pytest.mark.parametrize("friction", [0.1, 1.0, math.inf])
-@pytest.mark.parametrize("loading", ["incremental", "total"])
+@pytest.mark.parametrize(
+    ("friction", "loading"), [(0.1, "incremental"), (1.0, "total"), (math.inf, "incremental")]
+)
 def test_friction_changes_nothing_on_an_incompressible_half_space(friction, loading) -> None:
     thick = film(0.5, thickness=2.0)
     smooth = indent(thick, SPHERE, load=1e-2)
@@ -80,8 +81,9 @@ def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -
     assert small / large == pytest.approx(narrow / wide, rel=0.15)
 
 
-@pytest.mark.parametrize("friction", [0.0, math.inf])
-@pytest.mark.parametrize("nu", [0.0, 0.3, 0.495, 0.5])
+@pytest.mark.parametrize(
+    ("nu", "friction"), [(0.0, math.inf), (0.3, 0.0), (0.495, math.inf), (0.5, 0.0)]
+)
 def test_every_load_increment_is_a_flat_punch_s(nu: float, friction: float) -> None:
     # What is in contact goes down together, and sticks, if it does, where it touched: between two
     # loads a contact is stiff as a rod of its radius (Mossakovskii's argument, on any film).
@@ -123,7 +125,7 @@ def test_the_base_carries_the_load(friction: float, loading: str) -> None:
     ("nu", "friction", "loading"),
     [
         (nu, friction, loading)
-        for nu in (0.3, 0.495, 0.5)
+        for nu in (0.3, 0.5)
         for friction in FRICTIONS
         for loading in ("incremental", "total")
         if nu > 0.4 or loading == "incremental" or friction < 10
