@@ -56,9 +56,6 @@ CHOSEN_ON = {
 """Contacts on which the strength of a pressure's departures was chosen; that choice alone is tested
 on them."""
 
-DISC = memscal.SmoothedDisc(radius=0.8e-3, sigma=0.2e-3)
-OTHER_RING = memscal.GaussianMixture((1.25, -0.25), (0.7e-3, 0.35e-3))
-WIDER = memscal.Rod(radius=0.35e-3)
 CASES = {
     "small sphere": (partial(pressed, 0.6, indenter=SMALL), GAUSSIAN),
     "large sphere": (partial(pressed, 1.8, indenter=LARGE), GAUSSIAN),
