@@ -181,15 +181,6 @@ def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus) ->
     assert apparatus.radial(r).shape == r.shape
 
 
-def test_beyond_the_support_there_is_nothing() -> None:
-    apparatus = with_kernel(np.ones_like)
-    inside = SUPPORT * (1 - 1e-12)
-    outside = SUPPORT * (1 + 1e-12)
-    assert apparatus.radial(inside) == pytest.approx(1.0)
-    np.testing.assert_array_equal(apparatus.radial([outside, -outside, 1.0]), 0.0)
-    np.testing.assert_array_equal(apparatus.radial_uncertainty([outside, 1.0]), 0.0)
-
-
 @pytest.mark.parametrize(
     ("r", "sigma", "problem"),
     [

@@ -17,20 +17,6 @@ def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
     return [(one.task, one.done, one.total) for one in heard]
 
 
-@pytest.mark.parametrize(("arguments", "text"), [
-    (("contacts", 137, 500, 30.0), "137 of 500 contacts, 79 s left"),
-    (("contacts", 1, 500, 30.0), "1 of 500 contacts, 4.2 h left"),
-    (("contacts", 500, 500, 30.0), "500 of 500 contacts"),
-    (("rows", 1.5e6, 2e6, 3.0), "1,500,000 of 2,000,000 rows, 1 s left"),
-    (("draws", 0, 9, 0.1), "0 of 9 draws"), (("rows", 1234, 0, 9.0), "1,234 rows"),
-    (("scans", 90, 100, 1.0, 90), "90 of 100 scans"),
-    (("scans", 92, 100, 5.0, 90), "92 of 100 scans, 20 s left"),
-    (("the loading", 0.25, 1.0, 60.0), "25% of the loading, 3 min left"),
-])  # fmt: skip
-def test_progress_in_words_has_the_count_and_the_time_left(arguments, text: str) -> None:
-    assert str(memscal.Progress(*arguments)) == text
-
-
 def test_only_the_outermost_task_is_told_of() -> None:
     heard: list[memscal.Progress] = []
     with reporting(heard.append):

@@ -218,13 +218,3 @@ def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties
     squares = np.sum(np.square(deviates), axis=0)
     low, high = chi2.isf([1 - CHANCE, CHANCE], PASSES)
     assert np.all((low < squares) & (squares < high))
-
-
-def test_one_centre_for_repeats_that_moved_blurs_the_gaussian() -> None:
-    shift = 100e-6
-    choices = ("common", "per-repeat")
-    pairs = [[of_repeats(0.02, s, shift, centre=c) for c in choices] for s in range(PASSES)]
-    widened = [one.gaussian_sigma - own.gaussian_sigma for one, own in pairs]
-    blur = np.hypot(WIDTHS[0.02], shift * np.sqrt(2 / 3)) - WIDTHS[0.02]
-    error = np.std(widened, ddof=1) / np.sqrt(PASSES)
-    assert max(4 * error, blur - 4 * error) < np.mean(widened) < blur + 4 * error

@@ -79,16 +79,6 @@ def test_the_division_joins_scans_of_other_loads_rods_and_films() -> None:
     assert together.uncertainty(name) < min(parameters.uncertainty(name) for parameters in alone)
 
 
-def test_a_scan_along_y_says_what_one_along_x_says() -> None:
-    scan = simulated(noise=0.003)
-    along_x = joint([scan])
-    along_y = joint([replace(scan, direction="y")])
-    assert along_y.conversion_constant == pytest.approx(along_x.conversion_constant, rel=1e-9)
-    assert along_y.parameters["centre_y"] == pytest.approx(along_x.parameters["centre"], rel=1e-9)
-    both = joint([scan, replace(simulated(noise=0.003, seed=7), direction="y")])
-    assert {"centre", "centre_y_2", "drift", "drift_y_2"} <= set(both.parameters.names)
-
-
 def test_lines_and_a_raster_are_fitted_together() -> None:
     raster = simulated(raster=True, points=21, noise=0.003, centre=(0.2e-3, -0.1e-3), kernel=TAILS)
     apparatus = joint([simulated(noise=0.003, kernel=TAILS), raster])

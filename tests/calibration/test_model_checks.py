@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,30 +10,10 @@ from helpers.scans import RING, TAILS, simulated
 import memscal
 from memscal.model.checks import QualityCheck
 
-TABLE = Path(__file__).parent.parent.parent / "docs" / "quality.md"
-
 
 def checks(scan, **options) -> dict[str, QualityCheck]:
     options = {"method": "bayesian"} | options
     return {check.name: check for check in memscal.calibrate(scan, **options).apparatus.checks}
-
-
-def test_the_table_of_checks_lists_those_that_there_are_and_which_have_p_values() -> None:
-    rows = re.findall(r"^\| `(\w+)` +\|(.*)\|$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
-    exact = {name: rest.split("|")[1].strip() == "1/1000" for name, rest in rows}
-    # As the page says above its table, which ends with the checks of contacts.
-    listed = exact | {"reconvolution": False, "constraint": False}
-    assert len(rows) == len(listed)
-    of_contacts = [*listed].index("applied_force")
-    listed = dict([*listed.items()][:of_contacts])
-    scans = [
-        simulated(load=[0.5, 1.5], repeats=2, points=33, branch=[1, 2, 1, 2]),
-        simulated(raster=True, points=17),
-        [simulated(points=33, seed=1), simulated(points=33, seed=2)],
-    ]
-    found = [check for scan in scans for check in checks(scan).values()]
-    found += checks(simulated(points=33), nonnegative=True).values()
-    assert {check.name: check.p_value is not None for check in found} == listed
 
 
 @pytest.mark.parametrize(("options", "there", "absent"), [

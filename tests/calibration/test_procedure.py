@@ -135,25 +135,6 @@ def test_single_points_give_what_rows_give(options: dict[str, Any], method: str)
     np.testing.assert_allclose(*values, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "method", ["bayesian", pytest.param("white-noise", marks=pytest.mark.full_study)]
-)
-def test_a_raster_s_points_may_repeat_and_lie_off_their_places(method: str) -> None:
-    setting = {"raster": True, "points": 25, "centre": (0.3e-3, -0.4e-3)}
-    clean = simulated(noise=0.0, **setting)
-    rng = np.random.default_rng(4)
-    x, y = (np.tile(positions.ravel(), 3) for positions in clean.positions)
-    u = np.tile(clean.u_zz.ravel(), 3) + 0.005 * clean.u_zz.max() * rng.normal(size=x.size)
-    x, y = np.stack([x, y]) + rng.normal(scale=1e-6, size=(2, x.size))
-    repeat = np.repeat([0, 1, 2], clean.u_zz.size)
-    scan = replace(clean, x=x, y=y, u_zz=u, u_zz_errors=None, repeat=repeat)
-    apparatus = memscal.calibrate(scan, method=method).apparatus
-    bounds = cramer_rao(0.005 / np.sqrt(3), **setting)
-    assert_as_stated(apparatus.parameters, clean.synthetic, bounds)
-    # The repeats tell the noise: chi-square has a p-value though no noise is stated.
-    assert {"chi_square", "held_out_repeat"} <= {c.name for c in apparatus.checks}
-
-
 @pytest.mark.parametrize("name", regulariser_names()[:6])
 def test_every_method_gives_a_near_the_truth_and_says_what_it_is(name: str) -> None:
     apparatus = memscal.calibrate(simulated(noise=0.002), method=name).apparatus
@@ -184,14 +165,6 @@ def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
     assert (np.diff(sweep.gaussian_sigma_deconvolved[4:]) > 0).all()
     assert sweep.relative_rms[8] > sweep.relative_rms[0]
     assert sweep.seed_conversion_constant.shape == (9, 2)
-
-
-def test_points_on_no_lattice_cannot_be_swept() -> None:
-    scan = as_points(simulated(raster=True, points=9))
-    scan = replace(scan, x=scan.x + np.random.default_rng(1).normal(scale=0.2e-3, size=scan.x.size))
-    calibration = memscal.calibrate(scan, method="bayesian")
-    with pytest.raises(InputError, match="not evenly spaced"):
-        calibration.sweep(amplitudes=3, draws=1)
 
 
 @pytest.mark.parametrize(

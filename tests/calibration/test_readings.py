@@ -38,22 +38,6 @@ def numbers(apparatus):
     return np.array([[apparatus.parameters[n], apparatus.parameters.uncertainty(n)] for n in names])
 
 
-@pytest.mark.parametrize("thickness", [1e-3, 4e-3])
-def test_a_film_that_the_reference_does_not_need_changes_nothing(bare, thickness):
-    film = replace(FILM, thickness=thickness, thickness_uncertainty=1e-4, law="")
-    scan = replace(SCAN, film=film, load_uncertainty=None)
-    stated = memscal.calibrate(scan, reference=BARE).apparatus
-    np.testing.assert_allclose(numbers(stated), numbers(bare), rtol=1e-12)
-    for name in ("g", "g_errors"):
-        values = [getattr(a.radial_profile, name) for a in (stated, bare)]
-        np.testing.assert_allclose(*values, rtol=1e-12, atol=1e-12 * values[1].max())
-    assert stated.film == film
-    assert bare.film is None
-    assert [c.name for c in stated.checks] == [c.name for c in bare.checks]
-    assert not {"indentation", "width_over_thickness"} & {c.name for c in bare.checks}
-    assert set(stated.budget["conversion_constant"]) == set(bare.budget["conversion_constant"])
-
-
 @pytest.mark.parametrize(
     ("unit", "factor", "shown"),
     [

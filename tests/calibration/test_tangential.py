@@ -189,14 +189,6 @@ def test_a_line_along_y_calibrates_the_other_channel() -> None:
     assert {"centre_y", "drift_y"} <= set(along_y.names)
 
 
-def test_two_scans_together_know_more_than_either() -> None:
-    scans = [shear_scan(seed=seed, noise=0.02) for seed in (8, 9)]
-    together = memscal.calibrate(scans, channel="xz", method="bayesian")
-    found = (calibrated(scans[0]), together)
-    alone, both = (c.apparatus.budget["gaussian_sigma"]["noise"] for c in found)
-    assert both == pytest.approx(alone / np.sqrt(2), rel=0.25)
-
-
 def test_outliers_and_missing_points_move_nothing() -> None:
     scan = shear_scan(seed=10)
     u = scan.channels["u_xz"].copy()

@@ -70,17 +70,6 @@ def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, 
     assert (folder / name).read_bytes()[:4] in (b"\x89HDF", b"\x89PNG", b"<!DO")
 
 
-def test_an_interruption_keeps_the_old(run: Run, scan: Path, monkeypatch: Patch):
-    old = scan.with_name("out.h5")
-    old.write_bytes(OLD)
-    monkeypatch.setattr("memscal.formats.artifact.write_tree", raising(KeyboardInterrupt()))
-    stopped = run("calibrate", scan, "-o", old, "--force").exits(130)
-    assert "Interrupted" in stopped.err
-    assert "Traceback" not in stopped.err
-    assert old.read_bytes() == OLD
-    assert names(old.parent) == ["out.h5", "scan.h5"]
-
-
 def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, monkeypatch: Patch):
     figure = "memscal.figures.calibration.calibration_figure"
     monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))

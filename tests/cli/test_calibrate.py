@@ -1,10 +1,8 @@
 """``memscal calibrate``: what it writes, prints and returns."""
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from helpers.console import Run, names
 from helpers.scans import simulate
@@ -45,17 +43,6 @@ def lawless(folder: Path) -> Path:
     return path
 
 
-def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, lawless: Path):
-    own = run("calibrate", lawless, "--json", "-o", "own.h5").json
-    assert run("reference", "rod", "-o", "rod.h5").code == 0
-    given = run("calibrate", lawless, "--reference", "rod.h5", "--json", "-o", "given.h5").json
-    # The file holds a table of the same solution: to its accuracy nothing changes.
-    assert given["conversion_constant"]["value"] == pytest.approx(
-        own["conversion_constant"]["value"], rel=1e-5
-    )
-    assert memscal.load_apparatus("given.h5").process.input_reference.file_name == "rod.h5"
-
-
 def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Run, lawless: Path):
     run("reference", "rod", "--thickness", "2.1", "-o", "thick.h5")
     both = "2 mm (u 0.02) in the scan scan.h5, 2.1 mm (u not stated) in the reference thick.h5"
@@ -91,21 +78,6 @@ def test_the_seed_of_a_draw_is_recorded(run: Run, scan: Path):
 
 def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
     assert "--seed changes nothing" in run("calibrate", scan, "--seed", 3).err
-
-
-def test_repeats_that_moved_are_given_centres_of_their_own_and_that_is_said(run: Run, folder: Path):
-    scan = memscal.simulate(repeats=2, points=33)
-    x = np.append(scan.x, scan.x + 5e-5)
-    repeat = np.repeat([0, 1], 33)
-    flat = {name: getattr(scan, name).ravel() for name in ("u_zz", "u_zz_errors")}
-    memscal.write_scan(replace(scan, x=x, repeat=repeat, **flat), "moved.h5")
-    done = run("calibrate", "moved.h5", "--figure", "a.svg").exits(0)
-    assert "centre of the scan, repeat 2" in done.out
-    assert "Each of the 2 repeats has its own centre" in done.err
-    assert b"repeats moved to one centre" in Path("a.svg").read_bytes()
-    failed = run("calibrate", "moved.h5", "--centre", "common", "--force", "--json").exits(1)
-    assert failed.json["centres"]["chosen_by"] == "option"
-    run("calibrate", "moved.h5", "--centre", "per-repeat", "--force", "--dry-run").exits(0)
 
 
 def test_the_name_of_the_artifact_keeps_what_is_no_suffix(run: Run, good_scan: Path, folder: Path):

@@ -101,18 +101,6 @@ def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_h
     assert "Effective friction coefficient" in done.out
 
 
-def test_nothing_is_overwritten_without_force(compare: Run, made_by_hand: Give, folder: Path):
-    made_by_hand()
-    (folder / "drawn").mkdir()
-    (folder / "drawn" / "maxima.png").write_bytes(b"mine")
-    assert compare("--figures", "drawn", "--report", "page.html").code == NOT_WRITTEN
-    assert names(folder / "drawn") == ["maxima.png"]
-    assert names(folder) == ["drawn"]
-    assert (folder / "drawn" / "maxima.png").read_bytes() == b"mine"
-    assert compare("--figures", "drawn", "--force").code == 0
-    assert (folder / "drawn" / "maxima.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_folder_is_proven_writable_before_computing(compare: Run, monkeypatch: Patch):
     reached = "The comparison was reached."
     monkeypatch.setattr("memscal.friction.compare.compare", lambda *_, **__: pytest.fail(reached))

@@ -87,55 +87,6 @@ def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Ru
     assert "glycerol" in run("inspect", "each.h5").out
 
 
-def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
-    x = np.arange(9.0)
-    sets = (2.0, 0.5)
-    passes = (1, 2)
-    rows = np.array([(p, s, place, 10 * s + p) for p in passes for s in sets for place in x])
-    rows = np.delete(rows, 4, axis=0)  # a contact that was never made
-    write_table(folder / "sphere.csv", "pass,set,position,voltage", rows)
-    sphere = [*COLUMNS, *SET_UP[2:], "--indenter", "sphere", "--load-column", "set"]
-    both = ["--repeat", "set", "--repeat", "pass", "--position-error", 5]
-    run("import", "sphere.csv", "-o", "sphere.h5", *sphere, *both).exits(0)
-    scan = memscal.read_scan("sphere.h5")
-    assert scan.u_zz.shape == (35,)
-    np.testing.assert_allclose(scan.x_errors, np.full(35, 5e-6))
-    passes = [(0.5, 6e-3), (0.5, 7e-3), (2.0, 21e-3), (2.0, 22e-3)]
-    for i, (load, voltage) in enumerate(passes):
-        line = scan.only_passes(i)
-        assert line.x.size == (8 if i == 2 else 9)
-        np.testing.assert_allclose(line.normal_load, load)
-        np.testing.assert_allclose(line.u_zz, voltage)
-
-
-@pytest.mark.parametrize(
-    ("first", "repeat", "branch"),
-    [
-        ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]),
-        ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
-    ],
-)
-def test_branches_are_words_or_numbers(run: Run, folder: Path, first, repeat, branch):
-    words = [first, "Retreat", "1", "2", "APPROACH", "2.0", "approach", "retreat"]
-    rows = [f"{i // 2},{i},{word}\n" for i, word in enumerate(words)]
-    (folder / "scan.csv").write_text("".join(rows), encoding="utf-8")
-    columns = ["--x", 1, "--x-unit", "mm", "--u", 2, "--u-unit", "mV", "--branch", 3, *repeat]
-    done = run("import", "scan.csv", "-o", "scan.h5", *columns, *SET_UP).exits(0)
-    assert "readings on approach, 4 on retreat" in done.out
-    assert memscal.read_scan("scan.h5").branch.tolist() == branch
-
-
-def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: Run, folder: Path):
-    rows = np.array([(s, place, s) for s in (0.5, 2.0) for place in range(9)])
-    write_table(folder / "mixed.csv", "set,position,voltage", rows[[0, 10, 2, 12, 4, 14]])
-    loads = [*COLUMNS, *SET_UP[2:], "--load-column", "set"]
-    sphere = run("import", "mixed.csv", "-o", "sphere.h5", *loads, "--indenter", "sphere")
-    sphere.exits(0, "Warning: ", "--repeat")
-    assert "Warning" not in sphere.out
-    rod = run("import", "mixed.csv", "-o", "rod.h5", *loads)
-    assert (rod.code, "--repeat" in rod.err) == (0, False)
-
-
 @pytest.mark.parametrize(
     ("arguments", "hints"),
     [

@@ -9,7 +9,6 @@ from scipy.stats import multivariate_normal
 
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.errors import InputError
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.departures import SHAPES
 from memscal.estimation.profile import constrained_profile
@@ -124,18 +123,6 @@ def test_a_ring_is_no_falling_profile_and_its_constrained_fit_misses_the_scan() 
     )
     residual = {a: float(np.sum(a.reconvolution.residual**2)) for a in (free, falling)}
     assert residual[falling] > residual[free]
-
-
-def test_the_method_divides_no_fields_and_has_no_window() -> None:
-    r = np.linspace(0.0, 6e-3, 61)
-    field = memscal.lift(r, np.exp(-((r / 1e-3) ** 2)), 0.1e-3, 8e-3)
-    with pytest.raises(InputError, match="divides no fields"):
-        memscal.divide(field, field, weakest=1e-9, method="bayesian")
-    apparatus = memscal.calibrate(simulated(), method="bayesian").apparatus
-    assert np.all(apparatus.transfer.window == 1.0)
-    assert apparatus.budget["gaussian_sigma_deconvolved"]["window"] == 0.0
-    assert apparatus.gaussian_sigma == pytest.approx(SIGMA, rel=0.1)
-    assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=0.05)
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: f"{s.name} {s.blur} {s.extent}")

@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection, QuadMesh
 
 import memscal
 from memscal.figures.calibration import calibration_figure
-from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.apparatus import ApparatusData
 from memscal.model.scan import StressSensor
 
 
@@ -91,23 +91,6 @@ def test_each_point_is_a_value_or_an_upper_limit_on_the_logarithmic_axis(make_ap
     np.testing.assert_array_equal(np.isfinite(limits), ~(signal > 2 * errors))
     low = np.isfinite(limits)
     np.testing.assert_allclose(limits[low], np.maximum(signal[low], 0) + 2 * errors[low])
-
-
-def test_a_drift_is_taken_off_before_the_logarithm(make_apparatus, drawn):
-    data = make_apparatus()
-    scan = data.reconvolution
-    known = data.parameters
-    tilt = 5e-4 * scan.x / 8e-3  # V: a tenth of the maximum at the scan's end
-    names = ("u_zz", "u_zz_predicted", "u_zz_gaussian")
-    scan = replace(scan, **{name: getattr(scan, name) + tilt for name in names})
-    more = ParameterSet(
-        (*known.names, "drift"), np.append(known.values, 1e-3), np.diag(np.full(6, 1e-12))
-    )
-    figure = calibration_figure(replace(data, reconvolution=scan, parameters=more))
-    tilted = panels(figure)["scan_log"]
-    level = panels(drawn())["scan_log"]
-    for label in ("reconvolved, G", "less than 2u"):
-        np.testing.assert_allclose(line(tilted, label)[1], line(level, label)[1], rtol=1e-6)
 
 
 def test_residuals_are_in_units_of_the_standard_uncertainty(make_apparatus, drawn):

@@ -99,19 +99,6 @@ def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: Friction
         )
 
 
-def test_both_readings_stand_within_their_intervals(found: FrictionComparison):
-    axes = effective_friction_figure(found).axes[0]
-    intervals = [line for line in axes.lines if line.get_gid() == "interval"]
-    values = [line for line in axes.lines if line.get_label() == "_value"]
-    of_dry = found.loads["incremental"][: len(LOADS)]
-    readings = [one.by_maximum for one in of_dry] + [one.by_profile for one in of_dry]
-    assert len(values) == len(readings)
-    for bar, point, reading in zip(intervals, values, readings, strict=True):
-        ends = friction_position([reading.interval.low, reading.interval.high or math.inf])
-        np.testing.assert_allclose(bar.get_ydata(), ends)
-        np.testing.assert_allclose(point.get_ydata(), friction_position([reading.value]))
-
-
 def test_an_open_interval_is_an_arrow_to_infinity_without_a_value():
     sticking = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
     (axes,) = effective_friction_figure(sticking).axes
@@ -140,16 +127,6 @@ def test_the_likelihood_of_a_slip_length_touches_zero_at_it():
     t, rise = (np.asarray(values) for values in curves["tangential, dry"].get_data())
     assert t[np.argmin(rise)] == pytest.approx(1.8 / (1.8 + 3.0), abs=0.01)
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
-
-
-def test_evidence_is_drawn_below_that_of_the_best_law():
-    laws = interface_comparison()
-    axes = of_friction.interface_figure(comparison(interface=laws)).axes[1]
-    drawn = [float(line.get_xdata()[0]) for line in axes.lines if line.get_marker() == "o"]
-    tangential = [law.log_evidence for law in laws.tangential.laws]
-    normal = [law.log_evidence for law in laws.normal.laws]
-    expected = [v - max(tangential) for v in tangential] + [v - max(normal) for v in normal]
-    np.testing.assert_allclose(drawn, expected)
 
 
 def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionComparison):

@@ -187,12 +187,6 @@ def test_a_disk_that_refuses_is_found_before_the_work(target: Path, monkeypatch,
     assert_untouched(target)
 
 
-def test_a_proof_that_succeeds_leaves_no_trace(target: Path):
-    ensure_writable(target, overwrite=True)
-    ensure_writable(target.parent / "new.h5")
-    assert_untouched(target)
-
-
 def three(tmp_path: Path) -> list[Path]:
     """Two old outputs and a new one."""
     paths = [tmp_path / name for name in ("a", "b", "c")]
@@ -236,23 +230,6 @@ def test_files_that_are_written_together_are_all_new_or_all_as_before(
     stated = re.search(r"New is now: (.+?)\. As before is: ", caught.value.why)
     assert [Path(name).name for name in stated[1].split(", ")][::-1] == new if new else not stated
     assert sorted(os.listdir(tmp_path)) == ["a", "b"]
-
-
-@pytest.mark.parametrize("stop", [KeyboardInterrupt, ZeroDivisionError])
-def test_no_file_of_several_is_placed_before_all_are_written(tmp_path: Path, stop):
-    paths = three(tmp_path)
-    with pytest.raises(stop):
-        write_together([*paths, tmp_path / "made" / "d"], stop())
-    assert [path.read_bytes() for path in paths[:2]] == [OLD, OLD]
-    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
-
-
-def test_files_that_are_written_together_are_there_in_the_end(tmp_path: Path):
-    paths = three(tmp_path)
-    write_together([*paths, tmp_path / "made" / "d"])
-    assert {path.read_bytes() for path in paths} == {b"new"}
-    assert os.listdir(tmp_path / "made") == ["d"]
-    assert sorted(os.listdir(tmp_path)) == ["a", "b", "c", "made"]
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o755])

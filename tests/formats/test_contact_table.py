@@ -119,13 +119,6 @@ def test_the_tables_used_longest_ago_make_room(tmp_path: Path, monkeypatch: pyte
     assert {key for key in keys if entry(tmp_path, key).exists()} == {keys[0], keys[2], keys[3]}
 
 
-def test_a_folder_keeps_to_its_limit_of_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(contact_table, "_MOST_BYTES", 1)
-    for number in range(3):
-        keep_contact_table(tmp_path, table_key({"number": number}), table())
-    assert [path.name for path in tmp_path.iterdir()] == [f"{table_key({'number': 2})}.h5"]
-
-
 def test_several_may_write_and_read_one_entry_at_a_time(tmp_path: Path):
     large = table(3)
     small = {name: array for name, array in large.items() if not name.startswith("change_")}

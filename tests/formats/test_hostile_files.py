@@ -13,13 +13,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from helpers.builders import make_artifact, make_scan
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from helpers.builders import make_scan
 
-from memscal.apparatus import load_apparatus
-from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
-from memscal.formats.artifact import write_artifact
+from memscal.errors import FormatError, InputError, UnsafeFileError
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 from memscal.formats.scan import read_scan, write_scan
@@ -449,34 +445,6 @@ def test_every_truncation_is_an_error_of_ours(path: Path):
         with pytest.raises(FormatError, match=r"scan\.h5") as caught:
             read_scan(path)
     assert "Get the file again" in caught.value.cure
-
-
-@pytest.fixture(scope="module")
-def artifact_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    path = tmp_path_factory.mktemp("artifact") / "a.h5"
-    write_artifact(make_artifact(), path)
-    return path.read_bytes()
-
-
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(where=st.floats(0, 1), dense=st.booleans(), bit=st.integers(0, 7))
-def test_a_flipped_bit_of_an_artifact_is_refused_or_harmless(
-    artifact_bytes: bytes, tmp_path: Path, where, dense, bit
-):
-    damaged = bytearray(artifact_bytes)
-    # Half of the flips go to the first pages, where the structure is densest.
-    last = len(damaged) // 8 if dense else len(damaged) - 1
-    damaged[8 + int(where * (last - 8))] ^= 1 << bit
-    path = tmp_path / "flipped.h5"
-    path.write_bytes(damaged)
-    try:
-        found = load_apparatus(path)
-    except MemscalError:
-        return
-    expected = make_artifact()
-    np.testing.assert_allclose(found.field.g, expected.field.g, rtol=1e-15)
-    np.testing.assert_allclose(found.parameters.values, expected.parameters.values, rtol=1e-15)
-    assert found.checks == expected.checks
 
 
 def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(path: Path):

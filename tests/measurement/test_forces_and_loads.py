@@ -31,12 +31,6 @@ def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
         assert (values[name].p_value > 0.05) == (values[name].value < 1.96)
 
 
-def test_one_profile_has_no_check_of_all() -> None:
-    names = {check.name for check in measured(0, load=(1.37,)).checks}
-    assert "applied_force_1" in names
-    assert "applied_force_all" not in names
-
-
 @pytest.mark.parametrize("share", [-0.2, 0.2])
 def test_the_force_does_not_depend_on_the_width_of_g(share: float) -> None:
     scan = contact_scan(1, **QUIET)
@@ -96,12 +90,6 @@ def test_a_scan_that_records_no_load_is_one_part(kind: str) -> None:
     scan = make_scan(kind, normal_load=None)
     [part] = single_loads(scan)
     assert part is scan
-
-
-@pytest.mark.parametrize("kind", ["line", "raster"])
-def test_a_line_or_a_raster_has_one_load(kind: str) -> None:
-    [part] = single_loads(make_scan(kind))
-    assert part.load == pytest.approx(1.01)
 
 
 def test_a_line_at_several_loads_is_refused_by_its_number() -> None:

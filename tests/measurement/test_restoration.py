@@ -180,12 +180,6 @@ def test_a_wrong_unit_of_the_voltage_fails_the_check_of_the_force() -> None:
     assert "restored_force" in {check.name for check in found.checks if not check.passed}
 
 
-def test_an_override_of_another_film_stands_in_the_restored_stress() -> None:
-    other = replace(SCAN, film=replace(SCAN.film, thickness=2.2e-3))
-    restored = memscal.restore(other, EXACT, override=True)
-    assert "Overridden: film thickness 2.2 mm" in restored.profile().notes
-
-
 def test_a_spoilt_point_is_named_and_moves_little() -> None:
     scan = made.sphere_scan(made.pressed(), seed=4)
     u = scan.u_zz.copy()

@@ -1,7 +1,6 @@
 """Pressing a rod on a film: loads, depths, base stress, and requests that are refused."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,14 +93,6 @@ def test_what_is_no_radius_is_refused(r: list[float]) -> None:
         indent(FILM, ROD, load=1.0).base_stress(r)
 
 
-def test_base_stress_does_not_depend_on_the_other_radii_asked_for() -> None:
-    contact = indent(FILM, ROD, load=1.0)
-    r = np.linspace(0.0, 30e-3, 300)
-    together = contact.base_stress(r[::-1])[::-1]
-    alone = [contact.base_stress(one) for one in r[::25]]
-    np.testing.assert_allclose(together[::25], alone, atol=1e-12 * together.max())
-
-
 @pytest.mark.parametrize("radius", [0.1e-3, 0.25e-3, 4e-3])
 @pytest.mark.parametrize(("nu", "friction"), CASES)
 def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> None:
@@ -113,15 +104,6 @@ def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> Non
     assert np.max(np.abs(spline(between) - contact.base_stress(between))) < 1e-6 * highest
     beyond = profile.r[-1] + np.linspace(0.0, 0.05, 50)
     assert np.max(np.abs(contact.base_stress(beyond))) < 1.1e-9 * highest
-
-
-def test_the_profile_of_a_sticking_rod_carries_its_conditions() -> None:
-    profile = indent(FILM, ROD, load=1.0, friction=math.inf).profile([0.0, 1e-3])
-    assert (profile.load, profile.contact_radius) == (1.0, ROD.radius)
-    assert math.isinf(profile.friction_coefficient or 0)
-    assert profile.loading == ""
-    assert profile.film == replace(FILM, law="linear")
-    assert profile.sigma_rz[1] < 0
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.tables import imported
 
 from memscal.errors import InputError
 from memscal.model.notation import VOLTS
@@ -70,21 +69,3 @@ def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
     assert "1 presses of fewer than 5 steady rows are left out" in holds.notes[0]
     with pytest.raises(InputError, match="The log has no hold"):
         find_holds({n: v[::40] for n, v in columns.items()}, np.arange(99)[:48], VOLTS)
-
-
-def test_a_log_becomes_a_scan_and_a_figure():
-    columns = log(3)
-    scan = imported(
-        columns, x="x", u="u_zz", load_column="normal_load", x_unit="m", u_unit="V", holds=True
-    )
-    assert (scan.kind, scan.x.size) == ("line", PLACES.size)
-    assert np.median(scan.u_zz_errors) == pytest.approx(2e-6 / np.sqrt(30), rel=0.3)
-    assert scan.load == pytest.approx(1.0, abs=1e-3)
-    figure = scan.holds.plot()
-    assert [axes.get_ylabel() for axes in figure.axes] == [
-        "x (mm)",
-        "load (N)",
-        "reading (mV)",
-        "reading (mV)",
-    ]
-    assert len(figure.axes[2].collections[0].get_segments()) == PLACES.size

@@ -319,19 +319,6 @@ def test_a_summary_says_what_is_missing_mixed_repeated_and_overridden(
     assert "synthetic" in {message["kind"] for message in arrays["messages"][0]}
 
 
-def test_a_batch_that_overrides_says_so_in_its_rows(fleet: Path, folder: Path, run: Run) -> None:
-    shutil.copytree(
-        fleet / "scans", folder / "few", ignore=shutil.ignore_patterns("s0[2-9]*", "s1*")
-    )
-    run("reference", "rod", "--radius", 0.5, "--load", 1, "-o", folder / "r.h5").exits(0)
-    given = ["--reference", folder / "r.h5", "--override", "--workers", 1]
-    run("batch", folder / "few", "-o", folder / "results", *given)
-    [path] = (folder / "results" / "shards").iterdir()
-    kinds = [[m["kind"] for m in row] for row in pq.read_table(path)["messages"].to_pylist()]
-    assert len(kinds) == 2
-    assert all("override" in row for row in kinds)
-
-
 def test_artifacts_are_those_of_the_rows(copy: Path, folder: Path) -> None:
     results = copy / "results"
     source = copy / "wafer.csv"
@@ -342,17 +329,6 @@ def test_artifacts_are_those_of_the_rows(copy: Path, folder: Path) -> None:
     stale.write_text("of another scan")
     assert batch(source, results, "--resume").wait() == 1
     assert sorted((results / "artifacts").rglob("*.h5")) == written
-
-
-def test_a_batch_is_continued_in_shards_of_its_size_without_its_first_one(
-    copy: Path, run: Run
-) -> None:
-    (copy / "results" / "shards" / "shard-000000.parquet").unlink()
-    before = {path: path.stat().st_mtime_ns for path in (copy / "results" / "shards").iterdir()}
-    given = [copy / "wafer.csv", "-o", copy / "results", "--resume", "--workers", 1, "--json"]
-    assert shards_of(run("batch", *given)) == (1, COUNT // SHARD - 1)
-    assert len(list((copy / "results" / "shards").iterdir())) == COUNT / SHARD
-    assert all(path.stat().st_mtime_ns == time for path, time in before.items())
 
 
 @pytest.mark.parametrize("text", ["[" * 9000, '{"scans": 12, "shard_size": 1e9}', "{}", '{"a": 9'])
@@ -368,19 +344,3 @@ def test_a_list_of_which_no_scan_is_there_is_refused(folder: Path, run: Run) -> 
     (folder / "list.csv").write_text("path,wafer_x (um)\na.h5,0\n")
     run("batch", folder / "list.csv", "-o", folder / "results").exits(3, "'wafer_x (um)'")
     assert not (folder / "results").exists()
-
-
-def test_a_sensor_apart_from_equal_ones_is_an_outlier() -> None:
-    values = np.array([1.0] * 9 + [2.0])
-    assert list(outliers(fleet_of(values, values, 0.01 * values))) == [9]
-
-
-def test_a_manifest_that_may_not_be_read_is_refused(
-    fleet: Path, folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def denied(*_: object, **__: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(Path, "open", denied)
-    outcome = run(*arguments(fleet / "wafer.csv", folder / "results"))
-    outcome.exits(3, "wafer.csv cannot be read: Permission denied.")

@@ -11,15 +11,13 @@ import pytest
 from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, write
 
 from memscal.errors import FormatError, InputError, UnitError
-from memscal.extensions.meshes.mesh_files import read_mesh, write_mesh
+from memscal.extensions.meshes.mesh_files import read_mesh
 from memscal.extensions.meshes.reference_mesh import read_reference_mesh
 from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress
-from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 
 DATA = Path(__file__).parents[2] / "data"
-QUADRATIC = [(0, 1), (1, 2), (2, 0)]
 
 
 class GaussianPressure:
@@ -210,37 +208,6 @@ def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x, y, centre):
     assert found.force == pytest.approx(1.0, abs=0.01)
 
 
-def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
-    """Quadratic triangles, which meshio writes and another reader of ours finds."""
-    fine = np.linspace(0.0, 8.0, 21)
-    flat = np.array(np.meshgrid(fine, HEIGHTS, indexing="ij")).reshape(2, -1).T
-    quads = []
-    for i in range(20):
-        for j in range(3):
-            a = 4 * i + j
-            b = 4 * i + j + 1
-            quads += [(a, a + 4, b + 4), (a, b + 4, b)]
-    corners = np.array(quads)
-    middles = [(flat[corners[:, a]] + flat[corners[:, b]]) / 2 for a, b in QUADRATIC]
-    nodes = np.round(np.concatenate([flat[corners.T.ravel()], *middles]), 12)
-    points, index = np.unique(nodes, axis=0, return_inverse=True)
-    mesh = FieldMesh(
-        points=1e-3 * points,
-        triangles=index.reshape(6, -1).T,
-        displacement=1e-6 * points,
-        stress=1e6 * tensor(*points.T),
-        notes="A film -- with a -->comment<!-- in its notes, E = 2.2 MPa ---",
-    )
-    write_mesh(mesh, tmp_path / "film.vtu")
-    assert_is_the_section(imported(tmp_path / "film.vtu", "stress_Pa", sigma_unit="Pa"))
-    again = meshio.vtu.read(tmp_path / "film.vtu")
-    assert again.cells[0].type == "triangle6"
-    np.testing.assert_allclose(again.points[:, :2], points, rtol=1e-12)
-    np.testing.assert_allclose(again.point_data["displacement_mm"][:, :2], 1e-3 * points)
-    np.testing.assert_array_equal(again.point_data["displacement_mm"][:, 2], 0.0)
-    assert b"E = 2.2 MPa" in (tmp_path / "film.vtu").read_bytes()
-
-
 def test_units_and_signs_are_those_that_are_given(tmp_path: Path):
     mesh = section()
     mesh.points = mesh.points * 1e-3
@@ -299,13 +266,6 @@ def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path: Path, mesh,
     with pytest.raises(InputError, match=words) as caught:
         imported(path, **options)
     assert caught.value.cure
-
-
-def test_a_mesh_with_one_node_at_its_lowest_level_is_refused_with_the_options_named(tmp_path: Path):
-    mesh = section()
-    mesh.points[:, 1] += 0.01 * mesh.points[:, 0]
-    with pytest.raises(InputError, match=r"Only 1 nodes(.|\n)*--vertical(.|\n)*--base"):
-        imported(saved(mesh, tmp_path / "film.vtu"))
 
 
 def test_a_value_that_is_no_number_is_refused_only_where_it_matters(tmp_path: Path):
