@@ -49,6 +49,14 @@ def test_an_output_is_never_an_input_even_if_forced(run: Run, scan: Path, folder
     assert scan.read_bytes() == before
 
 
+@pytest.mark.usefixtures("no_computing")
+def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
+    run("reference", "rod", "-o", "rod.h5")
+    before = Path("rod.h5").read_bytes()
+    run("calibrate", scan, "--reference", "rod.h5", "--report", "rod.h5", "--force").exits(4)
+    assert Path("rod.h5").read_bytes() == before
+
+
 @pytest.mark.parametrize(("name", "arguments"), [
     ("scan.apparatus.h5", ["calibrate", "scan.h5"]),
     ("rod.h5", ["reference", "rod", "-o", "rod.h5"]),
@@ -75,6 +83,31 @@ def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, 
     monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
+
+
+@pytest.mark.parametrize(("arguments", "old", "failing"), [
+    (["calibrate", "scan.h5", "-o", "a.h5", "--figure", "b.svg"], ["a.h5", "b.svg"], "b.svg"),
+    (["simulate", "--experiment", "sphere", "-o", "."],
+     ["rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5"], "sphere_lubricated.h5"),
+])  # fmt: skip
+@pytest.mark.usefixtures("scan")
+def test_where_one_output_cannot_be_replaced_all_stay(
+    run: Run, folder: Path, monkeypatch: Patch, arguments, old, failing
+):
+    rename = os.replace
+
+    def replace(source: Path, target: Path) -> None:
+        if Path(target).name == failing:
+            raise OSError(errno.EIO, "broken")
+        rename(source, target)
+
+    for name in old:
+        (folder / name).write_bytes(OLD)
+    before = names(folder)
+    monkeypatch.setattr(os, "replace", replace)
+    run(*arguments, "--force").exits(4, failing, "what was there before is untouched")
+    assert {(folder / name).read_bytes() for name in old} == {OLD}
+    assert names(folder) == before
 
 
 @pytest.mark.parametrize(("arguments", "code"), [
@@ -138,3 +171,12 @@ def test_a_python_warning_becomes_one_line(run: Run, scan: Path, meanwhile):
     meanwhile(warn)
     done = run("calibrate", scan).exits(0)
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()
+
+
+@pytest.mark.parametrize("name", ["out.h5", "out.png"])
+def test_a_file_that_appears_during_the_computing_is_not_replaced(
+    run: Run, scan: Path, folder: Path, meanwhile, name
+):
+    meanwhile(lambda: (folder / name).write_bytes(OLD))
+    run("calibrate", scan, "-o", "out.h5", "--figure", "out.png").exits(4)
+    assert (folder / name).read_bytes() == OLD

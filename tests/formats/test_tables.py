@@ -279,6 +279,12 @@ def test_what_contradicts_or_has_no_effect_is_refused(tmp_path: Path, head, opti
         scan_table(tmp_path, f"{head}\n0,1\n1,2\n2,1\n", **options)
 
 
+def test_the_same_unit_in_other_letters_does_not_contradict(tmp_path: Path):
+    text = "x (µm),u [millivolt]\n0,1\n1e3,2\n2e3,1\n"
+    scan = scan_table(tmp_path, text, x_unit="um")
+    np.testing.assert_allclose(scan.x, [0, 1e-3, 2e-3])
+
+
 def test_uncertainties_are_a_column_or_one_number_in_the_unit_of_the_readings(tmp_path: Path):
     text = "x,u,e [uV]\n0,1,30\n1,2,40\n2,1,50\n"
     column = scan_table(tmp_path, text, u_errors="e")
