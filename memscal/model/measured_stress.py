@@ -232,7 +232,8 @@ class MeasuredProfile(ByContent):
     def errors_by(self, *sources: str) -> FloatArray:
         """Standard uncertainty of ``s_zz`` by some of the sources, shape (n,), in Pa."""
         roots = [self.roots[source].reshape(self.r.size, -1) for source in sources]
-        return np.asarray(np.linalg.norm(np.hstack(roots), axis=1))
+        none = np.zeros((self.r.size, 0))
+        return np.asarray(np.linalg.norm(np.hstack([none, *roots]), axis=1))
 
     @property
     def force_uncertainty(self) -> float:

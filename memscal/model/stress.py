@@ -80,7 +80,7 @@ class IdealReference:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Return the Fourier transform at ``k`` (rad/m), in m^2; of a slit across it, in m."""
-        phase = k * self.size
+        phase = np.asarray(k, dtype=np.float64) * self.size
         square = math.pi * self.size**2
         if self.shape == "disc":
             far = phase != 0
