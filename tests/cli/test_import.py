@@ -30,63 +30,6 @@ def table(folder: Path) -> Path:
     return write_table(folder / "scan.csv", "position,voltage", rows)
 
 
-def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
-    labels = [
-        "--sensor-name",
-        "S1",
-        "--sensor-model",
-        "MEMS",
-        "--title",
-        "Monday's scan",
-        "--noise",
-        0.04,
-    ]
-    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *labels, "--noise", 0.04)
-    scan = memscal.read_scan("scan.h5")
-    assert scan.film == memscal.ElasticFilm(
-        young_modulus=2.2e6,
-        poisson_ratio=0.5,
-        thickness=2e-3,
-        young_modulus_uncertainty=0.1e6,
-        poisson_ratio_uncertainty=0.004,
-        thickness_uncertainty=0.02e-3,
-    )
-    assert scan.indenter == memscal.Rod(radius=0.25e-3, radius_uncertainty=0.002e-3)
-    assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
-    assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
-    assert scan.title == "Monday's scan"
-    np.testing.assert_allclose(scan.u_zz_errors, np.full(65, 4e-5))
-    run("import", table, "-o", "turned.h5", *COLUMNS, *SET_UP, "--u-sign", -1).exits(0)
-    np.testing.assert_allclose(memscal.read_scan("turned.h5").u_zz, -scan.u_zz, rtol=1e-12)
-
-
-def test_the_law_of_the_film_and_the_friction_of_the_rod_are_stated(run: Run, table: Path):
-    law = ["--film-law", "mooney-rivlin", "--mooney-rivlin-ratio", 0.2]
-    run("import", table, "-o", "a.h5", *COLUMNS, *SET_UP, *law, "--rod-friction", "inf").exits(0)
-    scan = memscal.read_scan("a.h5")
-    assert (scan.film.law, scan.film.mooney_rivlin_ratio) == ("mooney-rivlin", 0.2)
-    assert scan.rod_friction == np.inf
-    assert " mooney-rivlin\n" in run("inspect", "a.h5").out
-    sphere = ["--indenter", "sphere", "--rod-friction", "0"]
-    run("import", table, "-o", "b.h5", *COLUMNS, *SET_UP, *sphere).exits(2, "--indenter rod")
-
-
-def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Run, folder: Path):
-    rows = np.stack([np.arange(9.0), np.arange(9.0), np.linspace(0.9, 1.1, 9)], axis=1)
-    write_table(folder / "scan.csv", "position,voltage,force", rows)
-    wet = ["--load-scatter", 2, "--lubrication", "lubricated", "--lubricant", "glycerol"]
-    assert run("import", "scan.csv", "-o", "one.h5", *COLUMNS, *SET_UP, *wet).code == 0
-    one = memscal.read_scan("one.h5")
-    assert (one.lubrication, one.lubricant) == ("lubricated", "glycerol")
-    np.testing.assert_allclose(one.normal_load, np.full(9, 1.0), rtol=1e-12)
-    np.testing.assert_allclose(one.normal_load_errors, np.full(9, 0.02), rtol=1e-12)
-    column = ["--load-column", "force", *wet]
-    assert run("import", "scan.csv", "-o", "each.h5", *COLUMNS, *SET_UP, *column).code == 0
-    each = memscal.read_scan("each.h5")
-    np.testing.assert_allclose(each.normal_load_errors, 0.02 * rows[:, 2], rtol=1e-12)
-    assert "glycerol" in run("inspect", "each.h5").out
-
-
 @pytest.mark.parametrize(
     ("arguments", "hints"),
     [

@@ -16,21 +16,6 @@ def test_a_depth_gives_the_load_that_gives_the_depth(run: Run):
     assert loaded["depth"]["value"] == pytest.approx(100)
 
 
-def test_options_of_the_film_and_the_rod_reach_the_file(run: Run, folder: Path):
-    film = ["--young-modulus", 1.5, "--poisson-ratio", 0.45, "--thickness", 3]
-    done = run("reference", "rod", "--radius", 0.4, *film, "--load", 0.7, "-o", "rod.h5")
-    done.exits(0, "Written: rod.h5")
-    profile = memscal.read_reference("rod.h5")
-    assert profile.film == memscal.ElasticFilm(
-        young_modulus=1.5e6, poisson_ratio=0.45, thickness=3e-3, law="linear"
-    )
-    assert profile.indenter == memscal.Rod(radius=0.4e-3)
-    assert profile.load == 0.7
-    # The table carries the load, to what a sum by trapezia makes of it.
-    assert profile.force == pytest.approx(0.7, rel=1e-3)
-    assert np.all(np.diff(profile.r) > 0)
-
-
 def test_a_cone_and_a_measured_tip_go_to_a_file_and_come_back(run: Run, folder: Path):
     assert run("reference", "cone", "--inclination", 2, "-o", "cone.h5").code == 0
     cone = memscal.read_reference("cone.h5").indenter

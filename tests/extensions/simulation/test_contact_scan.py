@@ -80,29 +80,6 @@ def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads() -> None:
         assert scan.u_zz[i] == pytest.approx(1e-7 * float(np.sum(weight * stress)), rel=1e-4)
 
 
-def test_loads_and_places_scatter_as_stated_and_are_seen_in_the_voltage(seed: int) -> None:
-    options: dict[str, Any] = {"load": [0.69], "repeats": 80, **STILL, "seed": seed}
-    exact = simulate_contacts(load_scatter=0.0, position_error=0.0, **options)
-    loads = simulate_contacts(load_scatter=0.02, position_error=0.0, record_loads=True, **options)
-    np.testing.assert_allclose(loads.normal_load_errors, 0.002 * loads.normal_load)
-    ratio = loads.normal_load / 0.69 - 1
-    low, high = chi2.ppf([RARE, 1 - RARE], ratio.size) * (0.02**2 + 0.002**2)
-    assert low < np.sum(ratio**2) < high
-    set_by_hand = simulate_contacts(load_scatter=0.02, position_error=0.0, **options)
-    assert_same_to_rounding(set_by_hand.u_zz, loads.u_zz)
-    np.testing.assert_array_equal(set_by_hand.normal_load, np.full((80, 33), 0.69))
-    np.testing.assert_allclose(set_by_hand.normal_load_errors, np.full((80, 33), 0.0138))
-
-    moved = simulate_contacts(load_scatter=0.0, position_error=20e-6, **options)
-    np.testing.assert_array_equal(moved.x_errors, np.full(33, 20e-6))
-    steep = np.abs(np.gradient(exact.u_zz[0], exact.x)) > 0.2 * exact.u_zz.max() / 1e-3
-    assert steep.sum() >= 3
-    away = (moved.u_zz - exact.u_zz)[:, steep] / np.gradient(exact.u_zz[0], exact.x)[steep]
-    low, high = chi2.ppf([RARE, 1 - RARE], away.size)
-    # A slope by differences of half a millimetre is good to some percent here.
-    assert 0.85 * low < np.sum((away / 20e-6) ** 2) < 1.15 * high
-
-
 def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -> None:
     heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
     np.testing.assert_allclose(heavy.u_zz, simulate_contacts(load=[1.1], **EXACT).u_zz, rtol=1e-12)
