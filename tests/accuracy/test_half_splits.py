@@ -12,7 +12,6 @@ import pytest
 from accuracy.test_division import CASES as SENSORS
 from helpers.bounds import FULL
 from helpers.estimation_study import Case
-from helpers.scans import simulated
 from scipy.stats import chi2
 
 import memscal
@@ -88,42 +87,3 @@ def test_halves_of_a_scan_differ_as_predicted(pair: tuple[Case, str], route: str
 @pytest.mark.parametrize("route", ROUTES)
 def test_halves_of_all_cases_together_differ_as_predicted(route: str) -> None:
     require_unit(np.concatenate([deviates(*pair) for pair in SPLITS]), route)
-
-
-def scatter(values: np.ndarray, stated: np.ndarray) -> float:
-    """RMS of the values about their weighted mean, in stated uncertainties."""
-    mean = np.average(values, weights=stated**-2)
-    return float(np.sqrt(np.sum(((values - mean) / stated) ** 2) / (values.size - 1)))
-
-
-@pytest.mark.parametrize("case", [c for c in SENSORS if c.noise < 0.01], ids=lambda c: c.name)
-def test_runs_of_other_reach_and_step_differ_as_stated(case: Case) -> None:
-    rng = np.random.default_rng(3)
-    rows = []
-    for seed in range(RUNS):
-        half_range = rng.uniform(5e-3, 10e-3)
-        step = rng.uniform(0.2e-3, 0.5e-3)
-        scan = simulated(
-            kernel=case.kernel,
-            noise=case.noise,
-            seed=seed,
-            half_range=half_range,
-            points=int(2 * half_range / step),
-            centre=(rng.uniform(-1e-3, 1e-3), 0.0),
-            repeats=int(rng.integers(1, 4)),
-        )
-        apparatus = memscal.calibrate(scan, method="bayesian").apparatus
-        p = apparatus.parameters
-        budget = apparatus.budget["gaussian_sigma"]
-        names = "gaussian_sigma", "conversion_constant_gaussian"
-        rows.append(
-            [budget["noise"], *(n for name in names for n in (p[name], p.uncertainty(name)))]
-        )
-    by_noise, width, u_width, a, u_a = np.array(rows).T
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], RUNS - 1) / (RUNS - 1))
-    for ratio in (scatter(width, u_width), scatter(a, u_a)):
-        assert 0.7 * low < ratio < 1.3 * high
-    if case.sigma is not None:
-        assert np.mean(u_width) < 1.02 * np.mean(by_noise)
-    elif case.kind == "mixture" and case.noise == 0.001:
-        assert scatter(width, by_noise) > 1.2

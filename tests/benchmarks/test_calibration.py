@@ -3,12 +3,10 @@
 Set MEMSCAL_FULL_STUDY for 400 scans in place of 100.
 """
 
-import os
-
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.machine import once, show, turns
+from helpers.machine import show, turns
 from helpers.scans import LINEAR_FILM, simulate
 from scipy.optimize import curve_fit
 
@@ -16,7 +14,6 @@ import memscal
 from memscal import Scan, StressProfile
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.model.arrays import FloatArray
-from memscal.parallel import worker_pool
 
 pytestmark = pytest.mark.benchmark
 
@@ -83,24 +80,3 @@ def test_a_calibration_costs_as_much_as_it_has_points() -> None:
 
 SCANS = 400 if FULL else 100
 #: Processes start by importing: a second or two, which a few hundred scans outweigh.
-ALLOWED = 0.9 if SCANS > 100 else 1.2
-
-
-def test_two_processes_calibrate_faster_than_a_loop() -> None:
-    if (os.cpu_count() or 1) < 2:
-        pytest.skip("one core")
-    scans = [simulate(points=65, noise=0.003, seed=seed) for seed in range(SCANS)]
-
-    def loop() -> None:
-        for scan in scans:
-            memscal.calibrate(scan, method="evidence")
-
-    memscal.calibrate(scans[0], method="evidence")
-
-    def fleet() -> None:
-        with worker_pool(2) as pool:
-            list(memscal.calibrate_many(scans, pool, method="evidence"))
-
-    # The better of two: what else the machine does is not ours.
-    shared, plain = (min(once(job) for _ in range(2)) for job in (fleet, loop))
-    show(f"{SCANS} scans on two processes, over a loop", shared / plain, ALLOWED)

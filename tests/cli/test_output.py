@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from memscal.cli.output import emit_tables, show_messages, working
-from memscal.model.checks import Message
+from memscal.cli.output import emit_tables, working
 from memscal.progress import counted
 from memscal.summaries.table import Table
 
@@ -89,23 +88,6 @@ def test_columns_wrap_beside_their_labels_and_none_is_lost(width: int):
             f"0.{row}{i}" for i in range(9)
         ]
     assert len(parts) == {40: 9, 60: 9, 80: 5, 120: 3}[width]
-
-
-def test_messages_of_a_kind_that_say_the_same_are_shown_once_with_their_number(monkeypatch):
-    terminal = at_terminal(monkeypatch)
-    text = "Outlier at x = {0} mm of repeat {1}: {2} mV instead of 4.756 mV."
-    outliers = [Message("outlier", text.format(0.5 * i, i, 4.1 - i)) for i in range(4)]
-    other = Message("missing", "Points are missing.", "warning")
-    verdicts = [Message("macroscopic", f"It ({way} loading) agrees.") for way in ("one", "two")]
-    show_messages([*outliers[:2], other, *outliers[2:], *verdicts, Message("macroscopic", "No.")])
-    assert terminal.getvalue().split("\n") == [
-        "Note: Outlier at x = 0.0 mm of repeat 0: 4.1 mV instead of 4.756 mV. (3 more",
-        "  like it; --json lists all.)",
-        "Warning: Points are missing.",
-        "Note: It (one loading) agrees. (1 more like it; --json lists all.)",
-        "Note: No.",
-        "",
-    ]
 
 
 def wait_for(shown: Callable[[], str], pattern: str) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.scans import simulate
 
 import memscal
 from memscal.cli import main
@@ -120,17 +119,6 @@ def test_a_plug_in_is_listed_and_created_with_its_options_and_without_the_seed()
 @pytest.mark.usefixtures("plug_in")
 def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
     assert type(create_regulariser("tikhonov")).__module__ == "memscal.deconvolution.division"
-
-
-@pytest.mark.usefixtures("plug_in")
-def test_a_calibration_runs_with_a_plug_in() -> None:
-    scan = simulate(noise=0.002, seed=5)
-    apparatus = memscal.calibrate(scan, method="cutoff", k_max=2.5e3).apparatus
-    assert apparatus.process.configuration["method"] == "cutoff"
-    assert apparatus.process.configuration["options"] == {"k_max": 2.5e3}
-    transfer = apparatus.transfer
-    np.testing.assert_array_equal(transfer.window[transfer.k > 2.6e3], 0.0)
-    np.testing.assert_array_equal(transfer.window[transfer.k < 2.4e3], 1.0)
 
 
 @pytest.mark.parametrize(("name", "options"), [

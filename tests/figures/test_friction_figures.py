@@ -58,31 +58,6 @@ def test_curves_are_of_the_fitted_coefficient_and_of_the_limits(found: FrictionC
             )
 
 
-def test_residuals_of_the_page_are_those_of_the_fitted_coefficient(found: FrictionComparison):
-    axes = of_friction.comparison_figure(found).axes[2]
-    drawn = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_marker() == "o"]
-    best = found.joint["dry"]["incremental"].value
-    for z, one in zip(drawn, found.loads["incremental"], strict=False):
-        expected = stress(one.profile.r, one.load, best, "incremental")
-        # The stress is interpolated between the coefficients that were calculated.
-        close = 2e-3 * expected.max() / one.profile.s_zz_errors.min()
-        np.testing.assert_allclose(
-            z, (one.profile.s_zz - expected) / one.profile.s_zz_errors, atol=close
-        )
-    assert f"{best:.3g}" in axes.get_ylabel()
-
-
-def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionComparison):
-    figure = friction_set_figure(found, loading="total")
-    differences = figure.axes[len(LOADS) : 2 * len(LOADS)]
-    dry = [one for one in found.loads["total"] if one.lubrication == "dry"]
-    for axes, one in zip(differences, dry, strict=True):
-        ((_, change, u),) = bars(axes)
-        measured = one.profile.s_zz - one.calculated[0]
-        np.testing.assert_allclose(change, 100 * measured / one.p0_max)
-        np.testing.assert_allclose(u, 200 * one.profile.s_zz_errors / one.p0_max)
-
-
 def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: FrictionComparison):
     figure = of_friction.maxima_figure(found)
     assert len(figure.axes) == len(found.loadings)

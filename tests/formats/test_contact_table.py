@@ -8,7 +8,6 @@ import h5py
 import numpy as np
 import pytest
 
-from memscal.errors import FormatError
 from memscal.formats import cache as contact_table
 from memscal.formats.cache import (
     find_contact_table,
@@ -52,11 +51,6 @@ def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_pat
         np.testing.assert_array_equal(found[name], array)
 
 
-def test_what_was_never_kept_is_not_found(tmp_path: Path):
-    assert find_contact_table(tmp_path, KEY) is None
-    assert find_contact_table(tmp_path / "no" / "folder", KEY) is None
-
-
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
 def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share):
     keep_contact_table(tmp_path, KEY, table())
@@ -93,11 +87,6 @@ def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path):
     with h5py.File(entry(tmp_path), "r+") as file:
         file.attrs["memscal_schema_version"] = "0.9.0"
     assert find_contact_table(tmp_path, KEY) is None
-
-
-def test_a_name_that_is_no_key_is_refused(tmp_path: Path):
-    with pytest.raises(FormatError, match="not the key"):
-        find_contact_table(tmp_path, "../elsewhere")
 
 
 def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path):

@@ -198,19 +198,6 @@ def test_loads_may_come_in_any_order_and_share_their_neighbours() -> None:
     assert family.loads.tolist() == asked
 
 
-def test_two_processes_find_what_one_finds() -> None:
-    """To rounding: one process may use several threads, of which each sums its share."""
-    asked = {"friction": [0.0, 0.3], "reach": REACH}
-    one = amontons_family(UNCERTAIN_FILM, SPHERE, [0.34], workers=1, **asked)
-    two = amontons_family(UNCERTAIN_FILM, SPHERE, [0.34], workers=2, **asked)
-    close = {"rtol": 0, "atol": 1e-12 * float(one.spectra.max())}
-    np.testing.assert_allclose(two.spectra, one.spectra, **close)
-    # A difference of contacts, divided by its small step.
-    np.testing.assert_allclose(two.by_load, one.by_load, rtol=0, atol=1e2 * close["atol"])
-    for source, change in one.changes.items():
-        np.testing.assert_allclose(two.changes[source], change, rtol=0, atol=1e2 * close["atol"])
-
-
 def test_a_load_beyond_the_model_is_named() -> None:
     with pytest.raises(DomainError, match=r"up to 300 N .*friction 0\.1"):
         amontons_family(FILM, Sphere(radius=2e-3), [1.0, 300.0], friction=[0.1], reach=REACH)

@@ -10,7 +10,7 @@ from helpers.paper import FILM, ROD, SPHERE, film
 from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements, Rubber
-from memscal.extensions.finite_strain.pressing import RodFace, SphereFace
+from memscal.extensions.finite_strain.pressing import RodFace
 from memscal.extensions.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Depth, Load
 from memscal.progress import reporting
@@ -91,18 +91,6 @@ def test_simple_shear_of_a_mooney_rivlin_film_is_the_closed_form(ratio: float) -
     assert zz - hoop == pytest.approx(-2 * rubber.c2 * gamma**2, abs=1e-12)
 
 
-@pytest.mark.parametrize("face", [RodFace(0.25, 0.05), SphereFace(0.3)])
-def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(face: RodFace | SphereFace) -> None:
-    s = np.linspace(0.0, 0.4, 8001)
-    points, tangents, _ = face.contour(s)
-    assert np.hypot(*tangents) == pytest.approx(1.0)
-    assert np.hypot(*np.diff(points)) == pytest.approx(np.diff(s), rel=1e-6)
-    r, z = np.meshgrid(np.linspace(0.0, 0.29, 24), np.linspace(-0.1, 0.09, 20))
-    _, gap = face.nearest(r.ravel(), z.ravel())
-    distance = np.hypot(r.ravel()[:, None] - points[0], z.ravel()[:, None] - points[1])
-    assert np.abs(gap) == pytest.approx(distance.min(axis=1), abs=3e-5)
-
-
 @pytest.mark.parametrize(("nu", "sticking"), [(0.3, False), (0.5, False), (0.5, True)])
 def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, sticking: bool) -> None:
     tip = {"sticking": sticking, "refinement": 0.6}
@@ -176,21 +164,6 @@ def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]
     assert gap.min() > -1e-9
     assert deepest.contact_radius == pytest.approx(ROD.radius, rel=0.03)
     assert np.all(deepest.traction.pressures >= 0)
-
-
-def test_a_mesh_of_the_state_carries_stress_and_displacement(pressed_rods) -> None:
-    state = pressed_rods[-1]
-    mesh = state.mesh()
-    a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
-    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    assert np.all(turn > 0)
-    for side, (start, end) in enumerate([(0, 1), (1, 2), (2, 0)]):
-        middle = mesh.points[mesh.triangles[:, [start, end]]].mean(axis=1)
-        assert mesh.points[mesh.triangles[:, 3 + side]] == pytest.approx(middle)
-    near = (mesh.points[:, 1] < 1e-12) & (mesh.points[:, 0] < 2e-3)
-    expected = -state.base_stress(mesh.points[near, 0])
-    assert mesh.stress[near, 1] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
-    assert mesh.displacement[:, 1].min() == pytest.approx(-state.depth, rel=1e-6)
 
 
 def test_a_sticking_sphere_moves_nothing_outward_and_a_sliding_one_does() -> None:

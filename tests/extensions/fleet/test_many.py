@@ -176,21 +176,6 @@ def test_what_a_generator_gave_before_it_failed_is_calibrated() -> None:
         next(results)
 
 
-def test_few_scans_of_a_generator_are_shared_by_all_workers() -> None:
-    submitted = []
-
-    class Counting(ThreadPoolExecutor):
-        def submit(self, function: Any, *given: Any, **named: Any) -> Any:
-            submitted.append(len(given[-1]))
-            return super().submit(function, *given, **named)
-
-    with Counting(2) as executor:
-        assert len(list(memscal.calibrate_many((s for s in scans(5)), executor))) == 5
-    assert submitted == [1, 1, 2, 1]
-    with pytest.raises(memscal.MemscalError, match="one scan"):
-        memscal.calibrate_many(scans(1)[0])
-
-
 def test_a_scan_survives_pickling() -> None:
     scan = replace(scans(1)[0], channels={"u_xz": np.zeros(33)})
     again = pickle.loads(pickle.dumps(scan))

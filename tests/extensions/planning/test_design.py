@@ -150,19 +150,6 @@ def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, v
         memscal.design(step=step, want=want, vary=vary)
 
 
-@pytest.mark.parametrize(("want", "vary", "told"), [
-    ({"colour": 0.01}, "step", "'colour', which is no known target"),
-    ({"sigma": 0.0}, "step", "above zero"),
-    ({"sigma": float("nan")}, "step", "above zero"),
-    ({"sigma": 0.01}, "weather", "'weather', which cannot be varied"),
-    ({"sigma": 0.01}, None, "something to vary"), ({"A": 1.4}, "step", "wanted to 140%"),
-    ({}, "step", "something to vary"),
-])  # fmt: skip
-def test_a_target_that_is_none_is_refused(want, vary, told) -> None:
-    with pytest.raises(InputError, match=told):
-        memscal.design(want=want, vary=vary)
-
-
 @pytest.mark.parametrize(("given", "told"), [
     ({"step": -0.1e-3}, "step"), ({"step": 0.0}, "step"), ({"step": float("nan")}, "step"),
     ({"half_range": -1e-3}, "half range"), ({"load": 0.0}, "load"),
