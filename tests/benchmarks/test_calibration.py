@@ -1,11 +1,7 @@
-"""Speed of the division, of a calibration and of many, each beside the plain way.
-
-Set MEMSCAL_FULL_STUDY for 400 scans in place of 100.
-"""
+"""Speed of a calibration beside the plain way."""
 
 import numpy as np
 import pytest
-from helpers.bounds import FULL
 from helpers.machine import show, turns
 from helpers.scans import LINEAR_FILM, simulate
 from scipy.optimize import curve_fit
@@ -78,5 +74,4 @@ def test_a_calibration_costs_as_much_as_it_has_points() -> None:
     show("calibration of a raster of 129 x 129 points, over 65 x 65", turns(large, small, 2), 8)
 
 
-SCANS = 400 if FULL else 100
 #: Processes start by importing: a second or two, which a few hundred scans outweigh.

@@ -189,19 +189,6 @@ def test_a_line_along_y_calibrates_the_other_channel() -> None:
     assert {"centre_y", "drift_y"} <= set(along_y.names)
 
 
-def test_outliers_and_missing_points_move_nothing() -> None:
-    scan = shear_scan(seed=10)
-    u = scan.channels["u_xz"].copy()
-    clean = calibrated(scan).apparatus
-    u[12] += 0.8 * np.abs(u).max()
-    u[40] = np.nan
-    found = calibrated(replace(scan, channels={**scan.channels, "u_xz": u})).apparatus
-    spread = clean.parameters.uncertainty("conversion_constant_gaussian")
-    spoilt, usual = (p.parameters["conversion_constant_gaussian"] for p in (found, clean))
-    assert abs(spoilt - usual) < 1.5 * spread
-    assert any(message.kind == "outlier" for message in found.process.messages)
-
-
 def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part() -> None:
     failed = 0
     for seed in range(8):

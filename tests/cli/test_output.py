@@ -47,11 +47,6 @@ def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     return both
 
 
-def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]):
-    emit_tables(TABLE, Table("empty", ("a",), []))
-    assert capsys.readouterr().out == PLAIN
-
-
 def test_a_terminal_gets_bold_titles_and_failures_in_red(monkeypatch: pytest.MonkeyPatch):
     terminal = at_terminal(monkeypatch)
     emit_tables(TABLE)

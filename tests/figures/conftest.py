@@ -36,14 +36,14 @@ def voltage(r: Any, parts: tuple[tuple[float, float], ...]) -> Any:
 
 
 def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolution:
-    """Return a line scan, a raster by distance from the centre, or one by position along x."""
+    """Return a line scan, or a raster by distance from the centre."""
     rng = np.random.default_rng(seed)
     x = np.linspace(-8e-3, 8e-3, points)
     r = np.abs(x - _CENTRE)
-    if kind != "line":
+    if kind == "radii":
         xx, yy = np.meshgrid(x, x)
         r = np.hypot(xx - _CENTRE, yy).ravel()
-        x = r if kind == "radii" else xx.ravel()
+        x = r
     clean = voltage(r, _PARTS)
     single = voltage(r, ((1.0, _SIGMA),))
     spread = noise * float(np.max(clean))

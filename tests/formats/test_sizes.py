@@ -17,7 +17,7 @@ from PIL import Image
 import memscal
 from memscal.calibration import calibrate as calibration
 from memscal.calibration import prepare
-from memscal.errors import FormatError, InputError
+from memscal.errors import InputError
 from memscal.estimation import points
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.tables import text_table
@@ -93,14 +93,6 @@ def big_table(path: Path, rows: int, wrong: int = -1) -> Path:
         lines[wrong] = "1.0,overload"
     path.write_text("\n".join(["x/mm,u/mV", *lines]))
     return path
-
-
-def test_a_wrong_cell_far_down_is_named_by_its_row(tmp_path: Path):
-    table = big_table(tmp_path / "t.csv", 60_000, wrong=54_320)
-    with pytest.raises(
-        FormatError, match=r"column 'u' holds what is not a number in line 54322 \('overload'\)\."
-    ):
-        import_table(table, x="x", u="u")
 
 
 def test_a_column_that_no_row_has_is_missing_throughout(tmp_path: Path):

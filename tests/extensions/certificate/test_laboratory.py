@@ -99,9 +99,3 @@ def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_pa
 def test_a_scan_that_says_otherwise_than_the_file_is_refused(tmp_path: Path, capsys):
     assert imported(tmp_path, "--sensor-name", "another") == 3
     assert "name of the sensor is 'a simulated sensor'" in capsys.readouterr().err
-
-
-def test_the_file_belongs_to_scans_and_is_not_written_over(tmp_path: Path):
-    assert imported(tmp_path, "--format", "reference") == 2
-    mine = written(tmp_path, SHIPPED.read_text(encoding="utf-8"))
-    assert imported(tmp_path, "--lab", str(mine), "-o", str(mine)) == 4

