@@ -22,29 +22,6 @@ def dry(folder: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def lubricated(folder: Path) -> Path:
-    path = folder / "lubricated.h5"
-    memscal.write_scan(contact_scan(2, load=LOADS[:1], lubrication="lubricated"), path)
-    return path
-
-
-def test_the_file_names_its_inputs_and_holds_the_profiles(
-    run: Run, artifact: Path, dry: Path, lubricated: Path, folder: Path
-):
-    assert run("apply", artifact, dry, lubricated, "-o", "out.h5").code == 0
-    found = memscal.read_stress(folder / "out.h5")
-    measured = memscal.measure_stress([memscal.read_scan(p) for p in (dry, lubricated)], artifact)
-    for mine, its in zip(found.profiles, measured.profiles, strict=True):
-        assert mine == its
-    assert found.artifact.file_name == "sensor.apparatus.h5"
-    sources = [scan.source.file_name for scan in found.scans if scan.source]
-    assert sources == ["dry.h5", "lubricated.h5"]
-    assert [found.scans.index(profile.scan) for profile in found.profiles] == [0, 0, 1]
-    assert run("check", "out.h5").code == 0
-    assert "memscal-stress" in run("inspect", "out.h5").out
-
-
 def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run: Run, artifact: Path, folder: Path):
     scan = contact_scan(1, load=LOADS, noise=0.001, load_scatter=0.0)
     memscal.write_scan(replace(scan, u_zz=1.2 * scan.u_zz), folder / "gain.h5")

@@ -16,28 +16,6 @@ def test_a_depth_gives_the_load_that_gives_the_depth(run: Run):
     assert loaded["depth"]["value"] == pytest.approx(100)
 
 
-def test_a_cone_and_a_measured_tip_go_to_a_file_and_come_back(run: Run, folder: Path):
-    assert run("reference", "cone", "--inclination", 2, "-o", "cone.h5").code == 0
-    cone = memscal.read_reference("cone.h5").indenter
-    assert isinstance(cone, memscal.Cone)
-    assert np.degrees(cone.inclination) == pytest.approx(2)
-    r = np.linspace(0, 8, 81)
-    rows = "".join(f"{x:g};{x**2 / 0.2576 + 3:g}\n" for x in r)
-    Path("tip.csv").write_text("r;z\n" + rows, encoding="utf-8")
-    tip = ["profile", "--profile-table", "tip.csv", "--load", 1]
-    assert run("reference", *tip, "--friction", 0.2, "-o", "tip.h5").code == 0
-    profile = memscal.read_reference("tip.h5")
-    assert isinstance(profile.indenter, memscal.Profile)
-    assert profile.indenter.extent == pytest.approx(8e-3)
-    sphere = run("reference", "sphere", "--load", 1, "--friction", 0.2, "--json").json
-    assert profile.sigma_zz.max() == pytest.approx(
-        sphere["solutions"][0]["max_base_stress"]["value"], rel=1e-3
-    )
-    for name in ("cone.h5", "tip.h5"):
-        assert run("check", name).code == 0
-        assert "shape" in run("inspect", name).out
-
-
 def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
     Path("tip.csv").write_text("r,z\n0,0\n1,nan\n2,4\n3,9\n", encoding="utf-8")
     run("reference", "profile", "--profile-table", "tip.csv").exits(3, "tip.csv")

@@ -151,7 +151,8 @@ def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, v
 
 
 @pytest.mark.parametrize(("given", "told"), [
-    ({"step": float("nan")}, "step"), ({"half_range": -1e-3}, "half range"), ({"load": 0.0}, "load"),
+    ({"step": float("nan")}, "step"), ({"half_range": -1e-3}, "half range"),
+    ({"load": 0.0}, "load"),
     ({"conversion_constant": -1e-7}, "conversion constant"), ({"load_uncertainty": -0.01}, "load"),
     ({"repeats": 1.5}, "repeated 1.5 times"), ({"noise": 0.0}, "noise"),
     ({"noise_voltage": 0.0}, "noise"),
