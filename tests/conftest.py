@@ -14,9 +14,11 @@ from pathlib import Path
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
-# A run under nohup ignores it, and so would the programs that tests start and end.
+# A run under nohup, or in the background of a script, ignores them, and so would the programs that
+# tests start and end.
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import pytest  # noqa: E402
 from helpers.console import Outcome, Run  # noqa: E402
