@@ -32,7 +32,6 @@ PUBLIC = {
         "BoundedEstimate",
         "DryAgainstLubricated",
         "FrictionComparison",
-        "InterfaceComparison",
         "Interval",
         "LoadComparison",
     ],

@@ -20,6 +20,7 @@ from .deconvolution.widths import fit_gaussian as fit_gaussian
 from .errors import MemscalError as MemscalError
 from .extensions.fleet.many import FleetCalibration as FleetCalibration
 from .extensions.fleet.many import calibrate_many as calibrate_many
+from .extensions.interface_laws.results import InterfaceComparison as InterfaceComparison
 from .extensions.monte_carlo.monte_carlo import MonteCarlo as MonteCarlo
 from .extensions.monte_carlo.monte_carlo import monte_carlo as monte_carlo
 from .extensions.monte_carlo.sweep import Sweep as Sweep
@@ -44,7 +45,6 @@ from .friction.compare import compare as compare
 from .friction.results import BoundedEstimate as BoundedEstimate
 from .friction.results import DryAgainstLubricated as DryAgainstLubricated
 from .friction.results import FrictionComparison as FrictionComparison
-from .friction.results import InterfaceComparison as InterfaceComparison
 from .friction.results import Interval as Interval
 from .friction.results import LoadComparison as LoadComparison
 from .measurement.measure_stress import measure_stress as measure_stress

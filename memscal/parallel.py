@@ -90,8 +90,10 @@ def worker_pool(workers: int) -> Iterator[Executor]:
         # Ctrl-C is this process's affair: workers inherit that it is blocked while they start.
         resource_tracker.ensure_running()  # at its own start it would lift the block
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        pool.submit(int)
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        try:
+            pool.submit(int)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         with workers_that_last():
             yield pool
             pool.shutdown()

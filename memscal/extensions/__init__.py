@@ -58,7 +58,7 @@ VIEWS = {
     "FleetResults": ("extensions.fleet.results_summary", "extensions.fleet.figure.fleet_figure"),
     "InterfaceComparison": (
         "extensions.interface_laws.summary",
-        "figures.friction.interface_figure",
+        "extensions.interface_laws.figure.interface_figure",
     ),
     "MonteCarlo": ("extensions.monte_carlo.summary", ""),
     "Sweep": (
@@ -75,6 +75,7 @@ HOOKS = {
     "write_artifact": "formats.artifact",
     "write_stress": "formats.stress",
     "compare_interface": "extensions.interface_laws.model_comparison",
+    "interface_figure": "extensions.interface_laws.figure",
     "is_mesh": "extensions.meshes.mesh_files",
     "monte_carlo": "extensions.monte_carlo.monte_carlo",
     "press_at_finite_strain": "extensions.finite_strain.solve",
@@ -88,6 +89,7 @@ HOOKS = {
 
 PUBLIC = {
     "extensions.fleet.many": ["FleetCalibration", "calibrate_many"],
+    "extensions.interface_laws.results": ["InterfaceComparison"],
     "extensions.monte_carlo.monte_carlo": ["MonteCarlo", "monte_carlo"],
     "extensions.monte_carlo.sweep": ["Sweep"],
     "extensions.planning.design": ["Design", "Plan", "design"],

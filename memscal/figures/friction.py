@@ -1,6 +1,5 @@
 """Figures of a comparison of measured with calculated stress."""
 
-import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -10,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.errors import InputError
+from memscal.extensions import hook
 from memscal.figures import friction_profiles as profiles
 from memscal.figures.friction_profiles import (
     comparison_looks,
@@ -25,101 +25,21 @@ from memscal.figures.style import (
     COLOURS,
     COVERAGE_NOTE,
     EXPANDED,
-    draw_band,
     legend_above,
     mark,
     panels_of,
 )
-from memscal.friction.family import bounded
 from memscal.friction.results import (
     BoundedEstimate,
     FrictionComparison,
-    ImpliedFriction,
-    InterfaceComparison,
-    LawComparison,
     LoadComparison,
 )
 from memscal.model.arrays import FloatArray
 
-_UM = 1e-6
-#: The length in the middle of the axis from 0 to infinity, in m.
-_MIDDLE = 3e-6
-_TICKS = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, np.inf)
-_COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
-_RISE = r"$-2\,\ln(p/p_{max})$"
+RISE = r"$-2\,\ln(p/p_{max})$"
 _INTERVALS = "95 % by profile likelihood, about k = 2"
-_INTERVAL_NOTE = f"Intervals of friction coefficients and lengths: {_INTERVALS}."
+INTERVAL_NOTE = f"Intervals of friction coefficients and lengths: {_INTERVALS}."
 _BOTH_NOTE = f"{COVERAGE_NOTE} Intervals of friction coefficients: {_INTERVALS}."
-
-
-def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
-    """Draw laws of the interface, of a comparison with friction or of the laws alone."""
-    if isinstance(comparison, FrictionComparison):
-        laws = comparison.interface
-        loads = comparison.loads[comparison.loadings[0]]
-    else:
-        laws = comparison
-        loads = ()
-    if laws is None:
-        cure = "Compare with interface=True and a macroscopic friction coefficient."
-        raise InputError("There is no law of the interface to draw.", cure=cure)
-    slip = laws.tangential
-    implied = None if slip is None else slip.implied
-    columns = 2 if implied is None else 3
-    with panels_of(3.0, 1, columns, note=_INTERVAL_NOTE) as (figure, panels):
-        _draw_lengths(panels[0], laws.by_direction)
-        _draw_marginal_likelihoods(panels[1], laws.by_direction)
-        if slip is not None and implied is not None:
-            measured = [load for load in loads if load.lubrication == slip.lubrication]
-            _draw_implied(panels[2], implied, measured)
-    return figure
-
-
-def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
-    for direction, compared in by_direction.items():
-        place = bounded(compared.length.values, _MIDDLE)
-        label = f"{direction}, {lubricated_words(compared.lubrication)}"
-        axes.plot(place, _rise(compared.length), color=COLOURS[_COLOURS[direction]], label=label)
-    _draw_levels(axes)
-    names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
-    axes.xaxis.set_ticks(list(bounded(np.array(_TICKS) * _UM, _MIDDLE)), names)
-    axes.set(xlim=(-0.02, 1.02), xlabel="length (µm)", ylabel=_RISE)
-    legend_above(axes, columns=1)
-
-
-def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
-    """Draw the logarithm of each law's marginal likelihood over that of the best of its kind."""
-    names = []
-    height = 0
-    for direction, compared in by_direction.items():
-        best = max(law.log_evidence for law in compared.laws)
-        for law in compared.laws:
-            below = law.log_evidence - best
-            axes.plot([below, 0.0], [height, height], color="0.8", lw=0.8, zorder=1)
-            axes.plot(below, height, "o", color=COLOURS[_COLOURS[direction]], ms=5)
-            names.append(textwrap.fill(law.name, 22))
-            height += 1
-    axes.yaxis.set_ticks(list(range(height)), names)
-    axes.set_ylim(height - 0.5, -0.5)
-    axes.axvline(0.0, color="0.6", lw=0.6)
-    axes.set_xlabel("ln of marginal likelihood\nover the best")
-
-
-def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:
-    low, best, high = friction_position(np.sort(implied.friction, axis=1)).T
-    draw_band(axes, implied.loads, low, high)
-    axes.plot(implied.loads, best, color=COLOURS["deconvolved"], label="what the slip length means")
-    black = COLOURS["measured"]
-    for i, at_load in enumerate(measured):
-        reading = at_load.by_profile
-        label = "found at each load" if i == 0 else "_found"
-        axes.plot([at_load.load] * 2, _ends(reading), color=black, lw=1.0, label=label)
-        if reading.value is not None:
-            axes.plot(at_load.load, friction_position(reading.value), "o", color=black, ms=4)
-    friction_axis(axes, "y")
-    axes.set_xlabel("load (N)")
-    axes.set_xlim(left=0)
-    legend_above(axes, columns=1)
 
 
 _SHOWN = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, np.inf)
@@ -257,7 +177,7 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     figures["effective-friction"] = partial(effective_friction_figure, comparison)
     figures["likelihood"] = partial(likelihood_figure, comparison)
     if comparison.interface is not None:
-        figures["interface"] = partial(interface_figure, comparison)
+        figures["interface"] = partial(hook("interface_figure"), comparison)
     return figures
 
 
@@ -289,7 +209,7 @@ def _draw_effective(
             _draw_reading(axes, getattr(at_load, name), x, words if i == 0 else "", look)
     joint = joint_estimate(comparison, loads)
     green = COLOURS["reference"]
-    axes.axhspan(*_ends(joint), color=green, alpha=0.18, lw=0, label="all loads, 95 %")
+    axes.axhspan(*interval_ends(joint), color=green, alpha=0.18, lw=0, label="all loads, 95 %")
     if joint.value is not None:
         axes.axhline(float(friction_position(joint.value)), color=green, lw=0.8)
     if comparison.macroscopic is not None:
@@ -313,7 +233,7 @@ def _draw_reading(
 ) -> None:
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
     colour = look["color"]
-    low, high = _ends(reading)
+    low, high = interval_ends(reading)
     (bar,) = axes.plot([x, x], [low, high], color=colour, lw=1.0, solid_capstyle="butt")
     bar.set_gid("interval")
     cap = {"marker": "_", "ls": "none", "color": colour, "ms": 5, "mew": 1.0}
@@ -330,7 +250,7 @@ def _draw_reading(
         axes.plot([], [], look["marker"], color=colour, ms=4, ls="-", lw=1.0, label=label)
 
 
-def _ends(reading: BoundedEstimate) -> FloatArray:
+def interval_ends(reading: BoundedEstimate) -> FloatArray:
     """Return where the ends of an interval stand on the axis."""
     return friction_position([reading.interval.low, reading.interval.upper])
 
@@ -372,7 +292,7 @@ def _one_legend(figure: Figure, panels: Iterable[Axes], first: Sequence[str]) ->
 
 def likelihood_figure(comparison: FrictionComparison) -> Figure:
     """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
-    return _panels(comparison, _draw_likelihood, 2.4, _INTERVAL_NOTE)
+    return _panels(comparison, _draw_likelihood, 2.4, INTERVAL_NOTE)
 
 
 def _draw_likelihood(
@@ -384,16 +304,16 @@ def _draw_likelihood(
         _draw_rise(axes, at_load.by_profile, color=colour, lw=1.0, label=name)
     joint = joint_estimate(comparison, loads)
     _draw_rise(axes, joint, color=COLOURS["measured"], lw=1.8, label="all loads")
-    _draw_levels(axes)
+    draw_levels(axes)
     friction_axis(axes, "x")
-    axes.set_ylabel(_RISE)
+    axes.set_ylabel(RISE)
 
 
 def _draw_rise(axes: Axes, reading: BoundedEstimate, **look: Any) -> None:
-    axes.plot(friction_position(reading.values), _rise(reading), **look)
+    axes.plot(friction_position(reading.values), deviance_rise(reading), **look)
 
 
-def _draw_levels(axes: Axes) -> None:
+def draw_levels(axes: Axes) -> None:
     """Draw the levels that bound 68.3 % and 95 %, and end the axis not far above."""
     look: dict[str, Any] = {"ha": "right", "fontsize": 6, "color": "0.4"}
     look |= {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
@@ -403,5 +323,6 @@ def _draw_levels(axes: Axes) -> None:
     axes.set_ylim(0, _HIGHEST)
 
 
-def _rise(reading: BoundedEstimate) -> FloatArray:
+def deviance_rise(reading: BoundedEstimate) -> FloatArray:
+    """Return the deviance over its least value."""
     return np.asarray(reading.deviance) - float(np.min(reading.deviance))

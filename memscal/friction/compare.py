@@ -29,7 +29,6 @@ from memscal.friction.likelihood import Channel, load_points, require_line, sens
 from memscal.friction.results import (
     BoundedEstimate,
     FrictionComparison,
-    InterfaceComparison,
     LoadComparison,
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
@@ -254,7 +253,7 @@ def compare(
         shear_families=shear_families,
         macroscopic=sliding,
     )
-    laws: InterfaceComparison | None = None
+    laws = None
     if interface:
         laws = hook("compare_interface")(
             measured.profiles,

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from memscal.apparatus import ApparatusFunction
 from memscal.model.arrays import FloatArray
-from memscal.model.bayes_factor import POSITIVE, BayesFactor
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
 from memscal.model.result import Result
+
+if TYPE_CHECKING:
+    from memscal import InterfaceComparison
 
 _UM = 1e-6
 
@@ -293,142 +296,3 @@ class FrictionComparison(Result, Checked):
     def loadings(self) -> tuple[str, ...]:
         """Definitions of the loading that were compared."""
         return tuple(self.loads or self.by_shear)
-
-
-@dataclass(frozen=True)
-class InterfaceLaw:
-    r"""One law of the interface, weighed over all loads together.
-
-    ``best`` are its free parameters at the largest likelihood (coefficients, of each load if there
-    are several, or a length in m).  ``log_evidence``,
-    :math:`\ln \int p(u | \theta)\,\pi(\theta)\,d\theta`, and ``log_likelihood``, the largest
-    :math:`\ln p(u | \theta)`, share a constant of the scans; ``numerical_error`` is the standard
-    uncertainty of the integral.  ``least``, ``degrees`` and ``p_value`` are of chi-square at best.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
-    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
-    >>> comparison = memscal.compare(
-    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
-    ... )
-    >>> amontons = comparison.interface.tangential.laws[0]
-    >>> 0 <= amontons.best[0] < 0.3
-    True
-    """
-
-    name: str
-    best: tuple[float, ...]
-    log_evidence: float
-    log_likelihood: float
-    numerical_error: float
-    least: float
-    degrees: int
-    p_value: float
-
-
-@dataclass(frozen=True, eq=False)
-class ImpliedFriction:
-    r"""What the fitted slip length means at each of ``loads`` (l,), in N, increasing.
-
-    ``friction`` (l, 3): Amontons' coefficients that give the same stress on the axis, through the
-    sensor, as lower end, best value and upper end of the slip length; ``inf`` where full stick is
-    not more than that.  ``pressures`` (l,): :math:`\bar p = P/\pi a^2` in Pa.  ``stiffnesses``
-    (l, 3): :math:`\mu\bar p/\ell` in Pa/m for the three; ``inf`` of a rigid interface.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
-    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
-    >>> comparison = memscal.compare(
-    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
-    ... )
-    >>> implied = comparison.interface.tangential.implied
-    >>> implied.friction.shape  # loads; lower end, best value, upper end
-    (1, 3)
-    """
-
-    loads: FloatArray
-    friction: FloatArray
-    pressures: FloatArray
-    stiffnesses: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class LawComparison:
-    """Laws of the interface over all ``loads`` (l,), in N, of one lubrication.
-
-    The last of ``laws`` yields over ``length``; ``factors`` weigh it against each of the others.
-    ``implied`` says what a slip length means at each load; it is ``None`` of a normal law.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
-    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
-    >>> comparison = memscal.compare(
-    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
-    ... )
-    >>> [law.name for law in comparison.interface.tangential.laws]
-    ['effective Amontons, one coefficient', 'elasto-plastic at 0.1, slip length']
-    """
-
-    lubrication: str
-    loads: FloatArray
-    laws: tuple[InterfaceLaw, ...]
-    factors: tuple[BayesFactor, ...]
-    length: BoundedEstimate
-    implied: ImpliedFriction | None = None
-
-    @property
-    def yielding_preferred(self) -> bool:
-        """Whether the evidence for the law that yields is positive, and its likelihood larger.
-
-        Its largest likelihood is above that of every law with as many parameters or fewer.
-        """
-        *others, yielding = self.laws
-        evident = 2 * (yielding.log_evidence - max(law.log_evidence for law in others)) >= POSITIVE
-        rivals = [law for law in others if len(law.best) <= len(yielding.best)]
-        likelier = all(yielding.log_likelihood > law.log_likelihood for law in rivals)
-        return evident and likelier
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class InterfaceComparison(Result):
-    """Laws of the interface against an effective friction coefficient, by evidence.
-
-    ``macroscopic`` is the coefficient at which the interface slips and its standard uncertainty.
-    ``tangential``, of dry scans: one effective coefficient, one for each load, and the
-    elasto-plastic law with a slip length; ``normal``, of lubricated scans: a rigid frictionless
-    interface, and one that yields normally; ``None`` without such scans.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
-    >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
-    >>> comparison = memscal.compare(
-    ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1
-    ... )
-    >>> laws = comparison.interface
-    >>> laws.normal is None  # no lubricated scan was given
-    True
-    """
-
-    macroscopic: tuple[float, float | None]
-    tangential: LawComparison | None
-    normal: LawComparison | None
-    messages: tuple[Message, ...] = field(default=())
-
-    def __repr__(self) -> str:
-        """Return the length of each law that yields."""
-        lengths = (f"{name}: {laws.length}" for name, laws in self.by_direction.items())
-        return f"<InterfaceComparison: {'; '.join(lengths)}>"
-
-    @property
-    def by_direction(self) -> dict[str, LawComparison]:
-        """What was compared, by the direction in which the interface yields."""
-        both = {"tangential": self.tangential, "normal": self.normal}
-        return {name: laws for name, laws in both.items() if laws is not None}

@@ -21,11 +21,11 @@ import memscal
 from memscal import ElasticFilm, Interface
 from memscal.extensions.interface_laws.families import elasto_plastic_family
 from memscal.extensions.interface_laws.model_comparison import compare_interface
+from memscal.extensions.interface_laws.results import LawComparison
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
-from memscal.friction.results import LawComparison
 
 pytestmark = [pytest.mark.accuracy, pytest.mark.full_study]
 

@@ -8,6 +8,7 @@ from helpers.friction_results import LOADS, comparison, interface_comparison, st
 from matplotlib.axes import Axes
 
 from memscal.errors import InputError
+from memscal.extensions.interface_laws.figure import interface_figure
 from memscal.figures import friction as of_friction
 from memscal.figures.friction import effective_friction_figure, likelihood_figure
 from memscal.figures.friction_profiles import (
@@ -97,7 +98,7 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
 
 
 def test_the_likelihood_of_a_slip_length_touches_zero_at_it():
-    figure = of_friction.interface_figure(comparison(interface=interface_comparison(1.8e-6)))
+    figure = interface_figure(comparison(interface=interface_comparison(1.8e-6)))
     curves = {line.get_label(): line for line in figure.axes[0].lines}
     t, rise = (np.asarray(values) for values in curves["tangential, dry"].get_data())
     assert t[np.argmin(rise)] == pytest.approx(1.8 / (1.8 + 3.0), abs=0.01)
@@ -110,4 +111,4 @@ def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionCom
     with pytest.raises(InputError, match="not stated"):
         friction_set_figure(found, lubrication="")
     with pytest.raises(InputError, match="interface=True"):
-        of_friction.interface_figure(found)
+        interface_figure(found)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import memscal
-from memscal.friction.results import ImpliedFriction, InterfaceLaw, LawComparison
+from memscal.extensions.interface_laws.results import ImpliedFriction, InterfaceLaw, LawComparison
 
 FRICTION = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, math.inf])
 LOADS = (0.34, 0.69, 1.37, 2.75)

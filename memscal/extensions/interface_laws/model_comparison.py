@@ -24,6 +24,12 @@ from memscal.extensions.interface_laws.families import (
     normal_compliance_family,
     slipping_family,
 )
+from memscal.extensions.interface_laws.results import (
+    ImpliedFriction,
+    InterfaceComparison,
+    InterfaceLaw,
+    LawComparison,
+)
 from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import amontons_family
 from memscal.friction.family import ProfileFamily, bounded, unbounded
@@ -38,14 +44,7 @@ from memscal.friction.marginal_likelihood import (
     log_likelihood,
     log_uniform_prior,
 )
-from memscal.friction.results import (
-    BoundedEstimate,
-    ImpliedFriction,
-    InterfaceComparison,
-    InterfaceLaw,
-    Interval,
-    LawComparison,
-)
+from memscal.friction.results import BoundedEstimate, Interval
 from memscal.model.arrays import BoolArray, FloatArray, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message

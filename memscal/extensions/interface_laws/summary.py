@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from memscal.friction import results
-from memscal.friction.results import percent
+from memscal.extensions.interface_laws import results
+from memscal.friction.results import INTERVAL, VALUE, percent
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, Quantity
 from memscal.model.records import ESTIMATE_FIT, SLIP_LENGTH
@@ -97,7 +97,7 @@ def _length_table(direction: str, compared: results.LawComparison) -> Table:
         likelier = "" if ratio is None else f"{sign * ratio:+.1f}"
         rows.append([law, value, f"{side} it, {factor.words}", likelier])
     length = str(compared.length)
-    if compared.length.kind in (results.VALUE, results.INTERVAL):
+    if compared.length.kind in (VALUE, INTERVAL):
         length += f" [{percent(compared.length.interval.level)} interval]"
     title = f"The law that yields, {words} {length}, against the others"
     return Table(title, ["law", "Bayes factor", "evidence", "ln of likelihoods"], rows)

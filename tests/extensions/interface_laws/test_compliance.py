@@ -26,9 +26,9 @@ from memscal.extensions.interface_laws.model_comparison import (
     weigh_normal_compliance,
     weigh_slip_length,
 )
+from memscal.extensions.interface_laws.results import LawComparison
 from memscal.friction.family import ProfileFamily, bounded
 from memscal.friction.likelihood import likelihood
-from memscal.friction.results import LawComparison
 
 
 @lru_cache

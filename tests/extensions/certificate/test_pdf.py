@@ -3,17 +3,14 @@
 import io
 import re
 import socket
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-import memscal
 from memscal.cli import main
 from memscal.extensions.certificate.certificate import Certificate, certify
 from memscal.extensions.certificate.dcc import certificate_xml
-from memscal.extensions.certificate.laboratory import LaboratoryFile, read_laboratory
 from memscal.extensions.certificate.page import certificate_page, certificate_pdf
 
 # What WeasyPrint says of libraries that it will need is no matter of ours.
@@ -22,24 +19,7 @@ pytestmark = [
     pytest.mark.filterwarnings("default::DeprecationWarning:weasyprint"),
 ]
 
-DATA = Path(__file__).parents[2] / "calibration_data"
-
-
-@pytest.fixture(scope="module")
-def laboratory() -> LaboratoryFile:
-    return read_laboratory(DATA / "lab.toml")
-
-
-@pytest.fixture(scope="module")
-def apparatus() -> memscal.ApparatusFunction:
-    """The shipped artifact of a sensor without a name, so that the file names it."""
-    shipped = memscal.load_apparatus(DATA / "rod_scan_65.apparatus.h5")
-    return replace(shipped, sensor=memscal.StressSensor())
-
-
-@pytest.fixture(scope="module")
-def certificate(apparatus, laboratory) -> Certificate:
-    return certify(apparatus, laboratory)
+DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture(scope="module")
