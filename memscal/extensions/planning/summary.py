@@ -90,7 +90,10 @@ def _percent(share: float) -> str:
 
 
 def _contributions_table(planned: Design) -> Table:
-    shares = {name: _relative_budget(planned, name) for name in _SHOWN}
+    shares = {}
+    for name in _SHOWN:
+        value = abs(planned.parameters[name])
+        shares[name] = {source: u / value for source, u in planned.budget[name].items()}
     rows = []
     for source in shares["conversion_constant"]:
         cells = []
@@ -102,11 +105,6 @@ def _contributions_table(planned: Design) -> Table:
             rows.append([_WORDS.get(source, source.replace("_", " ")), *cells])
     head = ("source", *(symbol for _, symbol in _SHOWN.values()))
     return Table("Contributions, in percent", head, rows)
-
-
-def _relative_budget(planned: Design, name: str) -> dict[str, float]:
-    value = abs(planned.parameters[name])
-    return {source: u / value for source, u in planned.budget[name].items()}
 
 
 def mapping(planned: Design) -> dict[str, Any]:
