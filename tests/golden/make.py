@@ -16,11 +16,13 @@ cannot repeat is masked: dates, digests, and versions of programs.
 
 import argparse
 import contextlib
+import functools
 import gzip
 import inspect
 import io
 import json
 import math
+import pkgutil
 import re
 import shlex
 import sys
@@ -28,6 +30,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from numpy.typing import ArrayLike
 
@@ -47,33 +50,91 @@ COMMANDS = {name: arguments for name, _, arguments in (line.partition(": ") for 
 """Arguments of the program by the name of the golden file; what one writes others read."""
 
 
+SOLVED = (
+    "memscal.calibration.calibrate.calibrate",
+    "memscal.calibration.calibrate.Calibration.sweep",
+    "memscal.extensions.planning.design.design",
+    "memscal.friction.compare.compare",
+    "memscal.measurement.measure_stress.measure_stress",
+    "memscal.measurement.restore.restore",
+)
+"""Functions by which a command finds what it then prints, draws and writes."""
+
+NAMES_OF_FILES = {"-o", "--report", "--figure", "--figures", "--figure-format", "--sweep-figure"}
+"""Options that change nothing of what a command finds."""
+
+
 class Runs:
-    """Runs of the commands in one folder, each once, after those whose outputs it reads."""
+    """Runs of the commands in one folder, each once, after those whose outputs it reads.
+
+    What is asked twice, to be printed as JSON and as text, is found once.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         unpack(folder / "files")
         self._results: dict[str, dict[str, Any]] = {}
+        self._found: dict[tuple[str, ...], Any] = {}
+        self._question: tuple[str, ...] = ()
         for name, target in LINKS.items():
             (folder / name).symlink_to(target)
 
     def __getitem__(self, name: str) -> dict[str, Any]:
         if name not in self._results:
-            for writer in inputs(name):
-                self[writer]
-            self._results[name] = self._run(name)
+            arguments = shlex.split(COMMANDS[name])
+            code, out, err = self.run([*arguments, "--json"])
+            if not out:
+                raise AssertionError(f"memscal {COMMANDS[name]}\n{err}")
+            printed = reduced(json.loads(out))
+            result = {"command": COMMANDS[name], "exit_code": code, "output": printed}
+            self._results[name] = result
         return self._results[name]
 
-    def _run(self, name: str) -> dict[str, Any]:
+    def run(self, arguments: list[str]) -> tuple[int, str, str]:
+        """Run a command, after those whose outputs it reads; return code and what it printed."""
+        read = {argument.partition("/")[0] for argument in arguments} - {output(arguments)}
+        for name, command in COMMANDS.items():
+            if output(shlex.split(command)) in read:
+                self[name]
         out = io.StringIO()
         err = io.StringIO()
-        streams = contextlib.redirect_stdout(out), contextlib.redirect_stderr(err)
-        with contextlib.chdir(self.folder), streams[0], streams[1]:
-            code = run_memscal([*shlex.split(COMMANDS[name]), "--json"])
-        if not out.getvalue():
-            raise AssertionError(f"memscal {COMMANDS[name]}\n{err.getvalue()}")
-        printed = reduced(json.loads(out.getvalue()))
-        return {"command": COMMANDS[name], "exit_code": code, "output": printed}
+        self._question = asked(arguments)
+        with contextlib.ExitStack() as stack:
+            for path in SOLVED:
+                stack.enter_context(self._once(path))
+            # Work that is shared among processes is that of other tests: each takes long to start.
+            stack.enter_context(mock.patch("os.cpu_count", return_value=1))
+            stack.enter_context(contextlib.chdir(self.folder))
+            stack.enter_context(contextlib.redirect_stdout(out))
+            stack.enter_context(contextlib.redirect_stderr(err))
+            code = run_memscal(arguments)
+        self._question = ()
+        return code, out.getvalue(), err.getvalue()
+
+    def _once(self, path: str) -> contextlib.AbstractContextManager[Any]:
+        """Let a function answer the question of a command once."""
+        place, _, name = path.rpartition(".")
+        owner = pkgutil.resolve_name(place)
+        function = getattr(owner, name)
+
+        @functools.wraps(function)
+        def once(*values: Any, **options: Any) -> Any:
+            # What was imported meanwhile keeps this function.
+            if not self._question:
+                return function(*values, **options)
+            key = path, *self._question
+            if key not in self._found:
+                self._found[key] = function(*values, **options)
+            return self._found[key]
+
+        return mock.patch.object(owner, name, once)
+
+
+def asked(arguments: list[str]) -> tuple[str, ...]:
+    """Return the arguments of a command that change what it finds."""
+    named = {i + 1 for i, argument in enumerate(arguments) if argument in NAMES_OF_FILES}
+    kept = [a for i, a in enumerate(arguments) if i not in named]
+    return tuple(a for a in kept if a not in NAMES_OF_FILES | {"--json"})
 
 
 def unpack(folder: Path) -> None:
@@ -83,15 +144,8 @@ def unpack(folder: Path) -> None:
         (folder / path.stem).write_bytes(gzip.decompress(path.read_bytes()))
 
 
-def inputs(name: str) -> list[str]:
-    """Commands that write what a command reads."""
-    first = [argument.partition("/")[0] for argument in shlex.split(COMMANDS[name])]
-    return [other for other in COMMANDS if other != name and output(other) in first]
-
-
-def output(name: str) -> str | None:
+def output(arguments: list[str]) -> str | None:
     """File or folder that a command writes."""
-    arguments = shlex.split(COMMANDS[name])
     return arguments[arguments.index("-o") + 1] if "-o" in arguments else None
 
 

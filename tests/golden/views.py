@@ -4,8 +4,7 @@ Numbers are masked, for the golden outputs hold them; so are layout and coordina
 on purpose, ``python tests/golden/views.py`` writes them anew: read the diff.
 """
 
-import contextlib
-import io
+import base64
 import re
 import shlex
 import sys
@@ -17,9 +16,7 @@ from itertools import groupby
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from golden.make import COMMANDS, HERE, Runs, output
-
-from memscal.cli import main as run_memscal
+from golden.make import HERE, Runs
 
 VIEWS = HERE / "views"
 LINES = (HERE / "commands_of_views.txt").read_text(encoding="utf-8").splitlines()
@@ -41,7 +38,7 @@ def masked(text: str) -> str:
 
 
 class _Page(HTMLParser):
-    """Elements of a page with their words, a line each."""
+    """Elements of a page with their words, a line each, and the structure of its figures."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -52,6 +49,9 @@ class _Page(HTMLParser):
         self.unseen = tag in _UNSEEN
         stated = [f"{key}={masked(value or '')}" for key, value in attrs if key in _ATTRIBUTES]
         self.lines.append(" ".join([f"<{tag}>", *stated]))
+        kind, _, content = (dict(attrs).get("src") or "").partition(";base64,")
+        if kind == "data:image/svg+xml":
+            self.lines += figure_structure(base64.b64decode(content).decode("utf-8"))
 
     def handle_endtag(self, tag: str) -> None:
         self.unseen = False
@@ -103,20 +103,12 @@ STRUCTURES = {".html": page_structure, ".svg": figure_structure, ".xml": xml_str
 
 def view(name: str, runs: Runs) -> str:
     """Run a command; return what it printed and the structure of what it drew, as text."""
-    arguments = shlex.split(VIEW_COMMANDS[name])
-    for other in COMMANDS:
-        if output(other) in {argument.partition("/")[0] for argument in arguments}:
-            runs[other]
     before = set(runs.folder.rglob("*"))
-    out = io.StringIO()
-    err = io.StringIO()
-    streams = contextlib.redirect_stdout(out), contextlib.redirect_stderr(err)
-    with contextlib.chdir(runs.folder), streams[0], streams[1]:
-        code = run_memscal(arguments)
+    code, out, err = runs.run(shlex.split(VIEW_COMMANDS[name]))
     sections = [f"memscal {VIEW_COMMANDS[name]}", f"exit code {code}", "", "stdout"]
-    sections += [masked(line) for line in out.getvalue().splitlines()]
+    sections += [masked(line) for line in out.splitlines()]
     # What says how long something took comes on a slow machine alone.
-    messages = err.getvalue().replace(str(runs.folder), "FOLDER").splitlines()
+    messages = err.replace(str(runs.folder), "FOLDER").splitlines()
     sections += ["", "stderr", *(masked(line) for line in messages if not _TIMED.search(line))]
     for path in sorted(set(runs.folder.rglob("*")) - before):
         if path.suffix in STRUCTURES:
