@@ -27,7 +27,7 @@ from memscal.axisymmetry.hankel import (
 )
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Deconvolution, Solution
-from memscal.deconvolution.widths import kernel_functionals, noise_area
+from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
@@ -383,8 +383,9 @@ def _parameters(
     widths = radial.combined(np.stack([functional.row for functional in functionals]))
     if deconvolution.divided and radial.hidden.size:
         # What a window hides of G adds to the integral of its square by its own square.
-        whole = noise_area(g.r, g.radial + radial.hidden[:, 0])
-        widths.hidden[-1, 0] = whole - functionals[-1].value
+        whole = g.radial + radial.hidden[:, 0]
+        area = 1 / np.sum(ring_areas(g.r) * whole**2)
+        widths.hidden[-1, 0] = area - functionals[-1].value
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain = estimate.gaussian_gain
     ellipse = estimate.points.ellipse

@@ -49,25 +49,28 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     if start is None:
         start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
 
-    def misfit(scaled: FloatArray) -> FloatArray:
-        return root * (unit_gaussian(r, scaled[0] * start) - radial) * start**2
-
-    def slope(scaled: FloatArray) -> FloatArray:
-        return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
-
     def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Misfit at a width over ``start``, and its slope."""
         # A step may lead beyond the narrowest width, where the search with a bound takes over.
-        inside = np.maximum(scaled, narrowest / start)
-        return misfit(inside), slope(inside)
-
+        sigma = max(scaled[0], narrowest / start) * start
+        misfit = root * (unit_gaussian(r, sigma) - radial) * start**2
+        slope = root * unit_gaussian_slope(r, sigma) * start**3
+        return misfit, slope[:, None]
     begin = np.array([max(start, 2 * narrowest) / start])
     width = gauss_newton(linearise, begin, tolerance=1e-10)
     if width is not None and width[0] * start > 2 * narrowest:
         return float(width[0] * start)
     from scipy.optimize import least_squares
 
-    bounds = (narrowest / start, np.inf)
-    bounded = least_squares(misfit, begin, slope, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+    bounded = least_squares(
+        lambda scaled: linearise(scaled)[0],
+        begin,
+        lambda scaled: linearise(scaled)[1],
+        bounds=(narrowest / start, np.inf),
+        xtol=1e-12,
+        ftol=1e-14,
+        gtol=1e-14,
+    )
     return float(bounded.x[0] * start)
 
 
@@ -84,8 +87,10 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     """Return the Gaussian width nearest to G, its half width and noise-equivalent area."""
     r = field.r
     g = field.radial
-    area = noise_area(r, g)
-    noise_width = Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
+    # The noise-equivalent area is 4 pi sigma^2 of a Gaussian.
+    rings = ring_areas(r)
+    area = float(1 / np.sum(rings * g**2))
+    noise_width = Functional("noise_equivalent_area", area, -2 * area**2 * rings * g)
     # The Gaussian u nearest to G over the plane: where the sum of r (u - G) u' vanishes, its change
     # by G over its change by the width.
     slope = unit_gaussian_slope(r, sigma)
@@ -97,10 +102,6 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     return nearest, _half_width(r, g), noise_width
 
 
-def noise_area(r: FloatArray, g: FloatArray) -> float:
-    """Noise-equivalent area (m^2) of G (1/m^2) at even radii: 4 pi sigma^2 of a Gaussian."""
-    return float(1 / np.sum(ring_areas(r) * g**2))
-
 
 def _half_width(r: FloatArray, g: FloatArray) -> Functional:
     """Diameter of the outermost circle where G is half of its maximum."""
@@ -111,16 +112,12 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
     last = min(int(np.flatnonzero(values >= values[top] / 2)[-1]), fine.size - 2)
     slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
     half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
-    row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
-    row = -2 * row / slope if slope else np.zeros_like(row)
-    return Functional("fwhm", float(2 * half), row)
-
-
-def _at(r: FloatArray, place: float) -> FloatArray:
-    """Row that reads a profile at a radius, by linear interpolation."""
     row = np.zeros_like(r)
-    i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
-    share = (place - r[i]) / (r[i + 1] - r[i])
-    row[i] = 1 - share
-    row[i + 1] = share
-    return row
+    if slope:
+        # A profile is read at a radius by linear interpolation.
+        for place, factor in ((half, -2 / slope), (fine[top], 1 / slope)):
+            i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
+            share = (place - r[i]) / (r[i + 1] - r[i])
+            row[i] += factor * (1 - share)
+            row[i + 1] += factor * share
+    return Functional("fwhm", float(2 * half), row)
