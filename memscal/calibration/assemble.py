@@ -117,7 +117,7 @@ def _configuration(
         "centre": centre,
         "override": prepared.overridden or None,
         "correlations": {" ".join(pair): c for pair, c in request.correlations.items()} or None,
-        "grid": dict(solution.choice.reasons),
+        "grid": solution.choice.reasons,
         "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
         "direction": "y" if solution.scan.direction == "y" else None,
         "further_scans": further or None,
@@ -127,12 +127,14 @@ def _configuration(
 
 def _plane(solution: Solution, results: Results) -> ApparatusField:
     g = solution.deconvolution.g
+    x, y = g.grid.axes
+    plane = g.grid.to_image(g.values)
     if results.field_errors is not None:
         scatter, errors = results.field_errors
-        return ApparatusField(g.x, g.y, g.image, errors, scatter)
+        return ApparatusField(x, y, plane, errors, scatter)
     radial = np.sqrt(np.diag(results.radial_covariance))
     errors = g.grid.to_image(np.interp(g.grid.radius, g.r, radial))
-    return ApparatusField(g.x, g.y, g.image, errors)
+    return ApparatusField(x, y, plane, errors)
 
 
 def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:

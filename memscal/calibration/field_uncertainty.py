@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fftfreq, fftshift, ifftshift, irfft2, rfft2, rfftfreq
 
+from memscal.calibration.fields import cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
@@ -259,7 +260,7 @@ def _division_variances(
     ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
     share = fields.share(solution.smoothed)
     division = _Filter.of(fields, share, ratio, window, (y, x), stated)
-    taper: FloatArray = fields.taper(np.hypot.outer(y, x).ravel()[inside])
+    taper = cosine_taper(np.hypot.outer(y, x).ravel()[inside], fields.support)
     moved, hidden, sums = _by_parameters(estimate, axes, inside, taper, division)
     count = moved.shape[1]
     gain = estimate.weighed.gain

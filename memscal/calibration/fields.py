@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -38,18 +38,7 @@ class GridChoice:
     spacing: float
     support: float
     extent: float
-
-    @property
-    def reasons(self) -> Mapping[str, str]:
-        """Why each was chosen, for the record."""
-        return {
-            "spacing": f"{self.spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
-            "width, and the last wavenumber is at least twice the one where the window has closed",
-            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre, of a "
-            "line rounded up to half a step; G is tapered to zero over its outer half",
-            "extent": f"{self.extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
-            "support, so that nothing wraps around into it",
-        }
+    reasons: Mapping[str, str]  # why each was chosen, for the record
 
 
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
@@ -66,12 +55,21 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     last = band.k[closed[0] if closed.size else -1]
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
-    spacing = support / (_COUNTED * np.ceil(support / spacing / _COUNTED))
+    spacing = float(support / (_COUNTED * np.ceil(support / spacing / _COUNTED)))
     span = max(float(np.ptp(offset)) for offset in estimate.offset)
-    return GridChoice(spacing=float(spacing), support=support, extent=max(span, 1.25 * support))
+    extent = max(span, 1.25 * support)
+    reasons = {
+        "spacing": f"{spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
+        "width, and the last wavenumber is at least twice the one where the window has closed",
+        "support": f"{support * 1e3:.4g} mm: the largest distance from the centre, of a "
+        "line rounded up to half a step; G is tapered to zero over its outer half",
+        "extent": f"{extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
+        "support, so that nothing wraps around into it",
+    }
+    return GridChoice(spacing, support, extent, reasons)
 
 
-def _taper(radius: FloatArray, support: float) -> FloatArray:
+def cosine_taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then a cosine that falls to zero at its edge."""
     # A sharp edge would cut G's ripples at full height, and A would depend on where it lies.
     return (1 + np.cos(np.pi * np.clip(2 * radius / support - 1, 0.0, 1.0))) / 2
@@ -84,7 +82,9 @@ class LineFields:
     grid: EvenGrid
     voltage: Field
     stress: Field
-    support: int
+    support: float  # half its width, in m
+    inside: EvenGrid  # of the support
+    confinement: FloatArray  # taper on the grid that confines a kernel to the support
     radius: FloatArray
     even: ClassVar[bool] = True  # so that they can be divided
 
@@ -107,22 +107,15 @@ class LineFields:
             lifted = _lifted if grid.count < _MOST_KEPT else _lifted.__wrapped__
             stress = lifted(grid, *arrays)
             voltage = Field(grid, on_grid(spectrum.scalar.at, grid, choice.spacing / 2))
-        return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
-
-    @cached_property
-    def confinement(self) -> FloatArray:
-        """Taper on the grid that confines a kernel to its support."""
-        return self.taper(self.grid.radius)
-
-    def taper(self, radius: FloatArray) -> FloatArray:
-        """Taper at radii, in m."""
-        return _taper(radius, self.support * self.grid.spacing)
+        inside = EvenGrid(round(choice.support / choice.spacing) + 1, choice.spacing)
+        support = (inside.count - 1) * inside.spacing
+        confinement = cosine_taper(grid.radius, support)
+        return cls(grid, voltage, stress, support, inside, confinement, estimate.distance)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero, as far as its support goes."""
-        inside = EvenGrid(self.support + 1, self.grid.spacing)
-        values = on_grid(profile, inside, self.grid.spacing / 2)
-        return np.pad(values, (0, self.grid.count - inside.count))
+        values = on_grid(profile, self.inside, self.grid.spacing / 2)
+        return np.pad(values, (0, self.grid.count - self.inside.count))
 
     def convolved(self, kernel: Field) -> FloatArray:
         """Convolve a kernel with the stress: its values at the measured points."""
@@ -132,8 +125,8 @@ class LineFields:
     def on_support(self, kernel: FloatArray, _: ProfileEstimate | None) -> Field:
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
-        count = self.support + 1
-        return Field(EvenGrid(count, self.grid.spacing), kernel[:count, :count])
+        count = self.inside.count
+        return Field(self.inside, kernel[:count, :count])
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +136,8 @@ class RasterFields:
     grid: Lattice
     voltage: Field
     stress: Field
-    support: float
+    support: float  # half its width, in m
+    confinement: FloatArray  # taper on the grid that confines a kernel to the support
     step: float
     oval: Callable[[FloatArray, FloatArray], FloatArray]
     index: tuple[IndexArray, IndexArray]
@@ -201,20 +195,12 @@ class RasterFields:
             Field(grid, voltage),
             Field(grid, stress),
             choice.support,
+            cosine_taper(central.radius, choice.support),
             step,
             estimate.oval_kernel,
             (rows, columns),
             even,
         )
-
-    @property
-    def confinement(self) -> FloatArray:
-        """Taper on the grid that confines a kernel to its support."""
-        return self.taper(self.central.radius)
-
-    def taper(self, radius: FloatArray) -> FloatArray:
-        """Taper at radii, in m."""
-        return _taper(radius, self.support)
 
     @property
     def central(self) -> Lattice:

@@ -25,7 +25,7 @@ from memscal.axisymmetry.hankel import (
     radial_spline,
     ring_areas,
 )
-from memscal.calibration.fields import RasterFields
+from memscal.calibration.fields import RasterFields, cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
@@ -504,7 +504,7 @@ def _division_map(
     # Where the window has closed the reference may have vanished.
     ratio = np.divide(window, reference.values, out=np.zeros_like(window), where=window > _CLOSED)
     weights = reference.wavenumbers.weights * ratio
-    synthesis = fields.taper(r)[:, None] * bessel_table(r, model.k) * weights
+    synthesis = cosine_taper(r, fields.support)[:, None] * bessel_table(r, model.k) * weights
     rings = ring_areas(r)
 
     # From changes of A G at its radii to those of A, G and its transfer function.

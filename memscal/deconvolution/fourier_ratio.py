@@ -80,16 +80,13 @@ class Field:
     @property
     def r(self) -> FloatArray:
         """Radii of the profile, shape (p,), in m."""
-        return self._profile[0]
-
-    @property
-    def radial(self) -> FloatArray:
-        """Radial profile at :attr:`r`, shape (p,): along an axis, or the mean over directions."""
-        return self._profile[1]
+        x = self.grid.axes[0]
+        return x[x.size // 2 :]
 
     @cached_property
-    def _profile(self) -> tuple[FloatArray, FloatArray]:
-        return self.grid.radial(self.values)
+    def radial(self) -> FloatArray:
+        """Radial profile at :attr:`r`, shape (p,): along an axis, or the mean over directions."""
+        return self.grid.radial(self.values)[1]
 
     @cached_property
     def transform(self) -> FloatArray:
@@ -277,7 +274,7 @@ def normalise(quotient: Field) -> tuple[float, Field]:
     >>> round(a / (np.pi * 1e-6), 6), round(g.integral, 6)
     (1.0, 1.0)
     """
-    a = quotient.integral
+    a = quotient.grid.integrate(quotient.values)
     if not a > 0:
         problem = f"The quotient of the fields adds up to {a:.3g} V/Pa."
         cure = "Look at the deconvolved field; choose another method or less regularisation."
@@ -322,6 +319,6 @@ def reconvolve(a: float, g: Field, stress: Field) -> Field:
 
 
 def _require_one_grid(first: Field, second: Field) -> None:
-    if not (np.array_equal(first.x, second.x) and np.array_equal(first.y, second.y)):
+    if not all(map(np.array_equal, first.grid.axes, second.grid.axes)):
         problem = f"The two fields, {first!r} and {second!r}, lie on different grids."
         raise InputError(problem, cure="Lift both with one spacing and one extent.")

@@ -56,6 +56,7 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         misfit = root * (unit_gaussian(r, sigma) - radial) * start**2
         slope = root * unit_gaussian_slope(r, sigma) * start**3
         return misfit, slope[:, None]
+
     begin = np.array([max(start, 2 * narrowest) / start])
     width = gauss_newton(linearise, begin, tolerance=1e-10)
     if width is not None and width[0] * start > 2 * narrowest:
@@ -100,7 +101,6 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
     nearest = Functional("gaussian_sigma_deconvolved", sigma, row)
     return nearest, _half_width(r, g), noise_width
-
 
 
 def _half_width(r: FloatArray, g: FloatArray) -> Functional:
