@@ -1,16 +1,16 @@
 """Progress of long work: how much of it is done, to a callback, to the log, or as a bar.
 
-What takes long counts its parts (:func:`counted`, :func:`counter`) or the steps that are done
-(:func:`in_steps`, :func:`done_with`), wherever in a call it is; a public function tells the
-``progress`` that it was given of all of them (:func:`reported`).
+What takes long counts its parts (:class:`Task`) or the steps that are done (:func:`in_steps`,
+:func:`done_with`), wherever in a call it is; a public function tells the ``progress`` that it was
+given of all of them (:func:`reported`).
 """
 
 import logging
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import wraps
 from html import escape
 from time import monotonic
@@ -83,10 +83,10 @@ Listener: TypeAlias = Callable[[Progress], None] | Literal[True] | None
 """What is told of progress: a callback, or ``True`` for a bar; ``None`` for what is told now."""
 
 _LISTENER: ContextVar[Callable[[Progress], None] | None] = ContextVar("listener", default=None)
-_STEPS: ContextVar[Callable[[str], None] | None] = ContextVar("steps", default=None)
+_STEPS: ContextVar["tuple[Task, Sequence[str]] | None"] = ContextVar("steps", default=None)
 
 
-def _nobody(_: Progress) -> None:
+def nobody(_: Progress) -> None:
     """Hear of tasks within one that is counted: nothing is made of them."""
 
 
@@ -111,28 +111,54 @@ def reporting(listener: Listener) -> Iterator[None]:
         _LISTENER.reset(token)
 
 
-@contextmanager
-def hushed() -> Iterator[None]:
-    """Tell nobody of the tasks within: they are parts of one that is counted."""
-    with reporting(_nobody):
-        yield
+@dataclass(eq=False)
+class Task:
+    """A task that is counted from now on, to whoever is told of progress now."""
+
+    name: str
+    total: float
+    done: float = 0
+    listener: Callable[[Progress], None] | None = field(default_factory=_LISTENER.get)
+    start: float = field(default_factory=monotonic)
+    logged: float = 0.0  # seconds from the start to the last line of the log
+
+    def tell(self, done: float, kept: float = 0.0) -> None:
+        """Tell how much of it is done, and was done before."""
+        self.done = done
+        if self.listener is nobody:
+            return
+        seconds = monotonic() - self.start
+        progress = Progress(self.name, done, self.total, seconds, kept)
+        if seconds - self.logged >= _EVERY or (self.logged and done == self.total):
+            _LOG.info("%s", progress)
+            self.logged = seconds
+        if self.listener is not None:
+            self.listener(progress)
+
+    def counted(
+        self,
+        items: Iterable[_Item],
+        size: Callable[[_Item], float] = lambda _: 1,
+        kept: Callable[[_Item], bool] = lambda _: False,
+    ) -> Iterator[_Item]:
+        """Yield its items, told of as they come: their sizes, and what was done before."""
+        rest = iter(items)
+        before: float = 0
+        while True:
+            try:
+                with reporting(nobody):
+                    item = next(rest)
+            except StopIteration:
+                return
+            before += size(item) if kept(item) else 0
+            self.tell(self.done + size(item), before)
+            yield item
 
 
 @contextmanager
-def in_steps(*steps: str) -> Iterator[None]:
+def in_steps(*names: str) -> Iterator[None]:
     """Begin a task of named steps; what is called within says which it is done with."""
-    tell = counter("steps", len(steps))
-    done = 0
-
-    def hear(step: str) -> None:
-        # What is repeated within a later step, as by another law of the film, counts for nothing.
-        nonlocal done
-        number = steps.index(step) + 1
-        if number > done:
-            done = number
-            tell(done)
-
-    token = _STEPS.set(hear)
+    token = _STEPS.set((Task("steps", len(names)), names))
     try:
         yield
     finally:
@@ -141,9 +167,13 @@ def in_steps(*steps: str) -> Iterator[None]:
 
 def done_with(step: str) -> None:
     """Tell that a step is done, of a task in steps if there is one."""
-    hear = _STEPS.get()
-    if hear is not None:
-        hear(step)
+    steps = _STEPS.get()
+    if steps is not None:
+        task, names = steps
+        number = names.index(step) + 1
+        # What is repeated within a later step, as by another law of the film, counts for nothing.
+        if number > task.done:
+            task.tell(number)
 
 
 def reported(function: _Function) -> _Function:
@@ -155,55 +185,6 @@ def reported(function: _Function) -> _Function:
             return function(*args, **options)
 
     return cast("_Function", with_progress)
-
-
-def counter(task: str, total: float) -> Callable[..., None]:
-    """Begin a task; return what is called with how much of it is done, and was done before."""
-    listener = _LISTENER.get()
-    start = monotonic()
-    if listener is _nobody:
-        return lambda *_: None
-    said = start
-
-    def tell(done: float, kept: float = 0.0) -> None:
-        nonlocal said
-        now = monotonic()
-        progress = Progress(task, done, total, now - start, kept)
-        if now - said >= _EVERY or (said > start and done == total):
-            _LOG.info("%s", progress)
-            said = now
-        if listener is not None:
-            listener(progress)
-
-    return tell
-
-
-def counted(
-    items: Iterable[_Item],
-    task: str,
-    total: float,
-    size: Callable[[_Item], float] = lambda _: 1,
-    kept: Callable[[_Item], bool] = lambda _: False,
-) -> Iterator[_Item]:
-    """Begin a task; return its items, told of as they come: their sizes, what was done before."""
-    tell = counter(task, total)
-    rest = iter(items)
-
-    def each() -> Iterator[_Item]:
-        done: float = 0
-        before: float = 0
-        while True:
-            try:
-                with hushed():
-                    item = next(rest)
-            except StopIteration:
-                return
-            done += size(item)
-            before += size(item) if kept(item) else 0
-            tell(done, before)
-            yield item
-
-    return each()
 
 
 def _bar() -> Callable[[Progress], None]:

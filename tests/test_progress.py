@@ -7,7 +7,7 @@ import pytest
 from helpers.scans import contact_scan, known_apparatus
 
 import memscal
-from memscal.progress import counted, counter, reporting
+from memscal.progress import Task, reporting
 
 FILM = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = memscal.Sphere(radius=128.8e-3)
@@ -20,17 +20,18 @@ def told(heard: list[memscal.Progress]) -> list[tuple[str, float, float]]:
 def test_only_the_outermost_task_is_told_of() -> None:
     heard: list[memscal.Progress] = []
     with reporting(heard.append):
-        list(counted((list(counted("ab", "inner", 2)) for _ in range(2)), "outer", 2))
-        counter("after", 1)(1)
-    list(counted("ab", "unheard", 2))
+        inner = (list(Task("inner", 2).counted("ab")) for _ in range(2))
+        list(Task("outer", 2).counted(inner))
+        Task("after", 1).tell(1)
+    list(Task("unheard", 2).counted("ab"))
     assert told(heard) == [("outer", 1, 2), ("outer", 2, 2), ("after", 1, 1)]
 
 
 def test_what_consumes_a_task_hears_of_its_own_work() -> None:
     heard: list[memscal.Progress] = []
     with reporting(heard.append):
-        for _ in counted("ab", "items", 2):
-            counter("own", 1)(1)
+        for _ in Task("items", 2).counted("ab"):
+            Task("own", 1).tell(1)
     assert told(heard) == [("items", 1, 2), ("own", 1, 1), ("items", 2, 2), ("own", 1, 1)]
 
 
@@ -70,7 +71,7 @@ def test_public_functions_tell_their_callback(tmp_path) -> None:
 
 def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) -> None:
     with reporting(True):
-        list(counted("ab", "<draws>", 2))
+        list(Task("<draws>", 2).counted("ab"))
     assert capsys.readouterr().err.endswith(f"\r{'2 of 2 <draws>':<60}\n")
     pytest.importorskip("ipykernel")
     shell = types.SimpleNamespace(kernel=None)
@@ -79,5 +80,5 @@ def test_a_bar_is_shown_in_a_notebook_and_a_line_elsewhere(capsys, monkeypatch) 
     handle = types.SimpleNamespace(update=lambda page: shown.append(page.data))
     monkeypatch.setattr("IPython.display.display", lambda *_, **__: handle)
     with reporting(True):
-        list(counted("ab", "<draws>", 2))
+        list(Task("<draws>", 2).counted("ab"))
     assert shown[-1] == '<progress value="2" max="2"></progress> 2 of 2 &lt;draws&gt;'

@@ -33,7 +33,7 @@ from memscal.calibration.uncertainty import InputEffect, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
 from memscal.model.arrays import BoolArray, FloatArray, IndexArray
-from memscal.progress import counted
+from memscal.progress import Task
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 
@@ -227,7 +227,8 @@ def _by_parameters(
         sums[some] = columns.sum(axis=0) - tapered.sum(axis=0)
         return passed
 
-    for some in counted(_chunks(count), "kernels", count, lambda some: some.stop - some.start):
+    task = Task("kernels", count)
+    for some in task.counted(_chunks(count), lambda some: some.stop - some.start):
         unit = np.eye(count)[:, some]
         voltages = estimate.basis.voltages(estimate.model, estimate.gaussian, unit)
         moved[:, some] = compare(kernels(unit), some) - division.divided(voltages)

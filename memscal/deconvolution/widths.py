@@ -63,15 +63,14 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         return float(width[0] * start)
     from scipy.optimize import least_squares
 
-    bounded = least_squares(
-        lambda scaled: linearise(scaled)[0],
-        begin,
-        lambda scaled: linearise(scaled)[1],
-        bounds=(narrowest / start, np.inf),
-        xtol=1e-12,
-        ftol=1e-14,
-        gtol=1e-14,
-    )
+    def misfit(scaled: FloatArray) -> FloatArray:
+        return linearise(scaled)[0]
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return linearise(scaled)[1]
+
+    bounds = (narrowest / start, np.inf)
+    bounded = least_squares(misfit, begin, slope, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
     return float(bounded.x[0] * start)
 
 

@@ -20,7 +20,7 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, more_and_less
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, SetUp
 from memscal.model.stress import StressProfile
-from memscal.progress import counted
+from memscal.progress import Task
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
@@ -174,7 +174,7 @@ def reference_sensitivities(
     """Change of each scan's transform by one standard uncertainty of each input, by its name."""
     changes: dict[str, list[FloatArray]] = {}
     todo = list(product(_SENSITIVITIES, range(len(scans))))
-    for owner, i in counted(todo, "uncertain inputs", len(todo)):
+    for owner, i in Task("uncertain inputs", len(todo)).counted(todo):
         if scans[i].film is None:
             continue
         # Scans share the error of a common film or rod, and that of the film's law.

@@ -29,7 +29,7 @@ from memscal.model.arrays import FloatArray, FrozenArrays, finite_vector, requir
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
-from memscal.progress import counted
+from memscal.progress import Task
 from memscal.version import __version__
 
 FRICTION_SCALE = 0.3
@@ -185,7 +185,7 @@ def solve_paths(
         if processes > 1:
             solve = stack.enter_context(worker_pool(processes)).map
         solved = solve(_solve, paths, [k] * len(paths))
-        return list(counted(solved, "contacts", total, lambda arrays: arrays["depths"].size))
+        return list(Task("contacts", total).counted(solved, lambda arrays: arrays["depths"].size))
 
 
 def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:

@@ -22,7 +22,7 @@ from memscal.model.provenance import Process, accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.sizes import MOST_OF_CORRELATED_CONTACT
 from memscal.parallel import single_threaded
-from memscal.progress import Listener, counted, reported
+from memscal.progress import Listener, Task, reported
 from memscal.readings.mistaken_unit import require_span
 
 #: Sources of a force's uncertainty that all profiles have in common.
@@ -179,7 +179,7 @@ def measure_stress(
             why = "Their noise is correlated: of each load two matrices over them are kept."
             restore.require_contact_size(single, MOST_OF_CORRELATED_CONTACT, why)
     loads = _measured_loads(origins, singles, sensor)
-    measured = counted(loads, "loads", sum(map(len, singles)))
+    measured = Task("loads", sum(map(len, singles))).counted(loads)
     profiles, restored, notes = zip(*measured, strict=True)
     checks = stress_checks(profiles, restored)
     return MeasuredStress(

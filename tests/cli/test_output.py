@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from memscal.cli.output import emit_tables, working
-from memscal.progress import counted
+from memscal.progress import Task
 from memscal.summaries.table import Table
 
 
@@ -97,7 +97,7 @@ def test_progress_is_counted_on_a_terminal_and_leaves_no_trace(monkeypatch: pyte
     terminal = at_terminal(monkeypatch)
     monkeypatch.setattr("memscal.cli.output._ON_TERMINAL", (0.0, 0.001))
     with working("Drawing"):
-        for item in counted(range(5), "draws", 5):
+        for item in Task("draws", 5).counted(range(5)):
             if item == 1:
                 wait_for(terminal.getvalue, r"Drawing: 2 of 5 draws, \d+ s left \(\d+ s\)")
     assert terminal.getvalue().endswith("\r\x1b[K")
@@ -110,7 +110,7 @@ def test_progress_is_a_line_now_and_then_where_nobody_watches(monkeypatch):
     assert written.getvalue() == ""
     monkeypatch.setattr("memscal.cli.output._IN_LINES", (0.01, 0.01))
     with working("Sweeping"):
-        for item in counted(range(3), "draws", 3):
+        for item in Task("draws", 3).counted(range(3)):
             if item == 0:
                 wait_for(written.getvalue, r"Sweeping: 1 of 3 draws, \d+ s left \(\d+ s\)\n")
     assert re.fullmatch(r"(Sweeping(: [123] of 3 draws[^\r\n]*)? \(\d+ s\)\n)+", written.getvalue())

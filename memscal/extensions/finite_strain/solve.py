@@ -35,7 +35,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
-from memscal.progress import counter
+from memscal.progress import Task
 
 _MM = 1e3
 _MPA = 1e6
@@ -112,11 +112,15 @@ def solve_finite_strain(
     # the wall; under a sphere that sticks nothing in the contact moves radially.
     goals = [t if isinstance(t, Load) else Depth(t.value * _MM) for t in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    tell = counter("the loading", 1.0)
+    task = Task("the loading", 1.0)
     rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
-    coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(_COARSE_WORK * x)))
+    coarse = tuple(
+        request.solve(refinement / _COARSER, rough, lambda x: task.tell(_COARSE_WORK * x))
+    )
     return tuple(
-        request.solve(refinement, coarse, lambda x: tell(_COARSE_WORK + (1 - _COARSE_WORK) * x))
+        request.solve(
+            refinement, coarse, lambda x: task.tell(_COARSE_WORK + (1 - _COARSE_WORK) * x)
+        )
     )
 
 

@@ -139,7 +139,7 @@ def command(
 def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Iterator[ShardOutcome]:
     """Yield the outcomes of a batch, and show how far it is."""
     from memscal.parallel import cluster, cores, worker_pool
-    from memscal.progress import counted
+    from memscal.progress import Task
 
     with ExitStack() as stack:
         if scheduler:
@@ -154,4 +154,4 @@ def _outcomes(batch: Batch, workers: int | None, scheduler: str | None) -> Itera
         stack.enter_context(out.working("Calibrating", rate=True))
         size = attrgetter("scans")
         kept = attrgetter("kept")
-        yield from counted(batch.run(executor, most), "scans", batch.count, size, kept)
+        yield from Task("scans", batch.count).counted(batch.run(executor, most), size, kept)

@@ -17,7 +17,7 @@ from memscal.model.checks import Message, QualityCheck
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import cores, shared
-from memscal.progress import Listener, counted, reported
+from memscal.progress import Listener, Task, reported
 
 _Result = TypeVar("_Result")
 
@@ -140,7 +140,7 @@ def calibrate_many(
     items = enumerate(scans)
     sized = list(items) if isinstance(scans, Sized) else items
     results = shared(task, sized, workers=cores(), executor=executor)
-    return counted(results, "scans", len(sized)) if isinstance(sized, list) else results
+    return Task("scans", len(sized)).counted(results) if isinstance(sized, list) else results
 
 
 def attempted(name: str, work: Callable[[], _Result]) -> _Result | MemscalError:

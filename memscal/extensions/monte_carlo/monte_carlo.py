@@ -25,7 +25,7 @@ from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, shared, single_threaded
-from memscal.progress import Listener, counted, reported
+from memscal.progress import Listener, Task, reported
 
 
 @dataclass(frozen=True)
@@ -366,7 +366,7 @@ def monte_carlo(
     rows: list[FloatArray] = []
     failures: list[str] = []
     results = shared(model.result, range(draws), workers=workers)
-    for result in counted(results, "draws", draws):
+    for result in Task("draws", draws).counted(results):
         if isinstance(result, str):
             failures.append(result)
         else:

@@ -10,7 +10,7 @@ from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
-from memscal.progress import counted
+from memscal.progress import Task
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +68,7 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
     methods: list[Regulariser] = [WhiteNoise(amplitude=a) for a in amplitude]
     methods += [WhiteNoiseDraw(amplitude=a, seed=s) for a in amplitude for s in seeds]
     outcomes = (_outcome(solution, method) for method in methods)
-    results = np.array(list(counted(outcomes, "divisions", len(methods))))
+    results = np.array(list(Task("divisions", len(methods)).counted(outcomes)))
     drawn = results[amplitudes:].reshape(amplitudes, draws, 3)
     return Sweep(amplitude, *results[:amplitudes].T, *np.moveaxis(drawn, -1, 0))
 

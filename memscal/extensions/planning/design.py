@@ -39,7 +39,7 @@ from memscal.model.indenter import Rod
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
-from memscal.progress import counted, counter, hushed
+from memscal.progress import Task, nobody, reporting
 from memscal.readings.mistaken_unit import require_plausible
 
 #: As many as a simulated scan may have.
@@ -338,18 +338,18 @@ def least_design(
     what, fewest, most, plan_of = _search(plan, vary)
     tried: dict[int, Design | None] = {}
     # As many as it can take to pass the number that is searched, and to close in on it.
-    tell = counter("plans", math.ceil(math.log(most / fewest, _GROWTH) + math.log2(most)))
+    task = Task("plans", math.ceil(math.log(most / fewest, _GROWTH) + math.log2(most)))
 
     def meets(count: int) -> bool:
         if count not in tried:
             # None where the plan determines nothing, or does not sample G.
             tried[count] = None
             attempt = plan_of(count)
-            with suppress(FitError), hushed():
+            with suppress(FitError), reporting(nobody):
                 design = evaluate(attempt)
                 samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
                 tried[count] = design if samples else None
-            tell(len(tried))
+            task.tell(len(tried))
         found = tried[count]
         return found is not None and all(_met(found, *target) for target in targets.items())
 
@@ -541,8 +541,8 @@ def design(
 def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[Design]:
     """Return the designs with one number of the plan (SI) replaced; unusable plans are left out."""
     designs = []
-    for value in counted(values, "plans", len(values)):
+    for value in Task("plans", len(values)).counted(values):
         changes: dict[str, Any] = {vary: int(value) if vary == "repeats" else float(value)}
-        with suppress(FitError), hushed():
+        with suppress(FitError), reporting(nobody):
             designs.append(evaluate(replace(planned.plan, **changes), planned.method))
     return designs

@@ -29,7 +29,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_FILE_BYTES, MOST_OTHER_TAGS, MOST_TAGS, too_large
-from memscal.progress import counted
+from memscal.progress import Task
 
 _KINDS = dict.fromkeys((".xlsx", ".xlsm"), "workbook") | dict.fromkeys(
     (".parquet", ".pq"), "Parquet"
@@ -98,7 +98,7 @@ def _sheet_table(
     chosen.reset_dimensions()  # which may claim billions of cells
     text = io.BytesIO()
     cells = 0
-    for row in counted(chosen.iter_rows(values_only=True), "rows", claimed):
+    for row in Task("rows", claimed).counted(chosen.iter_rows(values_only=True)):
         cells += max(len(row), 1)
         if cells > MOST_TAGS:
             raise too_large(name, cells, MOST_TAGS, "cells", cure="Save it as CSV.")

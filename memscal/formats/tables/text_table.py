@@ -29,7 +29,7 @@ from memscal.model.sizes import (
     MOST_TABLE_BYTES,
     too_large,
 )
-from memscal.progress import counted
+from memscal.progress import Task
 
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
@@ -96,7 +96,7 @@ class NamedColumns:
         count = 0
         values = [np.empty(room) for _ in wanted]
         parts = self._parts([*wanted.values()])
-        for lines, part in counted(parts, "rows", rows, lambda part: len(part[0])):
+        for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
             self._lines_of.append((count, lines))
             for column, numbers in zip(values, part, strict=True):
                 if self._sentinels:

@@ -37,7 +37,7 @@ from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
-from memscal.progress import counter
+from memscal.progress import Task
 
 _DEGREE = 4
 _SMOOTH_DEGREE = 5
@@ -310,7 +310,7 @@ class ElementFilm:
         seen = line.at(rings)
         scale = self.film.thickness / self.film.shear_modulus
         moved = np.empty((2, 2, rings.size, rings.size))
-        tell = counter("tractions", 2 * rings.size)
+        task = Task("tractions", 2 * rings.size)
         done = 0
         for source, unknowns in enumerate((inward, outward)):
             for start in range(0, rings.size, _BATCH):
@@ -319,7 +319,7 @@ class ElementFilm:
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
                 done += rings[batch].size
-                tell(done)
+                task.tell(done)
         return SurfaceCompliance(self.r, moved[0, 0], moved[1, 0], moved[0, 1], moved[1, 1])
 
     @property

@@ -15,7 +15,7 @@ from memscal.errors import ConvergenceError
 from memscal.mechanics.solver import step
 from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target, Touch
 from memscal.model.arrays import BoolArray
-from memscal.progress import counted
+from memscal.progress import Task
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
 _PULL = 1e-2
@@ -117,7 +117,7 @@ def follow(
     """Return the states at ``targets``; the ``last`` of a ConvergenceError is a PathPoint."""
     if problem.friction == 0 or loading != "total":
         steps = _step_by_step(problem, targets, increments)
-        return list(counted(steps, "loads", len(targets)))
+        return list(Task("loads", len(targets)).counted(steps))
     # Each from the untouched film; the frictionless contact is where to begin.
     begin = _step_by_step(replace(problem, friction=0.0), targets, increments)
     pairs = zip(begin, targets, strict=True)
