@@ -19,7 +19,7 @@ HEAD = (
 )
 
 
-def table(poisson_ratio: float) -> list[str]:
+def table(poisson_ratio: float, frictions: tuple[float, ...] = FRICTIONS) -> list[str]:
     """Return the rows for one film, both loadings in each cell."""
     film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=poisson_ratio, thickness=2e-3)
     sphere = memscal.Sphere(radius=128.8e-3)
@@ -27,12 +27,12 @@ def table(poisson_ratio: float) -> list[str]:
         (friction, loading): memscal.indent(
             film, sphere, load=LOADS, friction=friction, loading=loading
         )
-        for friction in FRICTIONS
+        for friction in frictions
         for loading in LOADINGS
     }
     rows = list(HEAD)
     for i, load in enumerate(LOADS):
-        for friction in FRICTIONS:
+        for friction in frictions:
             pair = [contacts[friction, loading][i] for loading in LOADINGS]
             cells = (
                 f"{load:g}",
