@@ -21,7 +21,7 @@ from memscal.estimation.reference_spectra import (
     press_neo_hookean,
     reference_spectra,
 )
-from memscal.estimation.set_up import is_source, reference_profile
+from memscal.estimation.set_up import reference_profile
 from memscal.extensions import hook
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
@@ -238,7 +238,7 @@ def calibrate(
     done_with("uncertainties")
     checks = quality_checks(solution, results, by_other_route)
     done_with("checks")
-    laws = None if relative or is_source(solution.stress) else weigh_laws(solution)
+    laws = None if relative or solution.stress.form else weigh_laws(solution)
     if not other:
         by_other_route = None
     apparatus = assemble(prepared, solution, results, by_other_route, checks, laws)

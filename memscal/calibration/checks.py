@@ -16,7 +16,6 @@ from memscal.estimation.bayesian import HYPOTHESES, Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import carried_force
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
-from memscal.estimation.set_up import is_source
 from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
@@ -205,7 +204,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     estimate = solution.estimate
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
-    source = is_source(solution.stress)
+    source = solution.stress.form is not None
     checks = []
     if film is not None and not source:
         meaning = (
@@ -228,7 +227,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "means that A rests on the extrapolation: scan farther."
     )
     # A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
-    most = 0.10 if estimate.model.order else 0.05
+    most = 0.10 if estimate.points.order else 0.05
     checks.append(check("tail_share", solution.tail_share, most, meaning))
     meaning = (
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
@@ -361,7 +360,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     extra = assumptions.symmetry_test(estimate)
     parity = "odd"
     failure = ": a tilted rod, an uneven film, or a drifting load"
-    if estimate.model.order:
+    if estimate.points.order:
         parity = "even"
         failure = " by more than their sign: cross-talk of the normal stress, "
         failure += "a tilted rod, or an uneven film"
@@ -475,7 +474,7 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Qual
 
 def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
     points = estimate.points
-    if estimate.model.order:
+    if estimate.points.order:
         return None
     clipped = np.flatnonzero(assumptions.clipped_points(estimate))
     where = ""

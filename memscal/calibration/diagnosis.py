@@ -188,7 +188,8 @@ class _Search:
         # Where no noise is stated, it is that of the best fit.
         noise = 1.0
         if self.points[0].u_errors is None:
-            noise = min(robust_scale(trial.residual) for trial in fitted)
+            tiny = np.finfo(float).tiny
+            noise = min(robust_scale(trial.residual, tiny) for trial in fitted)
         best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
         least = min(trial.loss(noise) for trial in best.values())
         unscaled = trials[self.lengths[0]][0].loss(noise)

@@ -96,7 +96,8 @@ def _divided(
     smoothed = smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     # The width of the Gaussian chooses the grid.
-    sigma = estimate.gaussian.sigma + float((solution.estimate.gaussian_gain[1:2] @ error)[0])
+    gain = solution.estimate.gaussian.gain(solution.estimate.weights)
+    sigma = estimate.gaussian.sigma + float((gain[1:2] @ error)[0])
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
     drawn = deconvolve(estimate, band, fields, method)

@@ -238,10 +238,10 @@ class RasterFields:
         table = wave_table(0, False, float(radius.max()), k.tobytes())
         everywhere = table.interpolation(radius.ravel())
         # J0(k r) J0(k' r) over what has something of the profile, by the table's splines.
-        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.splines
-        elsewhere = (table.splines.T @ both) * weights
+        both = (everywhere.T @ everywhere.multiply(profiled.reshape(-1, 1))) @ table.spline.c
+        elsewhere = (table.spline.c.T @ both) * weights
         own = table.interpolation(radius[self.index]).multiply(share[:, None]).tocsr()
-        by_points = VoltageMap(((table.splines.T, own),))
+        by_points = VoltageMap(((table.spline.c.T, own),))
         if share.size <= DENSE:
             by_points = VoltageMap(((by_points.dense(), None),))
         by_profile: VoltageMap = elsewhere @ smoothed.gain

@@ -59,7 +59,7 @@ def calibration_messages(
         )
         messages.append(Message("load_of_reference", text))
     messages += quality.failed_check_messages(checks)
-    if estimate.model.order:
+    if estimate.points.order:
         text = (
             f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
             "those of the shear at the base; the voltage is positive where the film pulls the "

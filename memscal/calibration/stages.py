@@ -84,7 +84,7 @@ def solved(
     method: Method,
 ) -> Solution:
     """Find A and G from the estimate of the profile; see :func:`solve`."""
-    smoothed = None if estimate.model.order else smooth_profile(estimate)
+    smoothed = None if estimate.points.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))

@@ -99,7 +99,7 @@ def input_effects(
     model = estimate.model
     changes = reference_sensitivities(scans, model.references)
     # Stated errors are those of the normal stress, not of the shear.
-    for i, stress in enumerate(() if model.order else stresses):
+    for i, stress in enumerate(() if estimate.points.order else stresses):
         if isinstance(stress, StressProfile) and stress.sigma_zz_errors is not None:
             errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
             blank = [np.zeros_like(errors) for _ in scans]
@@ -387,7 +387,7 @@ def _parameters(
         area = 1 / np.sum(ring_areas(g.r) * whole**2)
         widths.hidden[-1, 0] = area - functionals[-1].value
     # A round departure beside an ellipse would be read as less of width and ellipticity.
-    gain = estimate.gaussian_gain
+    gain = fit.gain(estimate.weights)
     ellipse = estimate.points.ellipse
     nuisances, scale = _nuisances(estimate.points.free)
     count = len(scale)
@@ -514,7 +514,8 @@ def _division_map(
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
     geometry = model.geometry(estimate.centres)
-    nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
+    by_centre = model.by_free_centres(model.shift_derivative(geometry, estimate.kernel))
+    nuisance = np.hstack([by_centre, model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
     starts = range(0, kernels.shape[1], count)

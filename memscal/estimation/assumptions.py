@@ -316,24 +316,26 @@ def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     """Say which points were held at a ceiling, shape (n,); of a shear none is told."""
     u = estimate.points.u
     clipped = np.zeros(u.size, dtype=np.bool_)
-    if estimate.model.order:
+    if estimate.points.order:
         return clipped
-    ordinary = _ordinary_noise(estimate)
+    # Noise of each point as if none were an outlier.
+    stated = estimate.points.u_errors
+    ordinary = estimate.noise_scale * (np.ones_like(u) if stated is None else stated)
     for scan in range(estimate.points.scans):
         inside = estimate.points.scan == scan
         # Points of a scan that share its largest voltage to the last digit.
         top = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
-        noise = np.median(ordinary[inside])
+        scatter = np.median(ordinary[inside])
         finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
-        curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
-        equal = top.sum() >= _FEWEST and (curved or finest < noise / _FINE)
-        clipped |= top if equal else _flattened(estimate, inside)
+        curved = np.ptp(estimate.predicted[top]) > _CURVED * scatter
+        equal = top.sum() >= _FEWEST and (curved or finest < scatter / _FINE)
+        clipped |= top if equal else _flattened(estimate, inside, ordinary)
     return clipped
 
 
-def _flattened(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
+def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) -> BoolArray:
     """Plateau of a scan that the profile through all other points rises above."""
-    plateau = _plateau(estimate, inside)
+    plateau = _plateau(estimate, inside, noise)
     none = np.zeros_like(inside)
     if plateau.sum() < _FEWEST:
         return none
@@ -362,26 +364,18 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
     share = plateau[chosen] / plateau[chosen].sum()
     overshoot = -(share @ weighed.residual)
     slope = reduced.summed(share) @ basis.columns(reduced)
-    noise = _ordinary_noise(estimate)[chosen]
-    variance = share**2 @ noise**2 + slope @ weighed.covariance @ slope
+    variance = share**2 @ noise[chosen] ** 2 + slope @ weighed.covariance @ slope
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 
 
-def _ordinary_noise(estimate: ProfileEstimate) -> FloatArray:
-    """Noise of each point, shape (n,), in V, as if none were an outlier."""
-    stated = estimate.points.u_errors
-    return estimate.noise_scale * (np.ones_like(estimate.points.u) if stated is None else stated)
-
-
-def _plateau(estimate: ProfileEstimate, inside: BoolArray) -> BoolArray:
-    """Points of a scan about its centre that are equal within the noise."""
+def _plateau(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) -> BoolArray:
+    """Points of a scan about its centre that are equal within the noise (n,), in V."""
     order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
     u = estimate.points.u[order]
-    noise = _ordinary_noise(estimate)[order]
     plateau = np.zeros_like(inside)
     # Scatter about the mean of the first points, for every number of them.
     half = int(inside.sum()) // 2
-    weight = noise[:half] ** -2
+    weight = noise[order][:half] ** -2
     offset = u[:half] - u[:1]
     total, first, second = (np.cumsum(weight * offset**power) for power in range(3))
     scatter = second - first**2 / total

@@ -36,7 +36,7 @@ from memscal.estimation.departures import (
     Shape,
 )
 from memscal.estimation.voltage_map import VoltageMap
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray
 
 #: The smallest noise, over the largest residual of a Gaussian, that is distinct from rounding.
 _ROUNDING = 1e-9
@@ -135,6 +135,7 @@ class _Conditionals:
     singular: FloatArray  # (h, s)
     right: FloatArray  # (h, s, m)
     data: FloatArray  # (h, s): along the left singular vectors
+    filter: FloatArray  # (h, s): from data to amplitudes, along the singular vectors
     # At the MAP estimate of the noise.
     log_marginal: FloatArray  # (h,)
     scatter: FloatArray  # (h,): variance of the residuals
@@ -161,19 +162,9 @@ class _Conditionals:
         prior = choice.strength**2
         signal = prior[:, None] * singular**2
         likelihoods = _likelihoods(sensors, choice.family, signal, power, noise)
-        decomposed = (by_amplitude, left, singular, right, data)
+        filters = prior[:, None] * singular / (likelihoods[-1][:, None] + signal)
+        decomposed = (by_amplitude, left, singular, right, data, filters)
         return cls(sensors, choice.number, choice.family, prior, *decomposed, *likelihoods)
-
-    def __getitem__(self, rows: BoolArray) -> _Conditionals:
-        """Some of the hypotheses."""
-        kept = {f.name: getattr(self, f.name)[rows] for f in fields(self)[1:]}
-        return replace(self, **kept)
-
-    @cached_property
-    def filter(self) -> FloatArray:
-        """From data to amplitudes, along the singular vectors, (h, s)."""
-        prior = self.prior[:, None]
-        return prior * self.singular / (self.variance[:, None] + prior * self.singular**2)
 
     @cached_property
     def by_component(self) -> FloatArray:
@@ -256,17 +247,12 @@ def _likelihoods(
 class Hypothesis:
     """The Gaussian or a family, with departures of a shape and strength; prior probabilities."""
 
+    kind: str  # name of the family, or of the shape; none of the Gaussian itself
     family: Family | None
     shape: Shape | None
     strength: float
     estimate: float
     uncertainty: float
-
-    @property
-    def kind(self) -> str:
-        """Name of the family, or of the shape; none of the Gaussian itself."""
-        named = self.family or self.shape
-        return named.name if named else ""
 
 
 #: Family (none: the Gaussian), departure from it and its strengths; prior probabilities, shared
@@ -295,7 +281,9 @@ def _hypotheses() -> Iterator[Hypothesis]:
         triples = [*product(families or (None,), shapes or (None,), strengths)]
         for family, shape, strength in triples:
             count = len(triples)
-            yield Hypothesis(family, shape, strength, estimate / count, uncertainty / count)
+            named = family or shape
+            kind = named.name if named else ""
+            yield Hypothesis(kind, family, shape, strength, estimate / count, uncertainty / count)
 
 
 HYPOTHESES = tuple(_hypotheses())
@@ -350,7 +338,9 @@ def weigh_departures(
     sizes = tuple(ring.radius.size for ring in basis.rings)
     choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))
     given = _Conditionals.of(_Sensors.of(basis, columns, data), columns, choice, noise)
-    return Weighing(reduced, basis, given, noise.added)
+    log_marginals = np.full(len(HYPOTHESES), -np.inf)
+    log_marginals[given.number] = given.log_marginal
+    return Weighing(reduced, basis, given, noise.added, log_marginals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,13 +351,7 @@ class Weighing:
     basis: DepartureBasis
     given: _Conditionals
     added: float
-
-    @cached_property
-    def log_marginals(self) -> FloatArray:
-        """Of each of HYPOTHESES, (h,)."""
-        log_marginals = np.full(len(HYPOTHESES), -np.inf)
-        log_marginals[self.given.number] = self.given.log_marginal
-        return log_marginals
+    log_marginals: FloatArray  # (h,): of each of HYPOTHESES
 
     @cached_property
     def log_marginal_likelihoods(self) -> tuple[float, float]:
@@ -386,9 +370,15 @@ class Weighing:
         fit = self.reduced.fit
         scatter = np.zeros(len(HYPOTHESES))
         scatter[given.number] = given.scatter
-        estimate, uncertainty = (_posterior(self.log_marginals, prior) for prior in _PRIORS)
-        likely = (estimate > 0) | (uncertainty > 0)
-        used = given[likely[given.number]]
+        probabilities = []
+        for prior in _PRIORS:
+            # Bayes' theorem; negligible probabilities are set to zero.
+            weight = prior * np.exp(self.log_marginals - self.log_marginals[prior > 0].max())
+            weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
+            probabilities.append(weight / weight.sum())
+        estimate, uncertainty = probabilities
+        likely = ((estimate > 0) | (uncertainty > 0))[given.number]
+        used = replace(given, **{f.name: getattr(given, f.name)[likely] for f in fields(given)[1:]})
         p = estimate[used.number]
         q = uncertainty[used.number]
         means = np.zeros((estimate.size, self.basis.integrals.size))
@@ -466,10 +456,3 @@ def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasi
         gain=weighed.gain[chosen],
     )
     return replace(basis, rings=rings, families=families), averaged
-
-
-def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:
-    """Posterior probabilities by Bayes' theorem, negligible ones set to zero."""
-    weight = prior * np.exp(log_marginal - log_marginal[prior > 0].max())
-    weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
-    return np.asarray(weight / weight.sum())

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -54,12 +54,7 @@ class Shape:
 
     def rings(self, width: float, amplitude: float) -> Rings:
         """Components about a Gaussian of a width (m) and amplitude (V/Pa), by its L2 norm."""
-        unit = self._about_unit
-        return Rings(width * unit.radius, width * unit.blur, amplitude * unit.amplitude)
-
-    @cached_property
-    def _about_unit(self) -> Rings:
-        """Components about a Gaussian of unit width and amplitude."""
+        # In units of the width at first.
         if self.scales:
             blur = np.geomspace(self.blur, self.extent, _SCALES)
             plain = Rings(np.zeros(_SCALES), blur, np.ones(_SCALES))
@@ -70,7 +65,8 @@ class Shape:
             envelope = np.sqrt(q) * np.exp(-0.5 * (q / self.extent) ** 4)
             plain = Rings(q, np.full(count, self.blur), envelope)
         gaussian = 1 / (2 * np.sqrt(np.pi))
-        return replace(plain, amplitude=plain.amplitude * gaussian / plain.size)
+        size = amplitude * (plain.amplitude * gaussian / plain.size)
+        return Rings(width * plain.radius, width * plain.blur, size)
 
 
 #: Edges (a disc, a plateau), a core (a ring, a spike), and tails.
@@ -190,7 +186,7 @@ class ReducedScan:
         if rings:
             first.append(rings.signal(model, fit.centre))
         columns, mix = model.framed(fit.geometry, first)
-        columns = points.standardise(columns, weights)
+        columns = points.standardised(columns, weights, out=columns)
         right = None
         last = columns.shape[1]
         synthesis = None
@@ -348,16 +344,14 @@ def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
     k = reduced.model.k
     step = _RELATIVE_STEP
     others = np.linalg.qr(reduced.flat[:, 2:])[0]
-
-    def free(values: FloatArray) -> FloatArray:
-        return values - others @ (others.T @ values)
-
     gaussian = fit.conversion_constant * kernels.gaussian_transfer(k, fit.sigma)
-    data = free(reduced.data + reduced.signal(gaussian))
+    data = reduced.data + reduced.signal(gaussian)
+    data = data - others @ (others.T @ data)
     widths = np.full(len(FAMILIES), start)
     for _ in range(_FAMILY_ROUNDS):
         both = _sensors(2 * FAMILIES, np.append(widths, (1 + step) * widths), k, _TRANSFORMS)
-        signal, wider = np.hsplit(free(reduced.signal(both)), 2)
+        voltages = reduced.signal(both)
+        signal, wider = np.hsplit(voltages - others @ (others.T @ voltages), 2)
         # Least squares in A and A d ln(width), of all families at once.
         slope = (wider - signal) / step
         a = np.sum(signal**2, axis=0)

@@ -20,7 +20,7 @@ the sensor to the indenter,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
@@ -34,6 +34,7 @@ from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
     from scipy.sparse import csr_array
 
 Rows: TypeAlias = slice | BoolArray
@@ -67,23 +68,14 @@ class WaveTable:
 
     radii: FloatArray
     values: FloatArray  # (t, nodes)
-    splines: FloatArray  # (t, nodes): coefficients
-    knots: FloatArray
-
-    def at(self, radius: FloatArray) -> FloatArray:
-        """Waves at radii within the table, (n, nodes)."""
-        from scipy.interpolate import BSpline
-
-        inside = np.clip(radius, self.radii[0], self.radii[-1])
-        spline = BSpline.construct_fast(self.knots, self.splines, _DEGREE)
-        return spline(inside)
+    spline: BSpline  # with coefficients (t, nodes)
 
     def interpolation(self, radius: FloatArray) -> csr_array:
         """From coefficients to radii within the table, shape (n, t), sparse."""
         from scipy.interpolate import BSpline
 
         inside = np.clip(radius, self.radii[0], self.radii[-1])
-        return BSpline.design_matrix(inside, self.knots, _DEGREE)
+        return BSpline.design_matrix(inside, self.spline.t, _DEGREE)
 
 
 @lru_cache(maxsize=32)
@@ -95,8 +87,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
     count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
     radii: FloatArray = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
     values = _wave(wave, radii, k, across)
-    spline = make_interp_spline(radii, values, k=_DEGREE)
-    return WaveTable(radii, values, spline.c, spline.t)
+    return WaveTable(radii, values, make_interp_spline(radii, values, k=_DEGREE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +104,13 @@ class Geometry:
     def summed(self, wave: int, spread: FloatArray, rows: Rows = slice(None)) -> FloatArray:
         """Sum a wave over the nodes, by factors (nodes,) or (nodes, m), at some of the points."""
         if self.radius.size > DENSE or wave > 1:
-            return self.interpolation[rows] @ (self.table(wave).splines @ spread)
+            return self.interpolation[rows] @ (self.table(wave).spline.c @ spread)
         if wave not in self._waves:
             # Repeats share their positions: each wave is computed once.
             unique, place = np.unique(self.radius, return_inverse=True)
             if self.reach * self.k[-1] < _LONGEST_PHASE:
-                values = self.table(wave).at(unique)
+                table = self.table(wave)
+                values = table.spline(np.minimum(unique, table.radii[-1]))
             else:
                 values = _wave(wave, unique, self.k, self.across)
             self._waves[wave] = values[place]
@@ -156,15 +148,6 @@ class ForwardModel:
     def reference(self) -> RadialSpectrum:
         """The first scan's reference."""
         return self.references[0]
-
-    def only(self, scan: int) -> ForwardModel:
-        """Return the model of one of the scans."""
-        return replace(self, points=self.points.only(scan), references=(self.references[scan],))
-
-    @property
-    def order(self) -> int:
-        """Zero for the normal channel; one for a tangential one, a component of a vector."""
-        return max(self.reference.order, 0)
 
     @property
     def axis(self) -> int:
@@ -220,8 +203,8 @@ class ForwardModel:
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
-        voltages = self._summed(geometry, self.order, kernel)
-        if self.order == 0:
+        voltages = self._summed(geometry, self.points.order, kernel)
+        if self.points.order == 0:
             return voltages
         return np.asarray(-(geometry.towards[self.axis] * voltages.T).T)
 
@@ -237,16 +220,16 @@ class ForwardModel:
         for scan, measure in enumerate(self._measures):
             alike.setdefault(measure.tobytes(), []).append(scan)
         strongest = np.abs(self._measures).max(axis=0)
-        table = geometry.table(self.order)
+        table = geometry.table(self.points.order)
         # One radius beyond the farthest point is within the reach of its interpolation.
         farthest = geometry.radius.max() + (table.radii[1] - table.radii[0])
         inside = (table.radii >= 0) & (table.radii <= farthest)
         _, size, right = np.linalg.svd(table.values[inside] * strongest, full_matrices=False)
         size = size[size > _NOTHING * size[0]]
         right = right[: size.size]
-        splines = table.splines @ ((strongest[:, None] * right.T) / size)
+        splines = table.spline.c @ ((strongest[:, None] * right.T) / size)
         factor = self.points.load
-        if self.order:
+        if self.points.order:
             factor = -factor * geometry.towards[self.axis]
         start = sum(columns.shape[1] for columns in first)
         columns = np.zeros((factor.size, start + size.size * len(alike)))
@@ -266,7 +249,7 @@ class ForwardModel:
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, in V/m."""
-        if self.order:
+        if self.points.order:
             slope, _ = self._vector_slopes(geometry, kernel)
             return np.asarray(-geometry.towards[self.axis] * slope)
         return -self._summed(geometry, 1, (self.k * kernel.T).T)
@@ -274,16 +257,12 @@ class ForwardModel:
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
         # A vector's component changes by f/R across its direction, too.
-        if self.order == 0:
+        if self.points.order == 0:
             return geometry.towards * self.radial_derivative(geometry, kernel)
         slope, turn = self._vector_slopes(geometry, kernel)
         shift = geometry.towards[self.axis] * geometry.towards * (turn - slope)
         shift[self.axis] -= turn
         return np.asarray(shift)
-
-    def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
-        """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""
-        return self.by_free_centres(self.shift_derivative(geometry, kernel))
 
     def by_free_centres(self, shift: FloatArray) -> FloatArray:
         """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -112,7 +113,8 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
     centres = []
     drifts = []
     for scan, free in enumerate(points.free):
-        start = _robust_start_of_scan(model.only(scan), weights[points.scan == scan])
+        own = replace(model, points=points.only(scan), references=(model.references[scan],))
+        start = _robust_start_of_scan(own, weights[points.scan == scan])
         last = 2 + int(free.sum())
         shapes.append(start[:2])
         centres.append(start[2:last])
@@ -145,7 +147,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     odd: list[FloatArray] = []
     for sigma, table in zip(widths, tables, strict=True):
         shapes = np.interp(distances, radii, table) * (points.load * root)
-        if model.order:
+        if points.order:
             shapes *= model.cosines(centres)
             odd.append(shapes)
         amplitudes, costs = _amplitudes(shapes, data, drift)
@@ -154,7 +156,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
             baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
             best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
             best_cost = costs[i]
-    if model.order:
+    if points.order:
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
@@ -264,77 +266,57 @@ def fit_gaussian_to_points(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
-    if start is not None:
-        theta = _parameters(start)
-    elif weights.size <= _MOST_AT_START:
+    points = model.points
+    robust = start is None
+    if robust and weights.size > _MOST_AT_START:
+        # Some points, evenly chosen along the scan, give the start for all.
+        order = np.lexsort((points.x, points.y, points.scan))
+        chosen = np.sort(evenly(order, _MOST_AT_START))
+        some = replace(model, points=points.selected(chosen))
+        start = fit_gaussian_to_points(some, weights[chosen])
+    if start is None:
         theta = _robust_start(model, weights)
     else:
-        # Some points, evenly chosen along the scan, give the start for all.
-        order = np.lexsort((model.points.x, model.points.y, model.points.scan))
-        chosen = np.sort(evenly(order, _MOST_AT_START))
-        some = replace(model, points=model.points.selected(chosen))
-        theta = _parameters(fit_gaussian_to_points(some, weights[chosen]))
-    return _solve(model, weights, theta, robust=start is None)
-
-
-def _parameters(fit: GaussianFit) -> FloatArray:
-    shape = [fit.conversion_constant, fit.sigma]
-    ellipticity = fit.ellipticity[: fit.points.ellipse]
-    return np.concatenate([shape, fit.centre[fit.points.free], fit.drift, ellipticity])
+        shape = [start.conversion_constant, start.sigma]
+        ellipticity = start.ellipticity[: points.ellipse]
+        theta = np.concatenate([shape, start.centre[points.free], start.drift, ellipticity])
+    return _solve(model, weights, theta, robust)
 
 
 def _solve(
     model: ForwardModel, weights: FloatArray, start: FloatArray, robust: bool
 ) -> GaussianFit:
-    from scipy.optimize import least_squares
+    points = model.points
+    # Typical size of each parameter, so that the solver sees numbers near one.
+    centres = int(points.free.sum())
+    scale = np.full(start.size, np.ptp(points.u))
+    scale[: 2 + centres] = max(abs(start[1]), 0.05 * _smoothing_length(model))
+    scale[0] = abs(start[0])
+    scale[start.size - points.ellipse :] = _TYPICAL_ELLIPTICITY
+    begin = start / scale
+    fit = linearise(model, begin * scale)
+    left = points.standardised(points.u - fit.predicted, weights)
+    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + np.finfo(float).tiny)
+    # The solvers ask for residuals and slopes one after the other, at the same place.
+    last = {begin.tobytes(): fit}
+    # Of many points there is room for one.
+    del fit
 
-    standardised = model.points.standardised
-    last: dict[bytes, GaussianFit] = {}
-
-    def evaluate(scaled: FloatArray) -> GaussianFit:
-        # The solvers evaluate residuals and Jacobian one after the other, at the same point.
+    def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
         key = scaled.tobytes()
         if key not in last:
             last.clear()
             last[key] = linearise(model, scaled * scale)
-        return last[key]
-
-    # Typical size of each parameter, so that the solver sees numbers near one.
-    centres = int(model.points.free.sum())
-    ellipse = model.points.ellipse
-    scale = np.full(start.size, np.ptp(model.points.u))
-    scale[: 2 + centres] = max(abs(start[1]), 0.05 * _smoothing_length(model))
-    scale[0] = abs(start[0])
-    scale[start.size - ellipse :] = _TYPICAL_ELLIPTICITY
-    unexplained = model.points.u - evaluate(start / scale).predicted
-    noise = robust_scale(standardised(unexplained, weights))
-
-    def residual(scaled: FloatArray) -> FloatArray:
-        return standardised(evaluate(scaled).predicted - model.points.u, weights) / noise
-
-    def slope(scaled: FloatArray) -> FloatArray:
-        return standardised(evaluate(scaled).jacobian, weights) * scale / noise
+        residual = points.standardised(last[key].predicted - points.u, weights) / noise
+        return residual, points.standardised(last[key].jacobian, weights) * scale / noise
 
     # A robust fit is the start of the next one: a low accuracy is enough.
     knee = _KNEE if robust else np.inf
     tolerance = 1e-4 if robust else 1e-9
-    begin = start / scale
-    solution = gauss_newton(
-        lambda scaled: (residual(scaled), slope(scaled)), begin, tolerance=tolerance, knee=knee
-    )
+    solution = gauss_newton(linearised, begin, tolerance=tolerance, knee=knee)
     # At a width of zero every slope by the width is zero: steps do not leave it.
     if solution is None or solution[1] < _NARROWEST:
-        result = least_squares(
-            residual,
-            begin,
-            slope,
-            loss="soft_l1" if robust else "linear",
-            f_scale=_KNEE,
-            xtol=1e-10,
-            ftol=1e-12,
-            gtol=1e-10,
-            max_nfev=100,
-        )
+        result = _trust_region(linearised, begin, robust)
         if not result.success:
             raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
         solution = result.x
@@ -344,6 +326,29 @@ def _solve(
     if not 0 < fit.conversion_constant < np.inf:
         raise _undetermined(model, fit.conversion_constant)
     return fit
+
+
+def _trust_region(linearised: Linearised, start: FloatArray, robust: bool) -> Any:
+    """Minimise the loss of the residuals from anywhere, with a trust region."""
+    from scipy.optimize import least_squares
+
+    def residual(place: FloatArray) -> FloatArray:
+        return linearised(place)[0]
+
+    def slope(place: FloatArray) -> FloatArray:
+        return linearised(place)[1]
+
+    return least_squares(
+        residual,
+        start,
+        slope,
+        loss="soft_l1" if robust else "linear",
+        f_scale=_KNEE,
+        xtol=1e-10,
+        ftol=1e-12,
+        gtol=1e-10,
+        max_nfev=100,
+    )
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
@@ -362,13 +367,14 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     kernel = gaussian_transfer(model.k, sigma)
     if model.points.ellipse:
         columns, shift = elliptic_columns(model, geometry, sigma, ellipticity)
-        centring = model.by_free_centres(amplitude * shift)
+        shift = amplitude * shift
     else:
-        centring = model.centre_derivative(geometry, amplitude * kernel)
+        shift = model.shift_derivative(geometry, amplitude * kernel)
         both = np.stack([kernel, gaussian_transfer_slope(model.k, sigma)], axis=1)
         columns = model.signal(geometry, both)
     signal = columns[:, :1]
     by_shape = amplitude * columns[:, 1 : 2 + model.points.ellipse]
+    centring = model.by_free_centres(shift)
     baseline = model.drift_columns
     jacobian = np.hstack([signal, by_shape[:, :1], centring, baseline, by_shape[:, 1:]])
     predicted = amplitude * columns[:, 0] + baseline @ drift

@@ -18,16 +18,9 @@ _UNEVEN = 4.0
 _NEIGHBOURS = 8
 
 
-def median_deviation(values: FloatArray) -> float:
-    """Standard deviation of a normal distribution by the median absolute value."""
-    return 1.4826 * float(np.median(np.abs(values)))
-
-
-def robust_scale(residual: FloatArray) -> float:
-    """Median absolute deviation as a standard deviation, never zero."""
-    return max(
-        median_deviation(residual), 1e-12 * float(np.abs(residual).max()), np.finfo(float).tiny
-    )
+def robust_scale(values: FloatArray, least: float = 0.0) -> float:
+    """Standard deviation of a normal distribution by the median absolute value, no less."""
+    return max(1.4826 * float(np.median(np.abs(values))), least)
 
 
 def outlier_weights(
@@ -35,7 +28,7 @@ def outlier_weights(
 ) -> FloatArray:
     """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
     # The residuals count in robust standard deviations of their own, of ``least`` or more.
-    z = np.abs(standardised) / max(median_deviation(standardised), least)
+    z = np.abs(standardised) / robust_scale(standardised, least)
     return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 
@@ -45,7 +38,7 @@ def point_weights(
     """Weights of the points by their residuals; over the plane by what neighbours do not share."""
     least = _ROUNDING * float(np.abs(points.u).max() * np.sqrt(stated).max())
     if points.planar:
-        least = max(least, float(robust_scale(residual * np.sqrt(stated))))
+        least = robust_scale(residual * np.sqrt(stated), least)
         residual = isolated(points, residual)
     return outlier_weights(residual * np.sqrt(stated), threshold, least)
 
@@ -64,7 +57,7 @@ def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
         return _third_difference_noise(points, residual)
     left = (residual - (np.bincount(group, residual) / readings)[group])[readings[group] > 1]
     # Deviations from a mean of few are smaller than the noise.
-    return median_deviation(left) * float(np.sqrt(left.size / degrees))
+    return robust_scale(left) * float(np.sqrt(left.size / degrees))
 
 
 def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float | None:
@@ -81,7 +74,7 @@ def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float |
     apart = points.x[four][:, :, None] - points.x[four][:, None, :] + np.eye(4)
     coefficients = 1 / apart.prod(axis=2)
     coefficients /= np.linalg.norm(coefficients, axis=1)[:, None]
-    return median_deviation(np.sum(coefficients * residual[four], axis=1))
+    return robust_scale(np.sum(coefficients * residual[four], axis=1))
 
 
 def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:

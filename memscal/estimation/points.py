@@ -186,9 +186,12 @@ class ScanPoints:
                 columns[name] = value[chosen]
         return replace(self, **columns, decorrelation=None)
 
-    def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+    def standardised(
+        self, values: FloatArray, weights: FloatArray, out: FloatArray | None = None
+    ) -> FloatArray:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
-        scaled = (values.T * np.sqrt(weights)).T
+        place = None if out is None else out.T
+        scaled: FloatArray = np.multiply(values.T, np.sqrt(weights), out=place).T
         return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
@@ -201,11 +204,6 @@ class ScanPoints:
         factor = self.decorrelation or Decorrelation(())
         factor = replace(factor, common=left, growth=np.hypot(1, singular))
         return replace(self, decorrelation=factor), float(np.log1p(singular**2).sum())
-
-    def standardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return :meth:`standardised` of columns (n, m), which are overwritten."""
-        columns *= np.sqrt(weights)[:, None]
-        return columns if self.decorrelation is None else self.decorrelation.apply(columns)
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
         """Apply the transposed standardisation to columns (n, m), which are overwritten."""
@@ -232,6 +230,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     load = scan.stated_load if scan.normal_load is None else scan.normal_load
     x_errors = 0.0 if scan.x_errors is None else scan.x_errors
     branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
+    correlation = None if channel_order(channel) else scan.u_zz_correlation
     points = ScanPoints(
         x=x[keep],
         y=y[keep],
@@ -244,7 +243,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
         missing=int(u.size - keep.sum()),
-        decorrelation=None if channel_order(channel) else _decorrelation(scan, keep),
+        decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
         reading=scan.reading,
     )
@@ -368,20 +367,18 @@ def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
     return Decorrelation(tuple(blocks))
 
 
-def _decorrelation(scan: Scan, keep: BoolArray) -> Decorrelation | None:
+def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
     """Cholesky factors of the correlation of all kept points, repeat by repeat."""
-    if scan.u_zz_correlation is None:
-        return None
     blocks = []
     first = 0
     roots: dict[bytes, FloatArray] = {}
-    for measured in keep.reshape(-1, len(scan.u_zz_correlation)):
+    for measured in keep.reshape(-1, len(correlation)):
         kept = np.flatnonzero(measured)
         if not kept.size:
             continue
         key = measured.tobytes()
         if key not in roots:
-            roots[key] = root_of(of_points(scan.u_zz_correlation, kept))
+            roots[key] = root_of(of_points(correlation, kept))
         blocks.append((np.arange(first, first + kept.size), roots[key]))
         first += kept.size
     return Decorrelation(tuple(blocks))

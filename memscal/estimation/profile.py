@@ -96,11 +96,6 @@ class ProfileEstimate:
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
     @cached_property
-    def gaussian_gain(self) -> VoltageMap:
-        """Derivative of the Gaussian fit's parameters by the voltages."""
-        return self.gaussian.gain(self.weights)
-
-    @cached_property
     def kernel(self) -> FloatArray:
         """Transform of A G at the quadrature nodes, in V/Pa."""
         gaussian = gaussian_transfer(self.model.k, self.gaussian.sigma)
@@ -240,7 +235,7 @@ def estimate_profile(
     stated = _stated_weights(points, slope[along] * points.x_errors)
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
-    angular = angular and points.planar and not model.order
+    angular = angular and points.planar and not points.order
     if start:
         outlier = start.outlier_weight
     else:

@@ -11,7 +11,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.set_up import film_of, is_source
+from memscal.estimation.set_up import film_of
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.mechanics.tabulated_rod import largest_tabulated_load
@@ -72,9 +72,13 @@ def reference_spectra(
 
 
 def _spectrum(stress: BaseStress, wavenumbers: Wavenumbers, points: ScanPoints) -> RadialSpectrum:
-    values = _per_newton(stress, wavenumbers.k, points.span, points.order)
-    if isinstance(stress, Contact) or stress.form is None:
+    if isinstance(stress, Contact):
+        values = _base_spectrum(stress, wavenumbers.k.tobytes(), points.order) / stress.load
         return RadialSpectrum(wavenumbers, values, points.order)
+    if stress.form is None or points.order:
+        values = _table_spectrum(stress, wavenumbers.k, points.span, points.order)
+        return RadialSpectrum(wavenumbers, values, points.order)
+    values = stress.form.transform(wavenumbers.k) / stress.load
     if stress.ideal is not None and stress.ideal.shape == "slit":
         if points.planar:
             why = "It is scanned across, along a line, and shows nothing of any other direction."
@@ -103,11 +107,7 @@ def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
     return float(k[size > _NOTHING * size.max()][-1])
 
 
-def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
-    if isinstance(reference, Contact):
-        return _base_spectrum(reference, k.tobytes(), order) / reference.load
-    if reference.form is not None and not order:
-        return reference.form.transform(k) / reference.load
+def _table_spectrum(reference: StressProfile, k: FloatArray, span: float, order: int) -> FloatArray:
     stress = reference.sigma_rz if order else reference.sigma_zz
     if stress is None or (order and not stress.any()):
         raise InputError(
@@ -144,7 +144,7 @@ def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
 
 def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
     """Force that a reference (a shear: its normal stress) carries, over its load; 1 of a source."""
-    if is_source(stress):
+    if stress.form:
         return 1.0
     if reference.order == 0:
         return reference.integral
@@ -295,12 +295,7 @@ def _relative_difference(
         spectrum = _base_spectrum(press_rod(*rod.under(law)), nodes, order)
         spectra.append(spectrum * set_up.load / rod.load)
     upper, lower, own = spectra
-    return relative(upper - lower, own)
-
-
-def relative(values: FloatArray, own: FloatArray) -> FloatArray:
-    """Ratio of two transforms, 0 where the second ends."""
-    return np.divide(values, own, out=np.zeros_like(own), where=own != 0)
+    return np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
 
 
 def law_at_once(set_up: SetUp) -> str:

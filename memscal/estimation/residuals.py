@@ -73,7 +73,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     if basis.angular:
         first.append(basis.angular.combined(basis.angular.rings.signal(model, fit.centre)))
     columns, mix = model.framed(fit.geometry, first)
-    columns = points.standardise(columns, weights)
+    columns = points.standardised(columns, weights, out=columns)
     columns[~ordinary] = 0.0
     data = columns[point, 0]
     q = None
@@ -133,11 +133,7 @@ class Residuals:
     place: IndexArray  # (n,): its place along the scan, outliers counted
     sequence: IndexArray  # (n,): which pass over the sensor: a repeat, or a raster's row
     stated: bool  # whether the noise is stated
-
-    @property
-    def degrees(self) -> int:
-        """How many of them are independent."""
-        return int(self.basis.shape[0] - self.basis.shape[1])
+    degrees: int  # how many of them are independent
 
     @cached_property
     def independent(self) -> tuple[FloatArray, IndexArray]:
@@ -175,7 +171,8 @@ def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> R
     basis = orthonormal(model.design[order])
     data = model.data[order]
     left_over = data - basis @ (basis.T @ data)
-    return Residuals(left_over, basis, point, place[point], sequence[point], model.stated)
+    degrees = basis.shape[0] - basis.shape[1]
+    return Residuals(left_over, basis, point, place[point], sequence[point], model.stated, degrees)
 
 
 def chi_square_test(residuals: Residuals) -> TestOutcome:
@@ -246,7 +243,13 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     # Sp = tr [(1 - QQ')(W - S1/nu)]^p; the p-value is that of a gamma distribution (Pearson III).
     nu = residuals.degrees
     values = residuals.values
-    neighbours = _neighbours(residuals)
+    place = residuals.place
+    sequence = residuals.sequence
+    # Weights of the pairs of residuals that follow each other in one pass, by their distance.
+    neighbours = []
+    for i in range(1, min(_FARTHEST, place.size - 1) + 1):
+        weights = 0.5 * _DECAY ** (place[i:] - place[:-i])
+        neighbours.append(weights * (sequence[i:] == sequence[:-i]))
     first, second, third = _traces(neighbours, residuals.basis)
     mean = first / nu
     third += 2 * nu * mean**3 - 3 * mean * second
@@ -260,17 +263,6 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     limit = deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
     p_value = gammaincc(shape, max(shape + np.sqrt(shape) * value / deviation, 0.0))
     return TestOutcome(value, float(limit), float(p_value))
-
-
-def _neighbours(residuals: Residuals) -> list[FloatArray]:
-    """Weights of the pairs of residuals that follow each other in one pass, by their distance."""
-    place = residuals.place
-    sequence = residuals.sequence
-    pairs = []
-    for i in range(1, min(_FARTHEST, place.size - 1) + 1):
-        weights = 0.5 * _DECAY ** (place[i:] - place[:-i])
-        pairs.append(weights * (sequence[i:] == sequence[:-i]))
-    return pairs
 
 
 def _weighted(pairs: list[FloatArray], values: FloatArray) -> FloatArray:

@@ -25,11 +25,6 @@ COVERAGE = 2.0
 _SAME = 1e-6
 
 
-def is_source(stress: BaseStress | None) -> bool:
-    """Whether a reference is a source that needs no film, rod and load."""
-    return stress is not None and stress.form is not None
-
-
 def film_of(stress: BaseStress) -> ElasticFilm | None:
     """Return the film that a stress is stated to be below."""
     return stress.film_of_law if isinstance(stress, Contact) else stress.film
@@ -74,7 +69,8 @@ def require_one_kind(
     forms = [reference and reference.form for reference in references]
     kinds = {form and (form.unit, getattr(form, "shape", "") == "slit") for form in forms}
     sources = kinds != {None}
-    if len(kinds) > 1 or (sources and alternatives) or any(map(is_source, alternatives)):
+    mixed = any(stress and stress.form for stress in alternatives)
+    if mixed or len(kinds) > 1 or (sources and alternatives):
         raise InputError(
             "Sources and stresses, slits and other sources, or sources of several units are mixed.",
             why="One conversion constant has one unit; an alternative is of a film's stress.",
@@ -132,7 +128,7 @@ def require_same_set_up(
     given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
     differences: list[str] = []
     for scan, stress in zip(scans, given, strict=True):
-        if stress is not None and not is_source(stress):
+        if stress is not None and stress.form is None:
             differences += _other_set_up(scan, stress, "reference")
     for scan, stress in zip(scans, alternatives, strict=False):
         if stress is not None:

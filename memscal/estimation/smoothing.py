@@ -75,13 +75,9 @@ class SmoothedProfile:
     estimate: ProfileEstimate  # whose centre, baseline, drift and noise it takes
     signal: FloatArray  # (n,): voltages of what is round alone, in V
     gain: VoltageMap  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
+    spectrum: RadialSpectrum  # transform of the profile per newton, in V m^2/N
     predicted: FloatArray  # (n,): the smoothed signal at the points, in V
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
-
-    @cached_property
-    def spectrum(self) -> RadialSpectrum:
-        """Transform of the profile per newton, in V m^2/N."""
-        return replace(self.estimate.model.reference, values=self.gain @ self.signal)
 
     @cached_property
     def noise(self) -> FloatArray:
@@ -112,7 +108,9 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
         gain, smoothed, weight[rows] = _fitted(estimate, signal[rows], reference, rows)
         predicted[rows] = load * smoothed
         gains.append((reference.values, gain.over(1 / load, rows, points.u.size)))
-    return SmoothedProfile(estimate, signal, _joined(gains, estimate), predicted, weight)
+    gain = _joined(gains, estimate) if len(gains) > 1 else gains[0][1]
+    spectrum = replace(references[0], values=gain @ signal)
+    return SmoothedProfile(estimate, signal, gain, spectrum, predicted, weight)
 
 
 def _joined(
@@ -123,9 +121,7 @@ def _joined(
     .. math:: \hat U = \hat\sigma_1 \sum_s \hat\sigma_s \hat U_s / v_s
               \Big/ \sum_s \hat\sigma_s^2 / v_s
     """
-    first, gain = gains[0]
-    if len(gains) == 1:
-        return gain
+    first = gains[0][0]
     shares = [stress / np.sum(estimate.scattered(each) ** 2, axis=1) for stress, each in gains]
     below = np.sum(
         [stress * share for (stress, _), share in zip(gains, shares, strict=True)], axis=0

@@ -441,7 +441,8 @@ def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray
     pressure = posterior.stress / restored.scan.stated_load / film
     a = restored.apparatus.conversion_constant
     geometry = model.geometry(np.atleast_2d(restored.centre))
-    by_centre = average @ model.centre_derivative(geometry, pressure) / a
+    slope = model.by_free_centres(model.shift_derivative(geometry, pressure))
+    by_centre = average @ slope / a
     by_drift = average @ model.drift_columns / a
     covariance = posterior.covariance[nodes:, nodes:]
     n = by_centre.shape[1]

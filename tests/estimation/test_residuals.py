@@ -29,7 +29,7 @@ def made(values: np.ndarray, passes: int = 1) -> Residuals:
     place = np.arange(n + 1)
     sequence = np.append(np.arange(n) * passes // n, passes)
     basis = (place == n)[:, None].astype(float)
-    return Residuals(np.append(values, 0.0), basis, place, place, sequence, stated=True)
+    return Residuals(np.append(values, 0.0), basis, place, place, sequence, stated=True, degrees=n)
 
 
 def rejected_share_bounds(scans: int, level: float) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from memscal.calibration.uncertainty import BUDGETED, InputEffect
 from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.points import measured_mask
-from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, relative, rod_spectrum
+from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
@@ -167,7 +167,9 @@ class DrawnScans:
         for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
             nominal = self._nominal[i]
             change = _rod(scan, reference, self.solution.scans[i]) - nominal
-            values = change * relative(reference.values, nominal)
+            blank = np.zeros_like(nominal)
+            ratio = np.divide(reference.values, nominal, out=blank, where=nominal != 0)
+            values = change * ratio
             changes.append(replace(reference, values=values))
         return tuple(changes)
 
