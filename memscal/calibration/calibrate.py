@@ -232,7 +232,8 @@ def calibrate(
     prepared = prepare(scans, request)
     if free:
         prepared = _with_thickness(prepared)
-    solution = _solved(prepared)
+    given = (prepared.scans, prepared.stresses, request.method, channel)
+    solution = solve(*given, centre=centre, owners=prepared.owners)
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
@@ -245,22 +246,13 @@ def calibrate(
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 
 
-def _solved(prepared: Prepared) -> Solution:
-    request = prepared.request
-    return solve(
-        prepared.scans,
-        prepared.stresses,
-        request.method,
-        request.channel,
-        centre=request.centre,
-        owners=prepared.owners,
-    )
-
-
 def _with_thickness(prepared: Prepared) -> Prepared:
     """Estimate the thickness of the films from the scans, and take it for that of the rods."""
-    require_free(prepared.request.free, prepared.scans, prepared.references)
-    thickness = free_thickness(_solved(prepared))
+    request = prepared.request
+    require_free(request.free, prepared.scans, prepared.references)
+    given = (prepared.scans, prepared.stresses, request.method, request.channel)
+    solution = solve(*given, centre=request.centre, owners=prepared.owners)
+    thickness = free_thickness(solution)
     scans = thickness.estimated(prepared.scans)
     stresses = tuple(reference_profile(scan, None) for scan in scans)
     return replace(prepared, scans=scans, stresses=stresses, thickness=thickness)

@@ -20,12 +20,13 @@ Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | Measure
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
-def opened_scan(
-    scan: Scan | FilePath, most: int | None = None, *, accept_altered: bool = False
-) -> Scan:
+def opened_scan(scan: Any, most: int | None = None, *, accept_altered: bool = False) -> Scan:
     """Return a scan that is given itself or as a path, with ``most`` points in a file."""
+    if isinstance(scan, Scan):
+        return scan
     if not isinstance(scan, str | PathLike):
-        return _required(scan)
+        cure = "Give a scan, or the path of its file."
+        raise InputError(f"There is a {type(scan).__name__} where a Scan is needed.", cure=cure)
     with open_hdf5(scan, accept_altered=accept_altered) as file:
         return scan_from(file, most)
 
@@ -36,7 +37,8 @@ def opened_scans(
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
     listed = _listed(scans)
     opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
-    _require_different(opened)
+    if len(opened) > 1:
+        require_different(map(_contents, opened))
     return tuple(opened)
 
 
@@ -45,7 +47,8 @@ def opened_contacts(
 ) -> tuple[Scan | MeasuredStress, ...]:
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
     opened = [_scan_or_stress(item, accept_altered) for item in _listed(contacts)]
-    _require_different([item for item in opened if isinstance(item, Scan)])
+    if len(opened) > 1:
+        require_different(_contents(item) for item in opened if isinstance(item, Scan))
     return tuple(opened)
 
 
@@ -53,15 +56,11 @@ def _scan_or_stress(item: Any, accept_altered: bool) -> Scan | MeasuredStress:
     if isinstance(item, MeasuredStress):
         return item
     if not isinstance(item, str | PathLike):
-        return _required(item)
+        return opened_scan(item)
     with open_hdf5(item, accept_altered=accept_altered) as file:
         if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
             return stress_from(file)
         return scan_from(file)
-
-
-def _require_different(scans: Sequence[Scan]) -> None:
-    require_different(map(_contents, scans) if len(scans) > 1 else ())
 
 
 def _contents(scan: Scan) -> tuple[str, Hashable]:
@@ -91,10 +90,3 @@ def _listed(items: Any) -> list[Any]:
     if not listed:
         raise InputError("There is no scan.", cure="Give a scan, or several.")
     return listed
-
-
-def _required(item: Any) -> Scan:
-    if not isinstance(item, Scan):
-        cure = "Give a scan, or the path of its file."
-        raise InputError(f"There is a {type(item).__name__} where a Scan is needed.", cure=cure)
-    return item

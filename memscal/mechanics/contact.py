@@ -197,22 +197,12 @@ class Contact(Result):
         far from it, out to where the stress stays below 1e-9 of its maximum: a cubic spline
         through them is accurate to 1e-6 of the maximum.
         """
-        return self._default_profile if r is None else self._tabulated(_radii(r))
-
-    @cached_property
-    def _default_profile(self) -> StressProfile:
-        near = np.arange(0.0, self.contact_radius / self.film.thickness + _NEAR_REACH, _NEAR_STEP)
-        far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
-        radii = np.concatenate([near, far]) * self.film.thickness
-        sigma_zz = np.abs(self.base_stress(radii))
-        last = np.flatnonzero(sigma_zz >= _PROFILE_FLOOR * sigma_zz.max())[-1] + 2
-        return self._tabulated(radii[:last])
-
-    def _tabulated(self, radii: FloatArray) -> StressProfile:
+        if r is None:
+            return self._default_profile
         return StressProfile(
-            r=radii,
-            sigma_zz=self.base_stress(radii),
-            sigma_rz=self.base_shear(radii),
+            r=np.asarray(r),
+            sigma_zz=self.base_stress(r),
+            sigma_rz=self.base_shear(r),
             load=self.load,
             depth=self.depth,
             contact_radius=self.contact_radius,
@@ -226,6 +216,15 @@ class Contact(Result):
             convergence=self.convergence,
             notes=f"Interface: {self.interface.description}." if not self.interface.rigid else "",
         )
+
+    @cached_property
+    def _default_profile(self) -> StressProfile:
+        near = np.arange(0.0, self.contact_radius / self.film.thickness + _NEAR_REACH, _NEAR_STEP)
+        far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
+        radii = np.concatenate([near, far]) * self.film.thickness
+        sigma_zz = np.abs(self.base_stress(radii))
+        last = np.flatnonzero(sigma_zz >= _PROFILE_FLOOR * sigma_zz.max())[-1] + 2
+        return self.profile(radii[:last])
 
 
 BaseStress: TypeAlias = StressProfile | Contact

@@ -28,16 +28,15 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IndexArray) -> Places:
     # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
     # an even lattice share a place too.
     close = _close(x, y, repeat)
-    columns = _clusters(x, close)
-    rows = _clusters(y, close)
+    columns, step_x = _clusters(x, close)
+    rows, step_y = _clusters(y, close)
     # Along a line the neighbours of a place are those in order.
     index = rows if np.ptp(y) else columns
     if np.ptp(x) and np.ptp(y):
         index = _linked(x, y, close, int(np.ptp(repeat)) + 1)
-    steps = _typical_step(x, columns), _typical_step(y, rows)
     count = int(index.max()) + 1
-    if 0.0 in steps or _nodes(columns, rows) <= _MOST_NODES * count:
-        return Places(index, rows, steps)
+    if 0.0 in (step_x, step_y) or _nodes(columns, rows) <= _MOST_NODES * count:
+        return Places(index, rows, (step_x, step_y))
     lattice = even_lattice(x, y, count)
     if lattice is not None:
         along_x, along_y = lattice
@@ -125,18 +124,14 @@ def _linked(x: FloatArray, y: FloatArray, close: float, passes: int) -> IndexArr
     return np.asarray(connected_components(links, directed=False)[1][index], dtype=np.intp)
 
 
-def _clusters(values: FloatArray, gap: float) -> IndexArray:
-    """Number groups of values, in order, that no gap wider than ``gap`` parts."""
+def _clusters(values: FloatArray, gap: float) -> tuple[IndexArray, float]:
+    """Number groups of values, in order, that no gap wider than ``gap`` parts; and their step."""
     order = np.argsort(values, kind="stable")
     index = np.empty(values.size, dtype=np.intp)
     index[order] = np.concatenate([[0], np.cumsum(np.diff(values[order]) > gap)])
-    return index
+    means = np.bincount(index, values) / np.bincount(index)
+    return index, float(np.median(np.diff(means))) if means.size > 1 else 0.0
 
 
 def _nodes(columns: IndexArray, rows: IndexArray) -> int:
     return (int(columns.max()) + 1) * (int(rows.max()) + 1)
-
-
-def _typical_step(values: FloatArray, cluster: IndexArray) -> float:
-    means = np.bincount(cluster, values) / np.bincount(cluster)
-    return float(np.median(np.diff(means))) if means.size > 1 else 0.0
