@@ -7,7 +7,7 @@ from scipy.special import chdtrc
 
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.calibration.stages import Misfit, Solution
+from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import DivisionMap, Results, route_difference
 from memscal.estimation import assumptions
 from memscal.estimation import residuals as unexplained
@@ -56,8 +56,7 @@ def quality_checks(
     checks = [
         *_reconvolutions(solution),
         _constraint(solution),
-        _route_agreement(solution, division),
-        _width_agreement(solution, results),
+        *_agreement(solution, results, division),
         *_shape(solution, results.parameters),
         *_set_up(solution),
         _indentation(solution, results),
@@ -68,9 +67,7 @@ def quality_checks(
         *_unexplained(estimate),
         _bayes_factor(estimate),
         _symmetry(estimate),
-        _linearity(estimate),
-        _hysteresis(solution),
-        _repeat_centres(solution),
+        *_steadiness(solution),
         *_held_out(solution),
         _saturation(estimate),
     ]
@@ -97,17 +94,13 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     p_value = None
     if solution.estimate.points.u_errors is not None:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
+    # Both are of the same points.
+    limit = chi_square_limit(fitted.degrees) / fitted.degrees
+    chi2 = solution.deconvolution.misfit.chi2_reduced
     return [
-        _chi_square("reconvolution", solution.deconvolution.misfit, division),
-        _chi_square("gaussian_misfit", fitted, gaussian, p_value),
+        check("reconvolution", chi2, limit, division),
+        check("gaussian_misfit", fitted.chi2_reduced, limit, gaussian, p_value),
     ]
-
-
-def _chi_square(
-    name: str, misfit: Misfit, meaning: str, p_value: float | None = None
-) -> QualityCheck:
-    limit = chi_square_limit(misfit.degrees) / misfit.degrees
-    return check(name, misfit.chi2_reduced, limit, meaning, p_value)
 
 
 def _constraint(solution: Solution) -> QualityCheck | None:
@@ -130,20 +123,20 @@ def _constraint(solution: Solution) -> QualityCheck | None:
     return check("constraint", max(rise, 0.0), chi_square_limit(max(determined, 1)), meaning)
 
 
-def _route_agreement(solution: Solution, division: DivisionMap | None) -> QualityCheck | None:
+def _agreement(
+    solution: Solution, results: Results, division: DivisionMap | None
+) -> list[QualityCheck]:
+    """Compare the results of both routes, and the width of G with the one fitted to the scan."""
+    checks = []
     difference = route_difference(solution, division)
-    if difference is None:
-        return None
-    meaning = (
-        "Difference of the division of the fields from the Bayesian estimate, in A or in G(r), "
-        "beyond what the window hides, over what noise explains. A failure means that the "
-        "scan shows a feature that the one follows and the other does not, or that the method "
-        "failed: look at the residuals and at both G(r)."
-    )
-    return check("method_agreement", difference, _ROUTES_LIMIT, meaning)
-
-
-def _width_agreement(solution: Solution, results: Results) -> QualityCheck:
+    if difference is not None:
+        meaning = (
+            "Difference of the division of the fields from the Bayesian estimate, in A or in G(r), "
+            "beyond what the window hides, over what noise explains. A failure means that the "
+            "scan shows a feature that the one follows and the other does not, or that the method "
+            "failed: look at the residuals and at both G(r)."
+        )
+        checks.append(check("method_agreement", difference, _ROUTES_LIMIT, meaning))
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
     meaning = (
         f"Difference of the width of G {route} from the one fitted to the scan, in its standard "
@@ -159,7 +152,8 @@ def _width_agreement(solution: Solution, results: Results) -> QualityCheck:
     variance = covariance[i, i] + covariance[j, j] - 2 * covariance[i, j] - misfit**2
     # Differences below a fifth of a percent are negligible, however small their noise.
     allowed = np.hypot(np.sqrt(max(variance, 0.0)), 0.002 * fitted)
-    return check("width_agreement", abs(deconvolved - fitted) / allowed, 3.0, meaning)
+    checks.append(check("width_agreement", abs(deconvolved - fitted) / allowed, 3.0, meaning))
+    return checks
 
 
 def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
@@ -372,39 +366,47 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     return _added("symmetry", extra, meaning)
 
 
-def _linearity(estimate: ProfileEstimate) -> QualityCheck | None:
-    linear = assumptions.linearity_test(estimate)
-    if linear is None:
-        return None
-    meaning = (
-        "Fall of chi-square by a conversion constant that changes with the load, here by "
-        f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output is "
-        "not linear in the load, and that one A does not serve all loads."
-    )
-    return _added("load_linearity", linear, meaning)
-
-
-def _hysteresis(solution: Solution) -> QualityCheck | None:
+def _steadiness(solution: Solution) -> list[QualityCheck]:
+    """Test whether A, centre and baseline are the same at all loads, branches and repeats."""
     estimate = solution.estimate
+    checks = []
+    linear = assumptions.linearity_test(estimate)
+    if linear is not None:
+        meaning = (
+            "Fall of chi-square by a conversion constant that changes with the load, here by "
+            f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output "
+            "is not linear in the load, and that one A does not serve all loads."
+        )
+        checks.append(_added("load_linearity", linear, meaning))
     owner = np.array(solution.owners)[estimate.points.scan]
-    extra = assumptions.hysteresis_test(estimate, owner)
-    if extra is None:
-        return None
-    reading = estimate.points.reading
-    units = [("A", 1e-2, "%"), ("the centre's position", 1e-6, "um")]
-    units.append(("the baseline", reading.scale, reading.unit))
-    differences = []
-    for i, (name, scale, unit) in enumerate(units[: extra.count]):
-        change = extra.coefficients[i] / scale
-        differences.append(f"of {name} by {format_measured(change, extra.errors[i] / scale, unit)}")
-    meaning = (
-        "Fall of chi-square by differences between approach and retreat (approach minus retreat): "
-        f"{', '.join(differences)}. A failure means that A and G are means over two different "
-        "scans: the film relaxes or adheres, the stage has play, or the amplifier drifts. Wait "
-        "longer before each reading, move to each position from the same side, or calibrate with "
-        "one branch alone."
-    )
-    return _added("hysteresis", extra, meaning)
+    branches = assumptions.hysteresis_test(estimate, owner)
+    if branches is not None:
+        reading = estimate.points.reading
+        units = [("A", 1e-2, "%"), ("the centre's position", 1e-6, "um")]
+        units.append(("the baseline", reading.scale, reading.unit))
+        differences = []
+        for i, (name, scale, unit) in enumerate(units[: branches.count]):
+            change = branches.coefficients[i] / scale
+            words = format_measured(change, branches.errors[i] / scale, unit)
+            differences.append(f"of {name} by {words}")
+        meaning = (
+            "Fall of chi-square by differences between approach and retreat (approach minus "
+            f"retreat): {', '.join(differences)}. A failure means that A and G are means over two "
+            "different scans: the film relaxes or adheres, the stage has play, or the amplifier "
+            "drifts. Wait longer before each reading, move to each position from the same side, "
+            "or calibrate with one branch alone."
+        )
+        checks.append(_added("hysteresis", branches, meaning))
+    apart = solution.apart
+    if apart is not None and not solution.per_repeat:
+        meaning = (
+            "Fall of the squared residuals by a centre for each repeat, over the scatter that is "
+            f"left: an F ratio. The centres are up to {apart.distance * 1e6:.3g} um apart. A "
+            "failure means that stage or sensor moved from repeat to repeat, and that the one "
+            "centre widens G: take a centre per repeat (--centre per-repeat)."
+        )
+        checks.append(_tested("repeat_centres", apart, meaning))
+    return checks
 
 
 def _added(name: str, extra: assumptions.ExtraColumns, meaning: str) -> QualityCheck:
@@ -412,40 +414,25 @@ def _added(name: str, extra: assumptions.ExtraColumns, meaning: str) -> QualityC
     return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
 
 
-def _repeat_centres(solution: Solution) -> QualityCheck | None:
-    apart = solution.apart
-    if apart is None or solution.per_repeat:
-        return None
-    meaning = (
-        "Fall of the squared residuals by a centre for each repeat, over the scatter that is left: "
-        f"an F ratio. The centres are up to {apart.distance * 1e6:.3g} um apart. A failure means "
-        "that stage or sensor moved from repeat to repeat, and that the one centre widens G: "
-        "take a centre per repeat (--centre per-repeat)."
-    )
-    return _tested("repeat_centres", apart, meaning)
-
-
 def _held_out(solution: Solution) -> list[QualityCheck | None]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
     estimate = solution.estimate
-    repeat = estimate.points.repeat
-    load = assumptions.load_groups(estimate.points.load)
-    scan = np.array(solution.owners)[estimate.points.scan]
+    groups = {
+        "scan": np.array(solution.owners)[estimate.points.scan],
+        "load": assumptions.load_groups(estimate.points.load),
+        "repeat": estimate.points.repeat,
+    }
     checks = []
-    # Where every repeat has a load, or a scan, of its own, it is held out under that name.
-    if not _same(repeat, load) and not _same(repeat, scan):
-        checks.append(_prediction(estimate, "repeat", repeat))
-    if not _same(load, scan):
-        checks.append(_prediction(estimate, "load", load))
-    if np.ptp(scan):
-        checks.append(_prediction(estimate, "scan", scan))
-    return checks
-
-
-def _same(first: IndexArray, second: IndexArray) -> bool:
-    """Whether two groupings of the points are the same but for the groups' names."""
-    pairs = np.unique(np.stack([first, second]), axis=1).shape[1]
-    return bool(pairs == np.unique(first).size == np.unique(second).size)
+    held_out = set()
+    for what, group in groups.items():
+        # Where every repeat has a load, or a scan, of its own, it is held out under that name.
+        # Groupings are equal if the first point of each point's group is the same.
+        _, first, index = np.unique(group, return_index=True, return_inverse=True)
+        grouping = first[index].tobytes()
+        if first.size > 1 and grouping not in held_out:
+            checks.append(_prediction(estimate, what, group))
+        held_out.add(grouping)
+    return checks[::-1]
 
 
 def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> QualityCheck | None:
