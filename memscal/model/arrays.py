@@ -92,19 +92,15 @@ def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
     return array
 
 
-def freeze_arrays(owner: object, *names: str) -> None:
-    """Replace arrays of a frozen dataclass by read-only copies."""
-    for name in names:
-        object.__setattr__(owner, name, frozen_array(getattr(owner, name)))
-
-
 @dataclass(frozen=True, eq=False)
 class FrozenArrays:
     """Base of a frozen dataclass whose arrays are read-only copies of what it was made of."""
 
     def __post_init__(self) -> None:
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        freeze_arrays(self, *(n for n, v in values.items() if isinstance(v, np.ndarray | list)))
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray | list):
+                object.__setattr__(self, item.name, frozen_array(value))
 
 
 def finite_vector(name: str, values: ArrayLike) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, freeze_arrays, frozen_array
+from memscal.model.arrays import FloatArray, frozen_array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -51,12 +51,12 @@ class FieldMesh:
     notes: str = ""
 
     def __post_init__(self) -> None:
-        freeze_arrays(self, "points", "displacement", "stress")
         triangles = frozen_array(self.triangles, dtype=np.int64)
         object.__setattr__(self, "triangles", triangles)
-        count = self.points.shape[0]
+        count = len(self.points)
         for name, columns in (("points", 2), ("displacement", 2), ("stress", 4)):
-            values = getattr(self, name)
+            values = frozen_array(getattr(self, name))
+            object.__setattr__(self, name, values)
             if values.shape != (count, columns):
                 raise InputError(
                     f"{name} of the field mesh has shape {values.shape}, but {(count, columns)} "

@@ -49,13 +49,15 @@ def mistaken_unit(factor: float) -> str:
 
 _SHORT = "So short a scan shows neither the flanks of the stress nor the baseline."
 _WIDE = "The stress at the base of a film is little wider than the film is thick: "
+_LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
 
 
 def require_span(scan: Scan) -> None:
     """Refuse positions over which no film is scanned, before anything is built on them."""
-    lengths = _lengths(scan)
-    _refuse_short_span(scan, lengths)
-    _refuse_long_span(scan, lengths)
+    h = (scan.film or scan.set_up.film).thickness
+    lengths = _lengths(scan, h)
+    if lengths["span"] > _LONGEST_SPAN * h:
+        raise _implausible(scan, h, lengths, "The positions span", lengths["span"], _LONG)
 
 
 def require_recorded(load: float, recorded: FloatArray) -> None:
@@ -78,61 +80,47 @@ def require_plausible(scan: Scan) -> None:
     """Refuse a rod scan whose lengths no film, rod and sensor can have, and name the unit."""
     if scan.load is not None and scan.normal_load is not None:
         require_recorded(scan.load, scan.normal_load)
-    lengths = _lengths(scan)
-    _refuse_short_span(scan, lengths)
+    h = (scan.film or scan.set_up.film).thickness
+    lengths = _lengths(scan, h)
     span = lengths["span"]
     rod_width = 2 * lengths.get("radius", 0.0)
     if rod_width > span:
         words = f"The positions span {span * 1e3:.4g} mm; the rod's width is"
-        raise _implausible(scan, lengths, words, rod_width, _SHORT)
+        raise _implausible(scan, h, lengths, words, rod_width, _SHORT)
 
     x, y = (positions.ravel() for positions in scan.positions)
     steps = places_of(x, y, scan.passes.ravel()).steps
     lengths["step"] = min((step for step in steps if step > 0), default=0.0)
     lengths["width"] = _voltage_width(x, y, scan.u_zz.ravel())
-    h = _thickness(scan)
     if lengths["step"] > _LONGEST_STEP * h:
         why = f"{_WIDE}the scan misses it."
-        raise _implausible(scan, lengths, "The positions' step is", lengths["step"], why)
-    _refuse_long_span(scan, lengths)
+        raise _implausible(scan, h, lengths, "The positions' step is", lengths["step"], why)
+    if span > _LONGEST_SPAN * h:
+        raise _implausible(scan, h, lengths, "The positions span", span, _LONG)
     if rod_width > h:
         why = "Under such a rod the stress depends on friction."
-        raise _implausible(scan, lengths, "The rod's width is", rod_width, why)
+        raise _implausible(scan, h, lengths, "The rod's width is", rod_width, why)
     if lengths["width"] > _WIDEST_VOLTAGE * h:
         words = "The voltage's width at half height is"
         why = f"{_WIDE}no sensor is so much wider."
-        raise _implausible(scan, lengths, words, lengths["width"], why)
+        raise _implausible(scan, h, lengths, words, lengths["width"], why)
 
 
-def _thickness(scan: Scan) -> float:
-    """Return the film's thickness in m; a scan that states no film is refused."""
-    return (scan.film or scan.set_up.film).thickness
-
-
-def _lengths(scan: Scan) -> dict[str, float]:
-    """Return the span of a scan and the radius of a rod, in m."""
-    lengths = {"span": max(float(np.ptp(axis)) for axis in (scan.x, scan.y) if axis is not None)}
+def _lengths(scan: Scan, h: float) -> dict[str, float]:
+    """Return the span of a scan and the radius of a rod, in m; too short a span is refused."""
+    span = max(float(np.ptp(axis)) for axis in (scan.x, scan.y) if axis is not None)
+    lengths = {"span": span}
     if isinstance(scan.indenter, Rod):
         lengths["radius"] = scan.indenter.radius
+    if span < _SHORTEST_SPAN * h:
+        raise _implausible(scan, h, lengths, "The positions span", span, _SHORT)
     return lengths
 
 
-def _refuse_short_span(scan: Scan, lengths: dict[str, float]) -> None:
-    if lengths["span"] < _SHORTEST_SPAN * _thickness(scan):
-        raise _implausible(scan, lengths, "The positions span", lengths["span"], _SHORT)
-
-
-def _refuse_long_span(scan: Scan, lengths: dict[str, float]) -> None:
-    if lengths["span"] > _LONGEST_SPAN * _thickness(scan):
-        why = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
-        raise _implausible(scan, lengths, "The positions span", lengths["span"], why)
-
-
 def _implausible(
-    scan: Scan, lengths: dict[str, float], words: str, length: float, why: str
+    scan: Scan, h: float, lengths: dict[str, float], words: str, length: float, why: str
 ) -> InputError:
     """Return the error of a length in m that no set-up has, with the units to check."""
-    h = _thickness(scan)
     place = f"{scan.source.file_name}: " if scan.source else ""
     times = f"{length / h:.3g} times the film's thickness of {h * 1e3:.4g} mm"
     problem = f"{place}{words} {length * 1e3:.4g} mm, {times}."
