@@ -23,6 +23,7 @@ from memscal.figures.style import house_style
 
 STATES = ("dry", "lubricated")
 OF_A_COMPARISON = ["", *figure_stems(STATES, interface=True)]
+AS_FOR_DRY = {"comparison profiles-lubricated", "comparison friction-set-lubricated"}
 WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 
 
@@ -49,7 +50,6 @@ def fleet() -> FleetResults:
 
 
 FIGURES: dict[str, Callable[..., Figure]] = {
-    "line": lambda make: calibration_figure(make("line")),
     "failed": lambda make: calibration_figure(make(failed=1, meaning="They are 31 um apart.")),
     "raster": lambda make: calibration_figure(make("radii", 25)),
     "loads": lambda make: calibration_figure(make(loads=(0.5, 1.0, 2.0), points=33)),
@@ -72,7 +72,13 @@ def contacts() -> list[memscal.Contact]:
     return memscal.indent(FILM, SPHERE, load=[0.34, 2.75], friction=0.2)
 
 
-@pytest.fixture(name="figure", scope="module", params=FIGURES)
+NAMES = [
+    pytest.param(name, marks=pytest.mark.full_study) if name in AS_FOR_DRY else name
+    for name in FIGURES
+]
+
+
+@pytest.fixture(name="figure", scope="module", params=NAMES)
 def figure_fixture(request, make_apparatus) -> Iterator[Figure]:
     figure = FIGURES[request.param](make_apparatus)
     figure.set_label(request.param)

@@ -7,11 +7,17 @@ import sys
 import pytest
 
 from memscal.errors import InputError
-from memscal.figures.style import figure_format, render_figure
+from memscal.figures.style import figure_format, panels_of, render_figure
 
 
-def test_a_png_has_its_signature_and_at_least_150_dots_per_inch(drawn):
-    figure = drawn()
+@pytest.fixture(scope="module")
+def figure():
+    with panels_of(3.0) as (figure, panels):
+        panels.flat[0].plot([1, 2, 3], [1, 4, 9], label="squares")
+    return figure
+
+
+def test_a_png_has_its_signature_and_at_least_150_dots_per_inch(figure):
     data = render_figure(figure, figure_format(".PNG"))
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     width, height = struct.unpack(">II", data[16:24])
@@ -27,8 +33,8 @@ def test_a_png_has_its_signature_and_at_least_150_dots_per_inch(drawn):
         ("pdf", b"%PDF-", b"%%EOF\n"),
     ],
 )
-def test_a_file_begins_and_ends_as_its_kind_and_holds_no_date(drawn, file_format, start, end):
-    data = render_figure(drawn(), file_format)
+def test_a_file_begins_and_ends_as_its_kind_and_holds_no_date(figure, file_format, start, end):
+    data = render_figure(figure, file_format)
     assert data.startswith(start)
     assert data.endswith(end)
     assert b"CreationDate" not in data
