@@ -155,9 +155,15 @@ def scan(good_scan: Path, folder: Path) -> Path:
     return Path(shutil.copy(good_scan, folder / "scan.h5"))
 
 
-@pytest.fixture
-def artifact(folder: Path) -> Path:
-    """A sensor whose G and A are known, in the folder."""
-    path = folder / "sensor.apparatus.h5"
+@pytest.fixture(scope="session")
+def known_artifact(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sensor whose G and A are known."""
+    path = tmp_path_factory.mktemp("known") / "sensor.apparatus.h5"
     known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(path)
     return path
+
+
+@pytest.fixture
+def artifact(known_artifact: Path, folder: Path) -> Path:
+    """A copy of the known sensor in the folder."""
+    return Path(shutil.copy(known_artifact, folder))

@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 from helpers.console import Run, names
 from helpers.scans import pressed, sphere_scan
+from matplotlib.figure import Figure
 
 import memscal
 
 OLD = b"an artifact from last week"
 CALIBRATE = "memscal.calibration.calibrate.calibrate"
+PLOT = "memscal.model.result.Result.plot"
 Patch = pytest.MonkeyPatch
 
 
@@ -24,6 +26,12 @@ def raising(error: BaseException) -> Callable[..., None]:
         raise error
 
     return call
+
+
+@pytest.fixture(autouse=True)
+def _plain_figures(monkeypatch: Patch) -> None:
+    """Draw nothing: what is drawn is no matter here."""
+    monkeypatch.setattr(PLOT, lambda *_, **__: Figure(figsize=(1, 1)))
 
 
 @pytest.fixture
@@ -79,8 +87,7 @@ def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, 
 
 
 def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, monkeypatch: Patch):
-    figure = "memscal.figures.calibration.calibration_figure"
-    monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))
+    monkeypatch.setattr(PLOT, raising(ZeroDivisionError("division by zero")))
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
 

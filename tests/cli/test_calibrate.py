@@ -71,7 +71,8 @@ def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path):
     assert configuration["options"]["amplitude"] == 0.5
 
 
-def test_the_seed_of_a_draw_is_recorded(run: Run, scan: Path):
+def test_the_seed_of_a_draw_is_recorded(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
     run("calibrate", scan, "--method", "white-noise-draw", "--seed", 6, "-o", "c.h5")
     assert memscal.load_apparatus("c.h5").process.configuration["seed"] == 6
 

@@ -36,8 +36,9 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def compare(run: Run, bench: Path, folder: Path) -> Run:
+def compare(run: Run, bench: Path, folder: Path, monkeypatch: Patch) -> Run:
     """Compare the bench's scans in an empty folder, with a cache that the tests share."""
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
 
     def compare_(*arguments: object, scans: tuple[str, ...] = ("dry.h5",)) -> Any:
         files = [bench / "sensor.apparatus.h5", *(bench / name for name in scans)]

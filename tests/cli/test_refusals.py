@@ -114,7 +114,7 @@ INVALID = {
     "reference sphere --backend fem --film-radius 1 -o out.h5": "the film's edge at 1 mm",
     "reference sphere --strain finite --friction 0.3 -o out.h5": "slides freely (friction 0) or",
     "restore scan.h5 scan.h5": "memscal-artifact",
-    "simulate --experiment sphere --load 1e7": "film",
+    "simulate --experiment sphere --load 1e6": "film",
     "simulate --sigma 700 --weight 0.5": "",
 }
 

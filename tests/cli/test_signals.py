@@ -11,6 +11,7 @@ import pytest
 from helpers.console import names
 
 OLD = b"from last week"
+OUTPUTS = ["rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5"]
 #: Tells when the program stands with all its outputs beside their targets.
 STOPPED = """
 import os, signal, sys, time
@@ -24,20 +25,14 @@ sys.exit(run())
 ENDING = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 
 
+EXPERIMENT = ("simulate", "--experiment", "sphere", "--contacts", "2", "--load", "1", "--force")
+
+
 def started(folder: Path, *, ignoring: bool = False) -> subprocess.Popen[str]:
-    """Begin a calibration over old outputs, and stop it just before it renames them."""
-    for name in ("scan.apparatus.h5", "a.svg"):
+    """Begin to simulate over old outputs, and stop just before they are renamed."""
+    for name in OUTPUTS:
         (folder / name).write_bytes(OLD)
-    command = [
-        sys.executable,
-        "-c",
-        STOPPED,
-        "calibrate",
-        "scan.h5",
-        "--figure",
-        "a.svg",
-        "--force",
-    ]
+    command = [sys.executable, "-c", STOPPED, *EXPERIMENT, "-o", "."]
     process = subprocess.Popen(
         ["nohup", *command] if ignoring else command,
         cwd=folder,
@@ -49,29 +44,33 @@ def started(folder: Path, *, ignoring: bool = False) -> subprocess.Popen[str]:
     for line in process.stdout:
         if line == "now\n":
             break
+    assert len(names(folder)) > 3
     return process
 
 
-@pytest.mark.parametrize(("number", "code"), ENDING[:2])
-def test_a_signal_cleans_up_and_has_its_exit_code(scan: Path, folder: Path, number: int, code: int):
-    with started(folder) as process:
-        assert len(names(folder)) > 3
-        process.send_signal(number)
-        shown = process.communicate(timeout=60)[1]
+def ends(process: subprocess.Popen[str], folder: Path, code: int) -> None:
+    """Assert that a program that was signalled says so and leaves what was there."""
+    shown = process.communicate(timeout=60)[1]
     assert process.returncode == code
     assert "Interrupted. Nothing was left half-written." in shown
     assert "Traceback" not in shown
-    assert names(folder) == ["a.svg", "scan.apparatus.h5", "scan.h5"]
-    assert (folder / "scan.apparatus.h5").read_bytes() == OLD
+    assert names(folder) == OUTPUTS
+    assert {(folder / name).read_bytes() for name in OUTPUTS} == {OLD}
 
 
-def test_a_signal_that_is_ignored_stays_ignored(scan: Path, folder: Path):
+def test_a_signal_cleans_up_and_has_its_exit_code(folder: Path):
+    with started(folder) as process:
+        process.send_signal(signal.SIGINT)
+        ends(process, folder, 130)
+
+
+def test_a_signal_that_is_ignored_stays_ignored(folder: Path):
     with started(folder, ignoring=True) as process:
         process.send_signal(signal.SIGHUP)
         time.sleep(0.2)
         assert process.poll() is None
         process.send_signal(signal.SIGTERM)
-    assert process.returncode == 143
+        ends(process, folder, 143)
 
 
 @pytest.mark.parametrize(("number", "code"), ENDING)

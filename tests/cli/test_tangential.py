@@ -38,7 +38,10 @@ def test_a_method_that_divides_fields_is_refused_by_a_dry_run(run: Run, sheared:
     assert names(sheared.parent) == ["scan.h5"]
 
 
-def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run, folder: Path):
+def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
     made = simulate_experiment(
         friction=0.1,
         loads=[1.37],
@@ -55,7 +58,7 @@ def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(run: Run
     shear = ("compare", "xz.apparatus.h5", "dry.stress.h5", "--channel", "xz", *ways)
     normal = ("compare", "zz.apparatus.h5", "dry.stress.h5", *ways)
     alone = memscal.compare(
-        measured, "xz.apparatus.h5", friction=(0.0, 0.1, np.inf), loading="total"
+        measured, "xz.apparatus.h5", friction=(0.0, 0.1, np.inf), loading="total", cache="kept"
     )
     joint = run(*shear, "--json").exits(0).json["joint"][0]
     assert joint["interval"]["low"] == pytest.approx(alone.joint["dry"]["total"].interval.low)
