@@ -134,6 +134,7 @@ class RasterFields:
     """A measured raster on its own lattice, continued by the fitted profile around it."""
 
     grid: Lattice
+    central: Lattice  # about the zero of a kernel
     voltage: Field
     stress: Field
     support: float  # half its width, in m
@@ -173,7 +174,8 @@ class RasterFields:
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
         reference = estimate.model.reference
-        central = _about_zero(grid)
+        # The lattice of a kernel has its zero at the central point, wherever the sensor is.
+        central = Lattice(grid.x - grid.x[x.size // 2], grid.y - grid.y[y.size // 2])
         round_ = on_grid(reference.at, grid, step)
         # The lattice does not sample the edge of a source.
         stress = grid.sampled(reference.plane) if reference.source else round_
@@ -192,6 +194,7 @@ class RasterFields:
             voltage += total / np.maximum(number, 1.0)
         return cls(
             grid,
+            central,
             Field(grid, voltage),
             Field(grid, stress),
             choice.support,
@@ -201,11 +204,6 @@ class RasterFields:
             (rows, columns),
             even,
         )
-
-    @property
-    def central(self) -> Lattice:
-        """The lattice about the zero of a kernel."""
-        return _about_zero(self.grid)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero, with what of the sensor is not round."""
@@ -269,12 +267,6 @@ def _lifted(grid: EvenGrid, k: bytes, weights: bytes, values: bytes) -> Field:
     nodes = Wavenumbers(np.frombuffer(k), np.frombuffer(weights))
     spectrum = RadialSpectrum(nodes, np.frombuffer(values))
     return Field(grid, on_grid(spectrum.at, grid, grid.spacing / 2))
-
-
-def _about_zero(grid: Lattice) -> Lattice:
-    """The lattice of a kernel, whose zero is the central point, wherever the sensor is."""
-    x, y = grid.axes
-    return Lattice(x - x[x.size // 2], y - y[y.size // 2])
 
 
 Fields: TypeAlias = LineFields | RasterFields

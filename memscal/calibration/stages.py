@@ -119,41 +119,34 @@ def deconvolve(
 ) -> Deconvolution:
     """Find A and G by a method: divide the fields, or take the posterior's; convolve back."""
     require_channel_method(estimate.points.channel, method)
+    stress = fields.stress
+    posterior = None
+    # Eq. 2: A G, by a division or of the posterior, as constrained.
     if isinstance(method, Bayesian):
-        return _of_posterior(estimate, fields, method)
-    # Eq. 2: A G.
-    weakest = (band.weakest_reference, band.weakest_voltage)
-    quotient = fourier_ratio.divide(fields.voltage, fields.stress, weakest=weakest, method=method)
+        constraints = {"nonnegative": method.nonnegative, "monotone": method.monotone}
+        posterior = constrained_profile(estimate, **constraints)
+        window = np.ones_like(stress.transform.real)
+        quotient = Quotient(fields.grid, fields.kernel(posterior.radial), window)
+    else:
+        weakest = (band.weakest_reference, band.weakest_voltage)
+        quotient = fourier_ratio.divide(fields.voltage, stress, weakest=weakest, method=method)
     quotient = replace(quotient, values=quotient.values * fields.confinement)
     # Eq. 3: A, and G of unit integral.
-    a, g = fourier_ratio.normalise(fields.on_support(quotient.values, None))
+    a, g = fourier_ratio.normalise(fields.on_support(quotient.values, posterior))
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict, of each scan through its own reference.
     model = estimate.model
-    if estimate.points.scans == 1 and model.reference.order != ACROSS:
+    if posterior is not None:
+        signal = model.signal(model.geometry(estimate.centres), posterior.kernel) + estimate.oval
+    elif estimate.points.scans == 1 and model.reference.order != ACROSS:
         signal = fields.convolved(quotient) * estimate.points.load
     else:
         k, kernel = fields.grid.axis_transfer(quotient.values)
         spectrum = np.interp(model.k, k, kernel.real, right=0.0)
         signal = model.signal(estimate.gaussian.geometry, spectrum) + estimate.oval
     predicted = signal + estimate.background
-    return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
-
-
-def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -> Deconvolution:
-    """Take A G of the posterior, as constrained, on the grid of the fields."""
-    profile = constrained_profile(
-        estimate, nonnegative=method.nonnegative, monotone=method.monotone
-    )
-    values = fields.kernel(profile.radial) * fields.confinement
-    quotient = Quotient(fields.grid, values, np.ones_like(fields.stress.transform.real))
-    a, g = fourier_ratio.normalise(fields.on_support(values, profile))
-    sigma = fit_gaussian(g, estimate.gaussian.sigma)
-    model = estimate.model
-    signal = model.signal(model.geometry(estimate.centres), profile.kernel)
-    predicted = signal + estimate.oval + estimate.background
     misfit = _misfit(estimate, predicted)
-    return Deconvolution(quotient, a, g, sigma, predicted, misfit, divided=False)
+    return Deconvolution(quotient, a, g, sigma, predicted, misfit, divided=posterior is None)
 
 
 def require_channel_method(channel: str, method: Method) -> None:
