@@ -526,7 +526,7 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     direct = division.direct[: 1 + rings.size]
     moved = division.kept[: 1 + rings.size, 1:].copy()
     moved[:, division.places] += direct @ division.nuisance
-    noise = estimate.scattered(direct - moved @ estimate.weighed.gain)
+    noise = estimate.scattered(direct + -moved @ estimate.weighed.gain)
     difference = direct @ (estimate.points.u - estimate.predicted)
     variance = np.sum(np.hstack([noise, moved @ estimate.fixed_root]) ** 2, axis=1)
     in_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))

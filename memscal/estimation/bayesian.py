@@ -106,9 +106,9 @@ def _times(matrices: FloatArray, vectors: FloatArray, *, transposed: bool = Fals
     return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
-def _abreast(matrices: FloatArray) -> FloatArray:
-    """Columns of matrices (h, n, m) next to each other, (n, h m)."""
-    return np.moveaxis(matrices, 0, 1).reshape(matrices.shape[1], -1)
+def _abreast(parts: list[FloatArray]) -> FloatArray:
+    """Columns of all matrices of the parts, (h, n, m) each, next to each other: (n, sum of h m)."""
+    return np.hstack([np.moveaxis(part, 0, 1).reshape(part.shape[1], -1) for part in parts])
 
 
 class _Noise(NamedTuple):
@@ -193,12 +193,9 @@ class _Conditionals:
         some = shares > 0
         kept = sensor_shares > 0
         components = self.by_component[some] * (shares[:, None] * self.filter)[some, None, :]
-        parameters = [components, self.sensors.root[kept]]
         weighted = sensor_shares[kept, None, None] * self.sensors.q[kept]
-        data = [self.left[some], weighted]
-        by_parameters = np.hstack([_abreast(part) for part in parameters])
-        by_data = np.hstack([_abreast(part) for part in data])
-        return by_parameters @ by_data.T
+        by_parameters = _abreast([components, self.sensors.root[kept]])
+        return by_parameters @ _abreast([self.left[some], weighted]).T
 
     def covariance_root(self, shares: FloatArray) -> FloatArray:
         """Square root (p, c) of the sum of covariances by shares (h,)."""
@@ -216,7 +213,7 @@ class _Conditionals:
         if self.right.shape[1] < self.right.shape[2]:
             hidden = self.by_amplitude[some] - self.by_component[some] @ self.right[some]
             parts.append(hidden * ((shares * self.prior)[some] ** 0.5)[:, None, None])
-        return np.hstack([_abreast(part) for part in parts])
+        return _abreast(parts)
 
 
 def _likelihoods(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from memscal.estimation.points import ScanPoints
+from memscal.estimation.points import ScanPoints, grouped
 from memscal.model.arrays import FloatArray
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
@@ -49,8 +49,7 @@ def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
     # ``None`` where noise is stated, or where there are too few of either.
     if points.u_errors is not None or not points.planar:
         return None
-    groups = np.stack([points.scan, points.place_numbers("index"), points.load])
-    group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
+    group = grouped(points.scan, points.place_numbers("index"), points.load)
     readings = np.bincount(group)
     degrees = group.size - int(group.max()) - 1
     if degrees < _FEWEST_DIFFERENCES:

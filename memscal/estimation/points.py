@@ -325,6 +325,15 @@ def loads_differ(loads: Sequence[float]) -> bool:
     return max(loads) > (1 + _SAME_LOAD) * min(loads)
 
 
+def grouped(*keys: NDArray[Any]) -> IndexArray:
+    """Number of the group of each point, (n,), of equal keys (n,)."""
+    order = np.lexsort(keys)
+    new = np.any([np.diff(key[order], prepend=key[order[:1]]) != 0 for key in keys], axis=0)
+    group = np.empty_like(order)
+    group[order] = np.cumsum(new)
+    return group
+
+
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     """Join the points of several scans, of which all state their noise, or none."""
     if len(scans) == 1:

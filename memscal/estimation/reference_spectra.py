@@ -280,22 +280,16 @@ _SENSITIVITIES = {
 
 def _difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
-    k = reference.wavenumbers.k.tobytes()
-    return reference.values * _relative_difference(set_up, more, less, k, reference.order)
-
-
-@lru_cache(maxsize=256)
-def _relative_difference(
-    set_up: SetUp, more: SetUp, less: SetUp, nodes: bytes, order: int
-) -> FloatArray:
-    """Difference of two rods per newton over the scan's own, kept for scans of other voltages."""
     law = law_at_once(set_up)
+    k = reference.wavenumbers.k.tobytes()
     spectra = []
     for rod in (more, less, set_up):
-        spectrum = _base_spectrum(press_rod(*rod.under(law)), nodes, order)
+        spectrum = _base_spectrum(press_rod(*rod.under(law)), k, reference.order)
         spectra.append(spectrum * set_up.load / rod.load)
     upper, lower, own = spectra
-    return np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
+    # Zero where the scan's own ends.
+    share = np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
+    return reference.values * share
 
 
 def law_at_once(set_up: SetUp) -> str:

@@ -17,12 +17,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
+from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, evenly, orthonormalised, triangular
 from memscal.model.arrays import FloatArray, IndexArray
@@ -294,15 +293,6 @@ def _traces(pairs: list[FloatArray], basis: FloatArray) -> tuple[float, float, f
     squared += np.sum(first * first.T) - 2 * np.trace(second)
     cubed += 3 * np.sum(first * second) - 3 * np.trace(third) - np.trace(first @ first @ first)
     return float(-np.trace(first)), float(squared), float(cubed)
-
-
-def grouped(*keys: NDArray[Any]) -> IndexArray:
-    """Number of the group of each point, (n,), of equal keys (n,)."""
-    order = np.lexsort(keys)
-    new = np.any([np.diff(key[order], prepend=key[order[:1]]) != 0 for key in keys], axis=0)
-    group = np.empty_like(order)
-    group[order] = np.cumsum(new)
-    return group
 
 
 def orthonormal(design: FloatArray, size: FloatArray | None = None) -> FloatArray:

@@ -144,7 +144,14 @@ def _fitted(
         # A source ends: what decays is G about it.
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
         reference = replace(reference, values=reference.values * blurred)
-    spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
+    radius = estimate.distance[rows]
+    reach = (1 + 2e-9) * rounded_reach(radius.max(), points.step)
+    nodes = reference.wavenumbers
+    arrays = (array.tobytes() for array in (nodes.k, nodes.weights, reference.values))
+    layout = _layout(reach, points.step, reference.order, reference.source, *arrays)
+    basis, intervals, *matrices = layout
+    interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
+    spline = _RadialSpline(basis(radius, 0), interval, *matrices)
     weight = np.ones_like(y)
     threshold = 2 * OUTLIER_THRESHOLD
     for rounds_left in range(_ROUNDS - 1, -1, -1):
@@ -182,17 +189,6 @@ class _RadialSpline:
     free: FloatArray  # (b, m): splines with the slope of the tail at R, by B-splines
     root: FloatArray  # (m, m): triangular root of the penalty
     transform: FloatArray  # (k, m): transforms of the splines
-
-    @classmethod
-    def through(cls, radius: FloatArray, reference: RadialSpectrum, step: float) -> _RadialSpline:
-        """Place the splines for points at radii (m), ``step`` apart."""
-        reach = (1 + 2e-9) * rounded_reach(radius.max(), step)
-        nodes = reference.wavenumbers
-        arrays = (array.tobytes() for array in (nodes.k, nodes.weights, reference.values))
-        layout = _layout(reach, step, reference.order, reference.source, *arrays)
-        basis, intervals, *matrices = layout
-        interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
-        return cls(basis(radius, 0), interval, *matrices)
 
     def fit(self, y: FloatArray, weight: FloatArray) -> _FittedSpline:
         """Fit values y (n,) with weights, smoothed by the restricted likelihood."""

@@ -45,17 +45,19 @@ class VoltageMap:
     @classmethod
     def stacked(cls, maps: Sequence[VoltageMap]) -> VoltageMap:
         """Put maps below each other; those of the same columns share them."""
-        columns = {id(right): right for each in maps for _, right in each.parts}
-        parts = []
-        for key, right in columns.items():
-            width = next(left.shape[1] for m in maps for left, r in m.parts if id(r) == key)
-            rows = [np.zeros((len(each), width)) for each in maps]
-            for block, each in zip(rows, maps, strict=True):
-                for left, other in each.parts:
-                    if id(other) == key:
-                        block += left
-            parts.append((np.vstack(rows), right))
-        return cls(tuple(parts))
+        stacked = cls(())
+        count = sum(len(each) for each in maps)
+        first = 0
+        for each in maps:
+            last = first + len(each)
+            parts = []
+            for left, right in each.parts:
+                rows = np.zeros((count, left.shape[1]))
+                rows[first:last] = left
+                parts.append((rows, right))
+            stacked += cls(tuple(parts))
+            first = last
+        return stacked
 
     def __len__(self) -> int:
         """How many numbers there are."""
@@ -87,10 +89,6 @@ class VoltageMap:
             known = merged.get(id(right))
             merged[id(right)] = (left if known is None else known[0] + left, right)
         return VoltageMap(tuple(merged.values()))
-
-    def __sub__(self, other: VoltageMap) -> VoltageMap:
-        """Subtract a map to the same numbers."""
-        return self + other * -1.0
 
     def dense(self) -> FloatArray:
         """All derivatives, (m, n)."""
