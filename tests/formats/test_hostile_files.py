@@ -30,7 +30,7 @@ path = pathlib.Path(sys.argv[1])
 good = path.read_bytes()
 heap = good.rfind(b"GCOL")
 read = refused = 0
-for i in range(8, len(good), 293):
+for i in [*range(8, len(good), 293), *range(heap, heap + 160)]:
     flipped = good[i] ^ (0xFF if i % 2 else 0x04)
     path.write_bytes(good[:i] + bytes([flipped]) + good[i + 1 :])
     try:
@@ -65,20 +65,6 @@ def edited(path: Path) -> Edit:
         return path
 
     return edit
-
-
-def run_sweep(path: Path, sweep: str) -> tuple[int, int]:
-    """Run a sweep over damaged copies; return how many were read and how many refused."""
-    done = subprocess.run(
-        [sys.executable, "-c", sweep, str(path)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    read, refused = map(int, done.stdout.split())
-    return read, refused
 
 
 def assert_refused_cheaply(path: Path, *words: str) -> None:
@@ -389,16 +375,6 @@ def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path: Path, f
         read_scan(path)
 
 
-def test_every_flipped_byte_of_a_heap_of_texts_is_met_without_hanging(path: Path):
-    """In a process of its own: HDF5 itself would walk through some of them for ever."""
-    with h5py.File(path, "r+") as file:
-        del file["/entry/title"], file["/entry/data/x"].attrs["units"]
-        file["/entry/title"] = "a title"
-        file["/entry/data/x"].attrs["units"] = "mm"
-    sweep = SWEEP.replace("range(8, len(good), 293)", "range(heap, heap + 160)")
-    assert sum(run_sweep(path, sweep)) == 160
-
-
 def test_a_text_dataset_longer_than_any_text_is_refused(path: Path):
     with h5py.File(path, "r+") as file:
         del file["/entry/title"]
@@ -448,10 +424,15 @@ def test_every_truncation_is_an_error_of_ours(path: Path):
 
 
 def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(path: Path):
-    """A process of its own: a crash of the HDF5 library would end the tests."""
-    read, refused = run_sweep(path, SWEEP)
-    assert read > 0
-    assert refused > 0
+    """And all over a heap of texts. HDF5 could crash, or walk through them for ever."""
+    with h5py.File(path, "r+") as file:
+        del file["/entry/title"], file["/entry/data/x"].attrs["units"]
+        file["/entry/title"] = "a title"
+        file["/entry/data/x"].attrs["units"] = "mm"
+    command = [sys.executable, "-c", SWEEP, str(path)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, timeout=300, check=True)
+    read, refused = map(int, done.stdout.split())
+    assert min(read, refused) > 0
 
 
 def test_the_plugin_path_is_off_before_the_hdf5_library_starts(tmp_path: Path):

@@ -179,7 +179,7 @@ def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path: Path, write, 
 finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else 0.0)
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     x=hnp.arrays(np.float64, st.integers(1, 700), elements=finite, unique=True),
     missing=st.floats(0, 1),

@@ -55,7 +55,7 @@ ROWS = st.one_of(
 )
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(
     table=st.lists(ROWS, max_size=30),
     delimiter=st.sampled_from(";,\t| "),
@@ -144,15 +144,15 @@ def test_places_along_a_line_are_those_along_the_same_line_in_the_plane(monkeypa
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        (";,\t|" * 900_000, "900,001 columns"),
+        (";,\t|" * 90_000, "90,001 columns"),
         ("# a comment", "holds no table"),
     ],
     ids=["endless lines", "comments"],
 )
 def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line, words):
-    """Of 20 MB of endless lines 419 MB were held: all of them were cut into cells at once."""
+    """Of 20 MB of endless lines 419 MB were held: all were cut into cells at once."""
     path = tmp_path / "t.csv"
-    path.write_text(f"{line}\n" * (20_000_000 // len(line)))
+    path.write_text(f"{line}\n" * (12_000_000 // len(line)))
     lines = TextTable._numbered
 
     def watched(table: TextTable, block: bytes) -> Any:

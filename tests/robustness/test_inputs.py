@@ -147,7 +147,7 @@ USED: dict[str, tuple[tuple[str, ...], ...]] = {
 }
 
 
-@drawn(20, 30_000)
+@drawn(8, 30_000)
 @given(kind=st.sampled_from(sorted(USED)), changes=BYTES)
 def test_damaged_bytes_are_read_or_refused(good, folder, kind, changes) -> None:
     survives(folder, change_bytes(good[kind], changes), *LOOKED_AT, *USED[kind])
@@ -180,19 +180,19 @@ CORPUS = (
 
 
 @pytest.mark.parametrize(("kind", "edit"), CORPUS)
-@pytest.mark.parametrize("digest", [True, False])
+@pytest.mark.parametrize("digest", [True, False] if SHARE else [True])
 def test_inputs_that_once_failed_are_read_or_refused(good, folder, kind, edit, digest) -> None:
     survives(folder, edit_hdf5(good[kind], [edit], digest=digest), *LOOKED_AT, *USED[kind])
 
 
-@drawn(25, 50_000)
+@drawn(8, 50_000)
 @given(kind=st.sampled_from(sorted(USED)), edits=EDITS, digest=st.booleans())
 def test_edited_values_are_read_or_refused(good, folder, kind, edits, digest) -> None:
     data = edit_hdf5(good[kind], edits, digest=digest)
     survives(folder, data, *LOOKED_AT, *USED[kind])
 
 
-@drawn(30, 19_000)
+@drawn(12, 19_000)
 @given(changes=st.one_of(TABLE, BYTES))
 def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
     change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
@@ -200,7 +200,7 @@ def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
     survives(folder, change(good["table"], changes), run, name="in.csv")
 
 
-@drawn(3, 1000)
+@drawn(1, 1000)
 @given(changes=st.one_of(BYTES, TABLE))
 def test_damaged_meshes_are_read_or_refused(good, folder, changes) -> None:
     # Each is read by a process of its own.
