@@ -181,7 +181,7 @@ finite = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-20 else
 
 @settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    x=hnp.arrays(np.float64, st.integers(1, 700), elements=finite, unique=True),
+    x=hnp.arrays(np.float64, st.integers(1, 99), elements=finite, unique=True),
     missing=st.floats(0, 1),
     title=st.text(max_size=50),
     notes=st.text(st.characters(categories=["L", "N", "P", "S"]), max_size=200),
