@@ -205,16 +205,6 @@ def test_a_sensor_of_any_name_is_drawn_as_plain_text(drawn):
     assert figure.texts[0].get_text().startswith("Apparatus function of ")
 
 
-def test_a_conversion_constant_below_zero_leaves_out_the_stress_axis(make_apparatus):
-    data = make_apparatus()
-    values = data.parameters.values.copy()
-    values[0] *= -1
-    data = replace(data, parameters=replace(data.parameters, values=values))
-    axes = panels(calibration_figure(data))["scan"]
-    assert not axes.child_axes
-    assert not [each for each in axes.lines if each.get_label().startswith("reference")]
-
-
 def test_the_settings_of_matplotlib_are_given_back():
     with mpl.rc_context({"font.size": 23.0, "axes.facecolor": "black"}):
         before = dict(mpl.rcParams)

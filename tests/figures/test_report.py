@@ -44,11 +44,6 @@ class Page(HTMLParser):
         if self.open and self.open[-1] != "style":
             self.words.append(data)
 
-    @property
-    def table(self):
-        """Cells of every row by the first of them."""
-        return {row[0]: row[1:] for row in self.rows if row}
-
     def find(self, tag):
         return [attributes for name, attributes in self.elements if name == tag]
 

@@ -132,9 +132,14 @@ class Runs:
 
 def asked(arguments: list[str]) -> tuple[str, ...]:
     """Return the arguments of a command that change what it finds."""
-    named = {i + 1 for i, argument in enumerate(arguments) if argument in NAMES_OF_FILES}
-    kept = [a for i, a in enumerate(arguments) if i not in named]
-    return tuple(a for a in kept if a not in NAMES_OF_FILES | {"--json"})
+    words = iter(arguments)
+    kept = []
+    for word in words:
+        if word in NAMES_OF_FILES:
+            next(words)
+        elif word != "--json":
+            kept.append(word)
+    return tuple(kept)
 
 
 def unpack(folder: Path) -> None:

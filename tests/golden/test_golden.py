@@ -3,45 +3,18 @@
 import difflib
 import re
 from collections.abc import Iterator
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from golden.make import COMMANDS, OUTPUTS, SIGNATURES, Runs, differences, load, signatures
 from golden.views import VIEW_COMMANDS, VIEWS, view
-from numpy.testing import assert_allclose
-
-import memscal
 
 TOLERANCE = 1e-6
 """Iterative solvers stop at other last digits with other processors and builds of BLAS."""
 
 SHARE = 1e-3
 """Of a standard uncertainty, and of statistics: what two processors differ by in a search."""
-
-FILES: dict[str, tuple[Any, dict[str, Any]]] = {
-    "line.scan.h5": (memscal.read_scan, {
-        "u_zz.shape": (33,), "load": 1.0, "direction": "x", "sensor.name": "a simulated sensor",
-        "film.poisson_ratio_uncertainty": 0.005, "indenter.shape": "rod",
-        "indenter.radius": 0.25e-3, "indenter.radius_uncertainty": 2.5e-6,
-    }),
-    "raster.scan.h5": (memscal.read_scan, {
-        "u_zz.shape": (9, 33), "y.size": 9, "title": "A scan", "film.roughness_rms": 1.82e-6,
-        "notes": "Two lines\nof notes, with an é.",
-    }),
-    "reference.h5": (memscal.read_reference, {
-        "load": 1.0, "depth": 0.587e-3, "contact_radius": 0.25e-3, "solver": "closed form",
-        "friction_coefficient": 0.0, "film.young_modulus": 2.2e6,
-    }),
-    "artifact.h5": (memscal.load_apparatus, {
-        "conversion_constant": 3e-8, "gaussian_sigma": 561e-6, "resolved_wavenumber": 3700.0,
-        "field.g.shape": (13, 17), "process.input_scan.file_name": "scan.h5",
-    }),
-    "stress.h5": (memscal.read_stress, {}),
-}  # fmt: skip
-"""Files that version 0.1 wrote, one of each schema 1.0.0: a later version must read them."""
 
 
 @pytest.fixture(scope="module")
@@ -112,24 +85,3 @@ def test_public_signatures_are_those_of_the_text_file():
         " the diff of tests/golden/signatures.txt: is each change in the changelog, and does old"
         " code still run?"
     )
-
-
-def test_files_of_version_0_1_say_what_they_said(runs: Runs):
-    """To the readers what the golden outputs ``inspect-old-...`` say of the files."""
-    records = {name: read(runs.folder / "files" / name) for name, (read, _) in FILES.items()}
-    for name, (_, values) in FILES.items():
-        for path, value in values.items():
-            expected = pytest.approx(value, rel=1e-9) if isinstance(value, float) else value
-            assert attrgetter(path)(records[name]) == expected, (name, path)
-
-    line, raster, reference, apparatus, stress = records.values()
-    assert_allclose(line.u_zz[:3], [1.3730e-4, 1.7451e-4, 1.5166e-4], atol=1e-8)
-    assert np.isnan(raster.u_zz).sum() == 9
-    assert_allclose(reference.sigma_rz, 100 * reference.r * reference.sigma_zz)
-    assert apparatus.budget["conversion_constant"] == pytest.approx({"noise": 1e-10, "load": 3e-10})
-    axis = 1 / (2 * np.pi * 561e-6**2)
-    assert_allclose(apparatus.radial([0.0, 1e-3]) / axis, [1, np.exp(-0.5 / 0.561**2)], atol=0.01)
-    (profile,) = stress.profiles
-    assert_allclose(profile.s_zz, 5e4 * np.exp(-((profile.r / 1e-3) ** 2)))
-    errors = [profile.errors_by(source) for source in profile.roots]
-    assert_allclose(np.diag(profile.covariance), np.sum(np.square(errors), axis=0))
