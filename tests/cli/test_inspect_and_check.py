@@ -1,25 +1,10 @@
 """``memscal inspect`` and ``memscal check``."""
 
-import shutil
 from pathlib import Path
 
 import h5py
 import pytest
 from helpers.console import Run
-
-
-@pytest.fixture(scope="module")
-def shared_artifact(drifting_scan: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from memscal.cli import main
-
-    path = tmp_path_factory.mktemp("artifact") / "a.h5"
-    assert main(["calibrate", str(drifting_scan), "-o", str(path)]) == 1
-    return path
-
-
-@pytest.fixture
-def artifact(shared_artifact: Path, folder: Path) -> Path:
-    return Path(shutil.copy(shared_artifact, folder / "a.h5"))
 
 
 def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path):

@@ -22,8 +22,7 @@ from memscal.figures.calibration import calibration_figure
 from memscal.figures.style import house_style
 
 STATES = ("dry", "lubricated")
-OF_A_COMPARISON = ["", *figure_stems(STATES, interface=True)]
-AS_FOR_DRY = {"comparison profiles-lubricated", "comparison friction-set-lubricated"}
+OF_A_COMPARISON = ["", *figure_stems(STATES[:1], interface=True)]
 WITHOUT_UNCERTAINTIES = {"contacts", "sweep", "fleet"}
 
 
@@ -72,13 +71,7 @@ def contacts() -> list[memscal.Contact]:
     return memscal.indent(FILM, SPHERE, load=[0.34, 2.75], friction=0.2)
 
 
-NAMES = [
-    pytest.param(name, marks=pytest.mark.full_study) if name in AS_FOR_DRY else name
-    for name in FIGURES
-]
-
-
-@pytest.fixture(name="figure", scope="module", params=NAMES)
+@pytest.fixture(name="figure", scope="module", params=FIGURES)
 def figure_fixture(request, make_apparatus) -> Iterator[Figure]:
     figure = FIGURES[request.param](make_apparatus)
     figure.set_label(request.param)

@@ -3,7 +3,6 @@
 import difflib
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -50,10 +49,6 @@ def test_a_view_is_the_golden_one(name: str, runs: Runs) -> None:
     assert changes == [], "\n".join(changes[:40])
 
 
-def test_every_golden_view_has_its_command() -> None:
-    assert {path.stem for path in Path(VIEWS).glob("*.txt")} == set(VIEW_COMMANDS)
-
-
 def test_json_has_one_convention_of_units():
     """A quantity is an object of value, uncertainty and unit; no key names a unit."""
     # Ranges of a file's arrays stand in the unit beside them; notes of a file are its own.
@@ -75,8 +70,9 @@ def test_json_has_one_convention_of_units():
     assert {place for name, told in outputs.items() for place in offenders(told, name)} == set()
 
 
-def test_every_golden_output_has_its_command():
-    assert {path.stem for path in Path(OUTPUTS).glob("*.json")} == set(COMMANDS)
+def test_every_golden_file_has_its_command():
+    assert {path.stem for path in OUTPUTS.glob("*.json")} == set(COMMANDS)
+    assert {path.stem for path in VIEWS.glob("*.txt")} == set(VIEW_COMMANDS)
 
 
 def test_public_signatures_are_those_of_the_text_file():
