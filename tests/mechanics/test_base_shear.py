@@ -25,8 +25,8 @@ def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu: fl
 def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k(indenter, nu, friction) -> None:
     contact = indent(film(nu), indenter, load=1.37, friction=friction)
     k = np.array([150.0, 700.0, 2000.0])
-    # Even radii, a hundred to the film's thickness, over which the shear is smooth.
-    r = np.linspace(0.0, 80e-3, 4001)
+    # Even radii, forty to the film's thickness, over which the shear is smooth.
+    r = np.linspace(0.0, 50e-3, 1001)
     measure = 2 * np.pi * r * contact.base_shear(r)
     direct = [simpson(measure * j1(wavenumber * r), x=r) for wavenumber in k]
     spectrum = contact.base_shear_spectrum(k)

@@ -53,9 +53,9 @@ def test_friction_changes_nothing_on_an_incompressible_half_space(friction, load
 
 def test_a_thin_compressible_film_is_a_row_of_springs() -> None:
     errors = []
-    for thickness in (1e-4, 2e-5):
+    for thickness in (2e-4, 4e-5):
         thin = film(0.3, thickness=thickness)
-        contact = indent(thin, SPHERE, depth=0.05 * thickness)
+        contact = indent(thin, SPHERE, depth=0.05 * thickness, rings=48)
         modulus = thin.shear_modulus * 2 * 0.7 / 0.4
         springs = math.pi * modulus * SPHERE.radius * contact.depth**2 / thickness
         errors.append(abs(contact.load / springs - 1))
@@ -68,7 +68,7 @@ def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -
     # w = -h^3 / 3G div grad p with a free surface, four times stiffer where both faces stick:
     # P = grip pi G a^6 / (32 R h^3), delta = a^2 / 4R.  The error falls as h/a.
     excess = []
-    for thickness in (4e-5, 1e-5):
+    for thickness in (4e-5, 2e-5):
         thin = film(0.5, thickness=thickness)
         contact = indent(
             thin, SPHERE, depth=0.02 * thickness, friction=friction, loading="total", rings=96
@@ -78,7 +78,7 @@ def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -
         excess.append([contact.load / (grip * squeezed) - 1, thickness / a])
     (large, wide), (small, narrow) = excess
     assert 0 < small < large
-    assert small / large == pytest.approx(narrow / wide, rel=0.15)
+    assert small / large == pytest.approx(narrow / wide, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_hayes_table_of_the_flat_punch() -> None:
 @pytest.mark.parametrize("loading", ["incremental", "total"])
 def test_the_base_carries_the_load(friction: float, loading: str) -> None:
     contact = indent(film(), SPHERE, load=1.37, friction=friction, loading=loading)
-    r, weights = gauss_panels(contact.contact_radius + 80e-3, 1e-3)
+    r, weights = gauss_panels(contact.contact_radius + 80e-3, 4e-3)
     force = 2 * math.pi * np.sum(weights * r * contact.base_stress(r))
     assert force == pytest.approx(1.37, rel=1e-8)
     assert contact.base_spectrum(0.0) == pytest.approx(1.37, rel=1e-10)
@@ -132,7 +132,8 @@ def test_the_base_carries_the_load(friction: float, loading: str) -> None:
     ],
 )
 def test_signorini_s_and_amontons_conditions_hold(nu: float, friction: float, loading: str) -> None:
-    for contact in indent(film(nu), SPHERE, load=LOADS[1::2], friction=friction, loading=loading):
+    setting = {"friction": friction, "loading": loading, "rings": 48}
+    for contact in indent(film(nu), SPHERE, load=LOADS[1::2], **setting):
         a = contact.contact_radius
         peak = contact.max_interface_stress
         r = contact.traction.rings
@@ -165,7 +166,7 @@ def test_a_hollow_tip_touches_on_a_ring_first() -> None:
         return np.asarray(dip + np.maximum(r - 1.5e-3, 0) ** 2 / 0.05)
 
     tip = Profile.from_function(hollow, extent=8e-3)
-    light, heavy = indent(film(), tip, load=[0.02, 2.0], friction=0.3)
+    light, heavy = indent(film(), tip, load=[0.02, 2.0], friction=0.3, rings=32)
     assert light.interface_pressure(0.0) == 0
     assert light.interface_pressure(1.5e-3) > 0
     assert heavy.interface_pressure(0.0) > 0
@@ -203,7 +204,7 @@ def test_load_and_depth_are_two_ways_to_one_contact() -> None:
 def test_a_contact_does_not_depend_on_the_rings_by_more_than_it_says() -> None:
     for friction in (0.0, 0.3, math.inf):
         coarse = indent(film(), SPHERE, load=1.37, friction=friction, rings=48)
-        fine = indent(film(), SPHERE, load=1.37, friction=friction, rings=200)
+        fine = indent(film(), SPHERE, load=1.37, friction=friction, rings=128)
         r = np.linspace(0.0, 8e-3, 50)
         change = np.max(np.abs(coarse.base_stress(r) - fine.base_stress(r)))
         assert change < 1.5 * coarse.convergence * fine.max_base_stress
@@ -231,4 +232,11 @@ def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(mo
 @pytest.mark.parametrize("way", ["hankel", "fem"])
 def test_a_film_that_sticks_at_once_is_refused_if_it_would_enter_the_indenter(way: str) -> None:
     with pytest.raises(ConvergenceError, match="Load incrementally"):
-        indent(film(0.1), SPHERE, load=1.0, friction=math.inf, loading="total", backend=way)
+        indent(
+            *(film(0.1), SPHERE),
+            load=1.0,
+            friction=math.inf,
+            loading="total",
+            backend=way,
+            rings=24,
+        )

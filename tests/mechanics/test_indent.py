@@ -25,7 +25,7 @@ def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
 @pytest.mark.parametrize(("nu", "friction"), CASES)
 def test_the_base_carries_the_load(nu: float, friction: float, radius: float) -> None:
     contact = press(nu, friction, radius)
-    r, weights = gauss_panels(radius + 40 * 2e-3, 1e-3)
+    r, weights = gauss_panels(radius + 40 * 2e-3, 4e-3)
     force = 2 * np.pi * np.sum(weights * r * contact.base_stress(r))
     assert force == pytest.approx(0.5, rel=1e-9)
     assert 2 * np.pi * contact.traction.pressure_transform(np.zeros(1))[0] == pytest.approx(0.5)
@@ -35,7 +35,7 @@ def test_the_base_carries_the_load(nu: float, friction: float, radius: float) ->
 def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction: float) -> None:
     contact = indent(FILM, ROD, load=0.5, friction=friction)
     k = np.array([[0.0, 300.0, 700.0], [1500.0, 3000.0, 1e6]])
-    r, weights = gauss_panels(80e-3, 0.5e-3)
+    r, weights = gauss_panels(80e-3, 2e-3)
     summed = 2 * np.pi * j0(k[..., None] * r) @ (weights * r * contact.base_stress(r))
     spectrum = contact.base_spectrum(k)
     np.testing.assert_allclose(spectrum[:, :2], summed[:, :2], atol=1e-11)
@@ -93,7 +93,7 @@ def test_what_is_no_radius_is_refused(r: list[float]) -> None:
         indent(FILM, ROD, load=1.0).base_stress(r)
 
 
-@pytest.mark.parametrize("radius", [0.1e-3, 0.25e-3, 4e-3])
+@pytest.mark.parametrize("radius", [0.1e-3, 4e-3])
 @pytest.mark.parametrize(("nu", "friction"), CASES)
 def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> None:
     contact = press(nu, friction, radius)

@@ -15,8 +15,8 @@ RUBBER = replace(FILM, law="neo-hookean")
 @pytest.mark.parametrize(
     ("nu", "radius", "depths", "sticking"),
     [
-        (0.5, 0.125, [0.06], True),
-        (0.495, 0.48, [0.06], False),
+        (0.5, 0.16, [0.04], True),
+        (0.495, 0.48, [0.04], False),
         pytest.param(0.46, 0.56, [0.02, 0.28], True, marks=pytest.mark.full_study),
     ],
 )

@@ -16,7 +16,7 @@ FULL = pytest.mark.full_study
 
 
 @cache
-def elements(nu: float, width: float, rings: int = 120, refinement: int = 1) -> ElementFilm:
+def elements(nu: float, width: float, rings: int = 60, refinement: int = 1) -> ElementFilm:
     return ElementFilm(film(nu), np.linspace(0, width * H, rings + 1), refinement=refinement)
 
 
