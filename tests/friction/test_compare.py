@@ -43,6 +43,7 @@ def found(
         [made.dry, made.lubricated],
         apparatus,
         friction=FRICTION,
+        loading="incremental",
         macroscopic=1.6,
         macroscopic_uncertainty=0.1,
         cache=kept,
@@ -79,7 +80,7 @@ def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made) 
 
 
 def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found) -> None:
-    for one in found.loads["total"]:
+    for one in found.loads["incremental"]:
         assert one.chi_square.shape == one.p_values.shape == (len(FRICTION),)
         assert one.deviance.min() >= 0
         assert one.degrees == one.by_profile.degrees + 1
@@ -118,10 +119,10 @@ def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, familie
     assert found.joint["dry"]["incremental"].p_value < 1e-6
 
 
-def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus) -> None:
+def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus, kept) -> None:
     press = partial(memscal.indent, made.dry.film, made.dry.indenter, load=[0.69, 2.75])
     tables = [contact.profile() for mu in (0.0, 0.3) for contact in press(friction=mu)]
-    found = memscal.compare(made.dry, apparatus, references=tables)
+    found = memscal.compare(made.dry, apparatus, references=tables, cache=kept)
     (reading,) = found.joint["dry"].values()
     assert found.friction.tolist() == [0.0, 0.3]
     assert reading.interval.low > 0

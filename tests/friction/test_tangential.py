@@ -8,11 +8,13 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from helpers.paper import FILM, SPHERE
 from helpers.scans import simulate_experiment
 from scipy.linalg import block_diag
 from scipy.stats import binom
@@ -44,6 +46,7 @@ def width(interval: Interval) -> float:
     return (math.inf if interval.high is None else interval.high) - interval.low
 
 
+@lru_cache
 def experiment(friction: float, seed: int) -> Experiment:
     return simulate_experiment(
         friction=friction,
@@ -55,17 +58,20 @@ def experiment(friction: float, seed: int) -> Experiment:
     )
 
 
-def calibrated(made: Experiment) -> tuple[ApparatusFunction, ApparatusFunction]:
+@lru_cache
+def calibrated(seed: int) -> tuple[ApparatusFunction, ApparatusFunction]:
+    # The rod's scan does not depend on the sphere's friction.
+    rod = experiment(TRUTHS[seed % len(TRUTHS)], seed).rod
     normal, shear = (
-        memscal.calibrate(made.rod, channel=channel, method="evidence").apparatus
+        memscal.calibrate(rod, channel=channel, method="evidence").apparatus
         for channel in ("zz", "xz")
     )
     return normal, shear
 
 
-def measured_with(made: Experiment) -> tuple[MeasuredStress, ApparatusFunction]:
-    normal, shear = calibrated(made)
-    return memscal.measure_stress(made.dry, normal), shear
+@lru_cache
+def measured(friction: float, seed: int) -> MeasuredStress:
+    return memscal.measure_stress(experiment(friction, seed).dry, calibrated(seed)[0])
 
 
 @pytest.fixture(scope="module")
@@ -74,15 +80,13 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     return tmp_path_factory.mktemp("contacts")
 
 
-def test_a_family_of_shear_is_that_of_contacts_between_its_values(cache: Path) -> None:
-    film = replace(memscal.simulate().film, poisson_ratio_uncertainty=None)
-    sphere = memscal.Sphere(radius=128.8e-3, radius_uncertainty=0.5e-3)
-    family = amontons_family(film, sphere, LOADS, reach=24e-3, cache=cache, order=1)
+def test_a_family_of_shear_is_that_of_contacts_between_its_values() -> None:
+    family = amontons_family(FILM, SPHERE, LOADS, reach=24e-3, order=1)
     assert family.order == 1
     r = np.linspace(0.0, 8e-3, 41)
     for friction in (0.07, 0.22, 0.5):
         member = family.at(friction)
-        for i, contact in enumerate(memscal.indent(film, sphere, load=LOADS, friction=friction)):
+        for i, contact in enumerate(memscal.indent(FILM, SPHERE, load=LOADS, friction=friction)):
             found = family.wavenumbers.synthesise(member.spectra[0, i], r, order=1)
             exact = contact.base_shear(r)
             np.testing.assert_allclose(found, exact, atol=1e-3 * np.abs(exact).max())
@@ -108,13 +112,13 @@ def test_a_thicker_film_and_a_larger_load_change_the_shear_as_the_family_says() 
     np.testing.assert_allclose(family.by_load[0, 0], heavier, atol=0.01 * np.abs(heavier).max())
 
 
-def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None:
-    made = experiment(0.1, seed=0)
-    _, shear = measured_with(made)
-    film = made.dry.film
-    sphere = made.dry.indenter
-    family = amontons_family(film, sphere, LOADS, reach=24e-3, cache=cache, order=1)
-    sensor = sensor_of(shear, family, 8e-3, [made.dry])
+def test_what_is_predicted_has_a_side_and_slopes_of_its_own() -> None:
+    dry = experiment(0.1, 0).dry
+    shear = calibrated(0)[1]
+    film = dry.film
+    sphere = dry.indenter
+    family = amontons_family(film, sphere, LOADS, friction=(0.1,), reach=24e-3, order=1)
+    sensor = sensor_of(shear, family, 8e-3, [dry])
     members = family.at(0.1)
 
     def at(offset: FloatArray) -> LoadPoints:
@@ -125,7 +129,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
     offset = np.array([-3e-3, -0.4e-3, 0.7e-3, 3e-3])
     found, mirrored = (predict(at(x), sensor, members, 1) for x in (offset, -offset))
     np.testing.assert_allclose(mirrored.signal, -found.signal)
-    r = np.linspace(0.0, 40e-3, 4001)
+    r = np.linspace(0.0, 30e-3, 1501)
     contact = memscal.indent(film.expected, sphere, load=LOADS[1], friction=0.1)
     profile = shear.predict(r, contact.base_shear(r))
     expected = np.sign(offset) * np.interp(np.abs(offset), r, profile)
@@ -144,15 +148,14 @@ def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_
     bounded = 0
     for seed in range(EXPERIMENTS):
         friction = TRUTHS[seed % len(TRUTHS)]
-        made = experiment(friction, seed)
-        normal, shear = calibrated(made)
-        measured = memscal.measure_stress(made.dry, normal)
-        found = compare(measured, shear, loading="incremental", cache=cache)
+        normal, shear = calibrated(seed)
+        stress = measured(friction, seed)
+        found = compare(stress, shear, loading="incremental", cache=cache)
         joint = found.joint["dry"]["incremental"]
         held.append(joint.interval.holds(friction))
         assert joint.p_value > 1e-4
         alone, both = (
-            compare(measured, normal, shear=s, loading="incremental", cache=cache).joint["dry"][
+            compare(stress, normal, shear=s, loading="incremental", cache=cache).joint["dry"][
                 "incremental"
             ]
             for s in (None, shear)
@@ -173,20 +176,19 @@ def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_
     assert bounded >= binom.ppf(CHANCE, EXPERIMENTS // len(TRUTHS), 0.93)
 
 
-def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(cache) -> None:
-    made = experiment(0.1, seed=3)
-    apparatus = calibrated(made)
-    measured = memscal.measure_stress(made.dry, apparatus[0])
-    film = made.dry.film
-    sphere = made.dry.indenter
+def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact() -> None:
+    apparatus = calibrated(0)
+    stress = measured(0.1, 0)
+    film = experiment(0.1, 0).dry.film
+    sphere = experiment(0.1, 0).dry.indenter
     common = common_inputs(*apparatus)
     assert {"load", "rod_radius"} <= set(common)
     assert not common_inputs(apparatus[0], replace(apparatus[1], load=2.0))
     channels = []
     for order, of_channel in enumerate(apparatus):
-        family = amontons_family(film, sphere, LOADS, reach=24e-3, cache=cache, order=order)
-        sensor = sensor_of(of_channel, family, 8e-3, measured.scans, common)
-        points = load_points(measured.profiles[1], of_channel.sensor.channel)
+        family = amontons_family(film, sphere, LOADS, friction=(0.1,), reach=24e-3, order=order)
+        sensor = sensor_of(of_channel, family, 8e-3, stress.scans, common)
+        points = load_points(stress.profiles[1], of_channel.sensor.channel)
         # A reading of the shear is missing.
         kept = np.arange(points.u.size) != 5 * order
         names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "flat")
@@ -234,13 +236,15 @@ def test_two_channels_share_what_scatters_and_what_is_uncertain_of_each_contact(
 
 
 def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
+    options = {"friction": (0.0, 0.2, 1.0, math.inf), "loading": "incremental", "cache": cache}
     low, high = (
-        compare(*measured_with(experiment(friction, 5)), loading="incremental", cache=cache)
-        for friction in (0.0, 1.0)
+        compare(measured(friction, 0), calibrated(0)[1], **options) for friction in (0.0, 1.0)
     )
     free, stuck = (found.joint["dry"]["incremental"].interval for found in (low, high))
     assert free.high < stuck.low
     assert "by the shear" in str(low)
+    with pytest.raises(InputError, match="no figure"):
+        low.plot()
     assert low.to_dict()["joint"][0]["interval"]["high"] == free.high
     assert list(low.to_dataframe()["friction, high"]) == [
         load.interval.high or math.inf for load in low.by_shear["incremental"]
@@ -248,33 +252,31 @@ def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
 
 
 def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
-    made = experiment(0.1, seed=1)
-    normal, shear = calibrated(made)
-    measured = memscal.measure_stress(made.dry, normal)
+    made = experiment(0.1, 0)
+    normal, shear = calibrated(0)
+    stress = measured(0.1, 0)
     options = {"friction": (0.0, math.inf), "loading": "total", "cache": cache}
     named = {"sensor": replace(shear.sensor, name="another")}
     for changed in (named, {"film": replace(shear.film, thickness=3e-3)}):
         with pytest.raises(InputError, match=r'"another"|3 mm'):
-            compare(measured, replace(shear, **changed), **options)
+            compare(stress, replace(shear, **changed), **options)
     for beside in ({"shear": shear}, {"references": []}, {"macroscopic": 1.6}):
         with pytest.raises(InputError, match="options of the normal one"):
-            compare(measured, shear, **beside)
-    with pytest.raises(InputError, match="no figure"):
-        compare(measured, shear, **options).plot()
+            compare(stress, shear, **beside)
     rod = memscal.measure_stress(made.rod, normal)
     silent = replace(made.dry, channels={"u_xz": made.dry.channels["u_xz"]})
     silent = memscal.measure_stress(silent, normal)
     without = memscal.measure_stress(replace(made.dry, channels={}), normal)
-    for stress, artifact, further, words in (
+    for contacts, artifact, further, words in (
         (made.dry, shear, {}, "reads the shear of measured"),
         (rod, shear, {}, "rod"),
         (silent, shear, {}, "u_xz_errors"),
         (without, shear, {}, "no usable voltage u_xz"),
         (without, normal, {"shear": shear}, "no usable voltage u_xz"),
-        (measured, normal, {"shear": normal}, "not of a tangential"),
+        (stress, normal, {"shear": normal}, "not of a tangential"),
     ):
         with pytest.raises(InputError, match=words):
-            compare(stress, artifact, **options, **further)
+            compare(contacts, artifact, **options, **further)
     path = cache / "xz.apparatus.h5"
     shear.save(path)
     with h5py.File(path, "r+") as file:
@@ -284,15 +286,15 @@ def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
     with pytest.raises(InputError, match="no usable voltage u_xz"):
         compare(without, normal, shear=path, accept_altered=True, **options)
     with pytest.raises(InputError, match="no shear"):
-        compare(measured, normal, shear=shear, references=[])
-    measured.save(cache / "dry.stress.h5")
+        compare(stress, normal, shear=shear, references=[])
+    stress.save(cache / "dry.stress.h5")
     with pytest.raises(InputError, match="No loading"):
         compare(cache / "dry.stress.h5", shear, loading=(), cache=cache)
 
 
 def test_a_tangential_artifact_is_applied_to_no_normal_channel_whatever_is_overridden() -> None:
-    made = experiment(0.1, seed=2)
-    _, shear = measured_with(made)
+    made = experiment(0.1, 0)
+    shear = calibrated(0)[1]
     for override in (False, True):
         with pytest.raises(InputError, match="xz"):
             memscal.measure_stress(made.dry, shear, override=override)
