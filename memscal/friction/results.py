@@ -175,7 +175,7 @@ class LoadComparison:
     >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
     >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
     >>> comparison = memscal.compare(
-    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.1, 0.3), loading="total"
+    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.3), loading="total"
     ... )
     >>> first = comparison.loads["total"][0]
     >>> 0.8 < first.ratio < 1.4  # measured maximum over the frictionless one
@@ -226,7 +226,7 @@ class DryAgainstLubricated:
     >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
     >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
     >>> comparison = memscal.compare(
-    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.1, 0.3), loading="total"
+    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.3), loading="total"
     ... )
     >>> [difference] = comparison.dry_against_lubricated
     >>> abs(difference.relative) < 0.5
@@ -270,7 +270,7 @@ class FrictionComparison(Result, Checked):
     >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
     >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
     >>> comparison = memscal.compare(
-    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.1, 0.3), loading="total"
+    ...     [made.dry, made.lubricated], sensor, friction=(0, 0.3), loading="total"
     ... )
     >>> sorted(comparison.joint)  # print(comparison) shows the tables
     ['dry', 'lubricated']

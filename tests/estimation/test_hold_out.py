@@ -40,7 +40,7 @@ def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covarian
     {"repeats": 14, "points": 21},
 ])  # fmt: skip
 def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options) -> None:
-    scans = 60 if FULL else 20
+    scans = 60 if FULL else 12
     level = 0.1
     p_values = []
     for seed in range(scans):

@@ -30,7 +30,7 @@ BOTH = {"repeats": 2, "points": 33, "branch": ["approach", "retreat"]}
     ],
 )
 def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options) -> None:
-    scans = 80 if FULL else 25
+    scans = 80 if FULL else 16
     extra = [test(estimated(simulated(seed=seed, **options))) for seed in range(scans)]
     rejected = sum(chi2.sf(columns.fall, columns.count) < 0.1 for columns in extra)
     # A tenth of good scans fall below p = 0.1, within what a binomial allows once in 1e6.
@@ -72,7 +72,7 @@ def hysteretic(seed: int, conversion: float = 0.0, play: float = 0.0, step: floa
 
 @pytest.mark.parametrize("differences", [(0.01, 0.0, 0.0), (0.0, -20e-6, 0.0), (0.0, 0.0, 1e-4)])
 def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences) -> None:
-    scans = 40 if FULL else 12
+    scans = 40 if FULL else 8
     extra = [hysteresis_test(estimated(hysteretic(seed, *differences))) for seed in range(scans)]
     assert all(columns.fall > chi_square_limit(3) for columns in extra)
     z = np.array([(columns.coefficients - differences) / columns.errors for columns in extra])

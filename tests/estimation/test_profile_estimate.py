@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.scans import CONVERSION, RING, TAILS, estimated, simulated
 from scipy.stats import chi2
 
@@ -14,9 +15,9 @@ from memscal.estimation.departures import ReducedScan
 
 
 def test_the_noise_is_found_from_the_scatter_alone() -> None:
-    # 40 scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
+    # Scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
     degrees = 60
-    seeds = range(40)
+    seeds = range(40 if FULL else 20)
     ratios = []
     for seed in seeds:
         scan = simulated(noise=0.01, state_noise=False, seed=seed)
@@ -52,7 +53,7 @@ def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> No
 
 def test_gross_outliers_leave_the_noise_as_it_is() -> None:
     ratios = []
-    for seed in range(24):
+    for seed in range(24 if FULL else 12):
         scan = simulated(noise=0.005, seed=seed)
         rng = np.random.default_rng(seed)
         chosen = rng.choice(scan.u_zz.size, 3, replace=False)

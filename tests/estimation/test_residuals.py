@@ -61,7 +61,7 @@ def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None
     estimate = estimated(simulated(noise=0.01, points=33))
     rng = np.random.default_rng()
     rows = []
-    draws = 1500 if FULL else 400
+    draws = 1500 if FULL else 250
     for _ in range(draws):
         noise = rng.normal(0.0, 1.0, estimate.points.u.size) * estimate.points.u_errors
         noisy = with_voltages(estimate, estimate.gaussian.predicted + noise)
@@ -125,7 +125,7 @@ def test_neighbours_of_different_passes_are_no_neighbours() -> None:
 
 def test_the_moments_of_the_neighbours_correlation_give_its_tail() -> None:
     rng = np.random.default_rng()
-    draws = 2500 if FULL else 800
+    draws = 2500 if FULL else 500
     residuals = residuals_of(estimated(simulated(points=49)))
     basis = residuals.basis
     p_values = np.empty(draws)
@@ -153,7 +153,7 @@ def pure_error(scan: Scan) -> TestOutcome | None:
 @pytest.mark.parametrize("scatter", [0.0, 5e-6])
 def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
     """Where the stage comes to rest elsewhere each time, as well."""
-    scans = 150 if FULL else 40
+    scans = 150 if FULL else 25
     level = 0.1
     p_values = []
     fine = simulated(points=2001, noise=0.0)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.linear_contacts import CONVERSION, Laboratory, bare_points
 from scipy.stats import kstest
 
@@ -14,7 +15,7 @@ from memscal.friction.likelihood import Channel, LoadPoints
 from memscal.friction.results import DryAgainstLubricated
 
 CHANCE = 1e-4
-PAIRS = 60
+PAIRS = 60 if FULL else 30
 LOAD = 1
 
 

@@ -4,13 +4,14 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.linear_contacts import Laboratory
 from scipy.stats import binom, kstest
 
 from memscal.friction.effective import with_loading
 from memscal.friction.results import BoundedEstimate
 
-SEEDS = 40
+SEEDS = 40 if FULL else 20
 CHANCE = 1e-4
 TRUTHS = (0.0, 0.1, 0.2, 0.3)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
 from memscal.friction.effective import FrictionFit
@@ -159,7 +160,7 @@ def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> Non
     laboratory = Laboratory.of()
     errors = []
     t = bounded(friction, laboratory.family.scale)
-    for seed in range(40):
+    for seed in range(40 if FULL else 20):
         along = laboratory.drawn(friction, seed).whole
         i = int(np.argmin(along.deviance))
         errors.append((along.coordinates[i] - t) * np.sqrt(along.information[i]))

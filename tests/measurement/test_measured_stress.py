@@ -18,8 +18,9 @@ from memscal.measurement.measured_profile import contact_signals, prepared_scan
 from memscal.measurement.restore import restore_known, single_loads
 
 QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
-SEEDS = 5 if FULL else 3
+SEEDS = 5 if FULL else 2
 SENSOR = made.known_apparatus()
+ENDS = made.LOADS[::3]
 
 
 def blurred(load: float, r: np.ndarray, friction: float = 0.0) -> np.ndarray:
@@ -65,8 +66,8 @@ def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
 
 
 def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
-    exact = made.measured(3)
-    found = made.measured(3, conversion_uncertainty=0.02)
+    exact = made.measured(3, load=ENDS)
+    found = made.measured(3, conversion_uncertainty=0.02, load=ENDS)
     for before, after in zip(exact.profiles, found.profiles, strict=True):
         part = after.roots["conversion_constant"] @ after.roots["conversion_constant"].T
         np.testing.assert_allclose(part, 4e-4 * np.outer(after.s_zz, after.s_zz), rtol=1e-9)
@@ -77,7 +78,7 @@ def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_max
 
 
 def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum() -> None:
-    scan = made.contact_scan(1)
+    scan = made.contact_scan(1, load=ENDS)
     right = memscal.measure_stress(scan, made.known_apparatus(width_uncertainty=0.05))
     kernel = memscal.GaussianMixture((1.0,), (1.05 * made.SIGMA,))
     wrong = memscal.measure_stress(scan, made.known_apparatus(kernel))
@@ -87,8 +88,8 @@ def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum()
 
 
 def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
-    parts = single_loads(made.contact_scan(2))
-    for profile, part in zip(made.measured(2).profiles, parts, strict=True):
+    parts = single_loads(made.contact_scan(2, load=ENDS))
+    for profile, part in zip(made.measured(2, load=ENDS).profiles, parts, strict=True):
         [signal] = contact_signals([part], SENSOR)
         prepared = prepared_scan(part, SENSOR, signal)
         found = restore_known(prepared.scan, SENSOR)
@@ -111,13 +112,14 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
 def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> None:
     """A contact that sticks follows its load by up to 40 % more than one that slides."""
     options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
+    options["load"] = ENDS
     for profile in made.measured(4, **options, state_noise=False, friction=friction).profiles:
         truth = blurred(profile.load, profile.r, friction)
         np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
 
 
 def test_a_scatter_of_the_loads_is_noise_unless_they_are_recorded() -> None:
-    options = {**QUIET, "load_scatter": 0.03, "load_reading": 0.0}
+    options = {**QUIET, "load_scatter": 0.03, "load_reading": 0.0, "load": ENDS}
     blind = made.measured(4, **options, record_loads=False, state_noise=False)
     off = [np.abs(p.s_zz - blurred(p.load, p.r)).max() / p.maximum for p in blind.profiles]
     assert min(off) > 0.01
@@ -137,11 +139,11 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
 
 
 def test_contacts_at_single_points_give_what_rows_give() -> None:
-    scan = made.contact_scan(repeats=2, record_loads=True)
+    scan = made.contact_scan(repeats=2, record_loads=True, load=ENDS)
     rows, points = (
         memscal.measure_stress(s, SENSOR).profiles for s in (scan, made.as_points(scan))
     )
-    assert len(points) == len(rows) == len(made.LOADS)
+    assert len(points) == len(rows) == len(ENDS)
     for one, other in zip(points, rows, strict=True):
         assert one.load == pytest.approx(other.load, rel=1e-12)
         assert one.force == pytest.approx(other.force, rel=1e-9)
@@ -149,8 +151,8 @@ def test_contacts_at_single_points_give_what_rows_give() -> None:
 
 
 def test_repeats_at_one_position_are_averaged() -> None:
-    once = made.measured(5)
-    thrice = made.measured(5, repeats=3)
+    once = made.measured(5, load=ENDS)
+    thrice = made.measured(5, repeats=3, load=ENDS)
     for few, many in zip(once.profiles, thrice.profiles, strict=True):
         assert many.r.size == few.r.size == 33
         ratio = few.roots["noise"] / many.roots["noise"]
@@ -158,7 +160,8 @@ def test_repeats_at_one_position_are_averaged() -> None:
 
 
 def test_correlated_noise_is_averaged_with_its_correlation() -> None:
-    scan = made.contact_scan(6, repeats=2, load_scatter=0.0, load_reading=0.0, record_loads=False)
+    exact = {"load_scatter": 0.0, "load_reading": 0.0, "record_loads": False}
+    scan = made.contact_scan(6, repeats=2, load=ENDS, **exact)
     near = 0.4 ** np.abs(np.subtract.outer(np.arange(scan.x.size), np.arange(scan.x.size)))
     scan = replace(scan, x_errors=None, u_zz_correlation=near)
     for profile in memscal.measure_stress(scan, SENSOR).profiles:
@@ -175,7 +178,7 @@ def test_correlated_noise_is_averaged_with_its_correlation() -> None:
 
 def test_files_of_many_points_grow_with_their_number(tmp_path: Path) -> None:
     sizes = []
-    for count in (500, 4000):
+    for count in (250, 2000):
         scan = memscal.simulate(film=SENSOR.film, points=count)
         found = memscal.measure_stress(scan, SENSOR)
         found.save(tmp_path / f"{count}.h5")
@@ -272,13 +275,9 @@ def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused() -> None:
 
 
 def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
-    scan = made.contact_scan(load=(1.37,))
-    heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
-    with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
-        memscal.measure_stress(heavy, SENSOR)
     # Of several, the one that cannot be.
-    scan = made.contact_scan(load=(0.34, 0.69, 1.37))
-    loads = np.where(np.arange(3)[:, None] == 1, 1e6, 1.0) * scan.normal_load
+    scan = made.contact_scan(load=(0.34, 0.69))
+    loads = np.where(np.arange(2)[:, None] == 1, 1e6, 1.0) * scan.normal_load
     heavy = replace(scan, normal_load=loads, source=SourceFile("heavy.h5", ""))
     with pytest.raises(DomainError, match=r"heavy\.h5, 6\.9e\+05 N, dry"):
         memscal.measure_stress(heavy, SENSOR)
@@ -289,7 +288,9 @@ def test_contacts_near_the_nominal_loads_are_those_of_converged_ones(loads: tupl
     scan = made.contact_scan(load=loads)
     nodes = Wavenumbers.covering(20 / made.EXACT_FILM.thickness, 48e-3)
     transfer = made.CONVERSION * made.GAUSSIAN.transform(nodes.k)
-    for load, signal in zip(loads, contact_signals(single_loads(scan), SENSOR), strict=True):
+    signals = contact_signals(single_loads(scan), SENSOR)
+    assert len(signals) == len(loads)
+    for load, signal in ((loads[0], signals[0]), (loads[-1], signals[-1])):
         for i, friction in enumerate((0.0, np.inf)):
             near = load * np.array([0.99, 1.0, 1.01])
             contacts = memscal.indent(made.EXACT_FILM, made.SPHERE, load=near, friction=friction)

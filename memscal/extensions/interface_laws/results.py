@@ -88,7 +88,10 @@ class InterfaceComparison(Result):
     Examples
     --------
     >>> import memscal
-    >>> made = memscal.simulate_experiment(friction=0.1, loads=[0.69], lubricated_loads=[0.69])
+    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> made = memscal.simulate_experiment(
+    ...     film=film, friction=0.1, loads=[0.69], lubricated_loads=[0.69]
+    ... )
     >>> sensor = memscal.calibrate(made.rod, method="bayesian").apparatus
     >>> comparison = memscal.compare(
     ...     made.dry, sensor, friction=(0, 0.1), loading="total", interface=True, macroscopic=0.1

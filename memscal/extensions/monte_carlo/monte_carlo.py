@@ -214,7 +214,7 @@ class BudgetComparison:
     --------
     >>> import memscal
     >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> width = memscal.monte_carlo(calibration, draws=8)["gaussian_sigma"]
+    >>> width = memscal.monte_carlo(calibration, draws=4)["gaussian_sigma"]
     >>> width.uncertainty < 1e-4, width.first_order < 1e-4  # m; by draws, by the budget
     (True, True)
     """
@@ -272,9 +272,9 @@ class MonteCarlo(Result):
     --------
     >>> import memscal
     >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> drawn = memscal.monte_carlo(calibration, draws=8)
+    >>> drawn = memscal.monte_carlo(calibration, draws=4)
     >>> drawn.samples.shape
-    (8, 5)
+    (4, 5)
     """
 
     draws: int
