@@ -81,15 +81,6 @@ def test_each_kind_of_departure_is_recognised(kernel, kinds) -> None:
     assert max(found, key=found.__getitem__) in kinds
 
 
-def test_more_noise_means_less_departure_from_the_gaussian() -> None:
-    probabilities = []
-    for noise in (0.002, 0.01, 0.05):
-        scans = [simulated(noise=noise, seed=seed, kernel=TAILS) for seed in range(8)]
-        gaussian = [estimated(scan).weighed.probability[0] for scan in scans]
-        probabilities.append(np.median(gaussian))
-    assert probabilities == sorted(probabilities)
-
-
 def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior() -> None:
     """Few places cannot tell 79 coefficients; what they do not tell stays uncertain."""
     scan = simulated(points=15, half_range=5e-3, noise=0.003)

@@ -2,14 +2,13 @@
 
 import math
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import memscal
-from memscal import Experiment, Scan, StressSensor
+from memscal import Experiment, Scan
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
@@ -119,15 +118,6 @@ def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, familie
     assert found.joint["dry"]["incremental"].p_value < 1e-6
 
 
-def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus, kept) -> None:
-    press = partial(memscal.indent, made.dry.film, made.dry.indenter, load=[0.69, 2.75])
-    tables = [contact.profile() for mu in (0.0, 0.3) for contact in press(friction=mu)]
-    found = memscal.compare(made.dry, apparatus, references=tables, cache=kept)
-    (reading,) = found.joint["dry"].values()
-    assert found.friction.tolist() == [0.0, 0.3]
-    assert reading.interval.low > 0
-
-
 def test_a_contact_over_a_plane_is_refused(made: Experiment, apparatus) -> None:
     axis = np.linspace(-5e-3, 5e-3, 9)
     u = np.exp(-np.add.outer(axis**2, axis**2) / 2e-6)
@@ -141,18 +131,6 @@ def test_a_contact_over_a_plane_is_refused(made: Experiment, apparatus) -> None:
 def test_a_rod_scan_is_refused(made: Experiment, apparatus: memscal.ApparatusFunction) -> None:
     with pytest.raises(InputError, match=r"made with a rod, not with a sphere[\s\S]*calibrate"):
         memscal.compare(made.rod, apparatus)
-
-
-def test_an_artifact_of_another_sensor_is_refused_unless_overridden(
-    made: Experiment, apparatus: memscal.ApparatusFunction, kept: Path
-) -> None:
-    other = replace(made.dry, sensor=StressSensor(name="another", channel="zz"))
-    with pytest.raises(InputError, match="another"):
-        memscal.compare(other, apparatus)
-    found = memscal.compare(
-        other, apparatus, friction=FRICTION, loading="incremental", override=True, cache=kept
-    )
-    assert found.measured.overridden
 
 
 def test_scans_of_different_films_or_spheres_are_refused(made, apparatus) -> None:

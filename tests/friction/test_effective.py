@@ -67,15 +67,6 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
     assert abs(np.sqrt(np.mean(np.square(apart))) - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
 
 
-def test_all_loads_together_tell_more_than_each() -> None:
-    fit = laboratory().drawn(0.1, seed=1)
-    joint = fit.coefficient([0, 1])
-    single = fit.coefficient([0])
-    width = joint.interval.high - joint.interval.low
-    assert single.interval.high is None or single.interval.high - single.interval.low > width
-    assert joint.degrees == 2 * (33 - 3) - 1
-
-
 def test_the_other_loading_adds_a_rectangle() -> None:
     first = found(0.1)[0]
     second = found(0.2)[0]

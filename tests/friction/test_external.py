@@ -21,12 +21,6 @@ FILM = replace(paper.FILM, thickness_uncertainty=2e-5)
 CONTACT = {"film": FILM, "indenter": SPHERE, "reach": REACH}
 
 
-@pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Contacts that the tests of this module calculate once."""
-    return tmp_path_factory.mktemp("contacts")
-
-
 @cache
 def tables() -> list[StressProfile]:
     return [
@@ -36,9 +30,9 @@ def tables() -> list[StressProfile]:
     ]
 
 
-def test_tables_of_our_own_contacts_give_our_own_family(kept: Path) -> None:
-    ours = amontons_family(FILM, SPHERE, LOADS, friction=FRICTIONS, reach=REACH, cache=kept)
-    family = external_family(tables(), LOADS, **CONTACT, cache=kept)
+def test_tables_of_our_own_contacts_give_our_own_family(tmp_path: Path) -> None:
+    ours = amontons_family(FILM, SPHERE, LOADS, friction=FRICTIONS, reach=REACH, cache=tmp_path)
+    family = external_family(tables(), LOADS, **CONTACT, cache=tmp_path)
     assert family.name == "external"
     assert family.loading == "incremental"
     assert family.values.tolist() == list(FRICTIONS)
@@ -49,13 +43,13 @@ def test_tables_of_our_own_contacts_give_our_own_family(kept: Path) -> None:
     np.testing.assert_allclose(family.depths, ours.depths, rtol=1e-3)
 
 
-def test_a_table_serves_a_load_within_one_percent_in_proportion(kept: Path) -> None:
+def test_a_table_serves_a_load_within_one_percent_in_proportion(tmp_path: Path) -> None:
     asked = [load * 1.008 for load in LOADS]
-    exact = external_family(tables(), LOADS, **CONTACT, cache=kept)
-    family = external_family(tables(), asked, **CONTACT, cache=kept)
+    exact = external_family(tables(), LOADS, **CONTACT, cache=tmp_path)
+    family = external_family(tables(), asked, **CONTACT, cache=tmp_path)
     np.testing.assert_allclose(family.spectra, 1.008 * exact.spectra, rtol=1e-12)
     assert family.loads.tolist() == asked
-    turned = external_family(tables()[::-1], asked, **CONTACT, cache=kept)
+    turned = external_family(tables()[::-1], asked, **CONTACT, cache=tmp_path)
     assert_same_to_rounding(turned.spectra, family.spectra)
 
 

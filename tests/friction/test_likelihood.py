@@ -116,15 +116,6 @@ def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
     assert found.whole.chi_square.min() < 100 < wrong.chi_square.min()
 
 
-def test_chi_square_is_that_of_the_whole_covariance(laboratory: Laboratory) -> None:
-    whole = laboratory.drawn(0.1, seed=7).whole
-    i = 30
-    rest = np.concatenate([load.residual[i] for load in whole.loads])
-    root = np.vstack([load.columns[i] for load in whole.loads])
-    expected = rest @ np.linalg.solve(np.eye(rest.size) + root @ root.T, rest)
-    assert whole.chi_square[i] == pytest.approx(expected, rel=1e-9)
-
-
 def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=8)
     together = found.whole.only([0]).with_held(found.whole.only([1]))

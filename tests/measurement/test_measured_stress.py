@@ -118,13 +118,6 @@ def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> No
         np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
 
 
-def test_a_scatter_of_the_loads_is_noise_unless_they_are_recorded() -> None:
-    options = {**QUIET, "load_scatter": 0.03, "load_reading": 0.0, "load": ENDS}
-    blind = made.measured(4, **options, record_loads=False, state_noise=False)
-    off = [np.abs(p.s_zz - blurred(p.load, p.r)).max() / p.maximum for p in blind.profiles]
-    assert min(off) > 0.01
-
-
 def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
     ratios = []
     for seed in range(SEEDS):
@@ -150,15 +143,6 @@ def test_contacts_at_single_points_give_what_rows_give() -> None:
         np.testing.assert_allclose(one.s_zz, other.s_zz, atol=1e-9 * other.maximum)
 
 
-def test_repeats_at_one_position_are_averaged() -> None:
-    once = made.measured(5, load=ENDS)
-    thrice = made.measured(5, repeats=3, load=ENDS)
-    for few, many in zip(once.profiles, thrice.profiles, strict=True):
-        assert many.r.size == few.r.size == 33
-        ratio = few.roots["noise"] / many.roots["noise"]
-        assert np.median(ratio**2) == pytest.approx(3.0, rel=0.25)
-
-
 def test_correlated_noise_is_averaged_with_its_correlation() -> None:
     exact = {"load_scatter": 0.0, "load_reading": 0.0, "record_loads": False}
     scan = made.contact_scan(6, repeats=2, load=ENDS, **exact)
@@ -177,15 +161,12 @@ def test_correlated_noise_is_averaged_with_its_correlation() -> None:
 
 
 def test_files_of_many_points_grow_with_their_number(tmp_path: Path) -> None:
-    sizes = []
-    for count in (250, 2000):
-        scan = memscal.simulate(film=SENSOR.film, points=count)
-        found = memscal.measure_stress(scan, SENSOR)
-        found.save(tmp_path / f"{count}.h5")
-        found.plot().savefig(tmp_path / "many.svg")
-        assert memscal.read_stress(tmp_path / f"{count}.h5") == found
-        sizes.append((tmp_path / f"{count}.h5").stat().st_size)
-    assert sizes[1] < 8 * sizes[0]
+    found = memscal.measure_stress(memscal.simulate(film=SENSOR.film, points=2000), SENSOR)
+    found.save(tmp_path / "many.h5")
+    found.plot().savefig(tmp_path / "many.svg")
+    assert memscal.read_stress(tmp_path / "many.h5") == found
+    # A matrix over the points would have 32 MB.
+    assert (tmp_path / "many.h5").stat().st_size < 2_000_000
     assert (tmp_path / "many.svg").stat().st_size < 500_000
 
 

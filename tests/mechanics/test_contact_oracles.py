@@ -195,12 +195,6 @@ def test_rings_and_spherical_bessel_functions_solve_the_same_rod(nu: float) -> N
     assert np.max(np.abs(difference)) < 1e-6 * by_series.max_base_stress
 
 
-def test_load_and_depth_are_two_ways_to_one_contact() -> None:
-    by_load = indent(film(), SPHERE, load=1.0, friction=0.3)
-    by_depth = indent(film(), SPHERE, depth=by_load.depth, friction=0.3)
-    assert by_depth.load == pytest.approx(by_load.load, rel=3e-5)
-
-
 def test_a_contact_does_not_depend_on_the_rings_by_more_than_it_says() -> None:
     for friction in (0.0, 0.3, math.inf):
         coarse = indent(film(), SPHERE, load=1.37, friction=friction, rings=48)

@@ -104,6 +104,13 @@ def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer() -> None:
     np.testing.assert_allclose(field.base(r, 0), 1e4, rtol=1e-6)
 
 
+def test_a_film_that_ends_near_the_load_is_softer() -> None:
+    ours = elements(0.5, 0.5)
+    cut = ElementFilm(ours.film, ours.r, radius=0.8 * H).compliance.normal
+    p = tractions(ours.r)[0]
+    assert (cut @ p)[0] > 1.005 * (ours.compliance.normal @ p)[0]
+
+
 def test_beyond_the_edge_there_is_neither_stress_nor_surface() -> None:
     ours = elements(0.5, 0.5)
     field = ours.field(*tractions(ours.r))
