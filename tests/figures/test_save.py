@@ -6,7 +6,6 @@ import sys
 
 import pytest
 
-from memscal.errors import InputError
 from memscal.figures.style import figure_format, panels_of, render_figure
 
 
@@ -39,12 +38,6 @@ def test_a_file_begins_and_ends_as_its_kind_and_holds_no_date(figure, file_forma
     assert data.endswith(end)
     assert b"CreationDate" not in data
     assert b"dc:date" not in data
-
-
-@pytest.mark.parametrize("suffix", [".jpg", "", ".exe"])
-def test_another_suffix_is_refused_with_the_allowed_ones_named(suffix):
-    with pytest.raises(InputError, match=r"\.png, \.svg, \.pdf"):
-        figure_format(suffix)
 
 
 def test_drawing_needs_no_pyplot_and_the_rest_no_matplotlib():

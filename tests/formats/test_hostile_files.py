@@ -409,13 +409,6 @@ def test_a_file_over_the_size_limit_is_refused_unread(tmp_path: Path):
         read_scan(path)
 
 
-def test_a_text_file_is_not_taken_for_hdf5(tmp_path: Path):
-    path = tmp_path / "scan.csv"
-    path.write_text("x,u\n0,1\n")
-    with pytest.raises(FormatError, match=r"scan\.csv is not an HDF5 file"):
-        read_scan(path)
-
-
 def test_every_truncation_is_an_error_of_ours(path: Path):
     data = path.read_bytes()
     for length in [*range(0, 2048, 64), *range(2048, len(data), 1999), len(data) - 1]:
@@ -456,10 +449,3 @@ def test_the_plugin_path_is_off_before_the_hdf5_library_starts(tmp_path: Path):
         [sys.executable, "-c", watch], capture_output=True, text=True, env=environment, check=True
     )
     assert done.stdout.strip() == "::"
-
-
-def test_reading_leaves_the_file_as_it_was(path: Path):
-    before = path.read_bytes()
-    path.chmod(0o444)
-    read_scan(path)
-    assert path.read_bytes() == before
