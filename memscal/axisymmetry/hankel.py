@@ -153,7 +153,13 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
     r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table (r,) or (r, m) up to its end."""
     spline, sharp = table_spline(*_mirrored(r, f, order))
     knots = r if sharp else r[::_INTERVALS_PER_PANEL]
-    edges = _panel_edges(knots, float(r[-1]), float(np.max(np.abs(k))))
+    knots = np.unique(np.concatenate([[0.0], knots, r[-1:]]))
+    # Panels between knots that hold little of a phase.
+    phases = np.diff(knots) * np.max(np.abs(k))
+    pieces = np.maximum(np.ceil(phases / _TABLE_PHASE), 1).astype(int)
+    widths = np.repeat(np.diff(knots) / pieces, pieces)
+    within = np.concatenate([np.arange(count) for count in pieces])
+    edges = np.append(np.repeat(knots[:-1], pieces) + within * widths, knots[-1])
     nodes, weights = gauss_between(edges, _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
     matrix = bessel(order, np.multiply.outer(k, nodes))
@@ -177,12 +183,3 @@ def _kept_table(r: bytes, k: bytes, order: int) -> FloatArray:
     table = bessel(order, np.multiply.outer(np.frombuffer(r), np.frombuffer(k)))
     table.flags.writeable = False
     return table
-
-
-def _panel_edges(knots: FloatArray, end: float, fastest: float) -> FloatArray:
-    """Ends of panels between knots from the axis to ``end`` that hold little of a phase."""
-    knots = np.unique(np.concatenate([[0.0], knots, [end]]))
-    pieces = np.maximum(np.ceil(np.diff(knots) * fastest / _TABLE_PHASE), 1).astype(int)
-    widths = np.repeat(np.diff(knots) / pieces, pieces)
-    within = np.concatenate([np.arange(count) for count in pieces])
-    return np.append(np.repeat(knots[:-1], pieces) + within * widths, knots[-1])

@@ -211,11 +211,6 @@ class ProfileEstimate:
         return float(np.abs(self.predicted - self.background).max())
 
 
-def fitted_gaussian(points: ScanPoints, *references: RadialSpectrum) -> GaussianFit:
-    """Fit a Gaussian to the points at their stated noise."""
-    return fit_gaussian_to_points(forward_model(points, references), _stated_weights(points))
-
-
 def estimate_profile(
     points: ScanPoints,
     *references: RadialSpectrum,
@@ -226,13 +221,13 @@ def estimate_profile(
     # With ``angular`` also what of a sensor that was scanned over the plane is not round.
     # ``start``, of nearly the same voltages at the same points, spares the search.
     model = forward_model(points, references)
-    fit = start.gaussian if start else fit_gaussian_to_points(model, _stated_weights(points))
+    fit = start.gaussian if start else fit_gaussian_to_points(model, stated_weights(points))
     kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
     along = np.argmax(points.free[points.scan], axis=1), range(points.u.size)
     # Uncertain positions make noise where U is steep.
-    stated = _stated_weights(points, slope[along] * points.x_errors)
+    stated = stated_weights(points, slope[along] * points.x_errors)
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
     angular = angular and points.planar and not points.order
@@ -322,7 +317,7 @@ def _least_noise(fit: GaussianFit) -> float:
     return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
 
 
-def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:
+def stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:
     """Inverse variance of each voltage as stated; ones where nothing is."""
     if points.u_errors is None:
         return np.ones_like(points.u)

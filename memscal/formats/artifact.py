@@ -91,7 +91,12 @@ def artifact_tree(data: ApparatusData) -> Group:
         "process": write_record(records.PROCESS, data.process),
     }
     if data.kernel_changes:
-        children["kernel_changes"] = _changes_group(data)
+        names, changes = zip(*data.kernel_changes.items(), strict=True)
+        group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})
+        listed = to_json("inputs", list(names))
+        radii = si(data.radial_profile.r, "length", ("r",))
+        group = replace(group, children={"names": listed, **group.children, "r": radii})
+        children["kernel_changes"] = group
     if data.other is not None:
         name = data.other.route
         radial = data.other.radial_profile
@@ -105,15 +110,6 @@ def artifact_tree(data: ApparatusData) -> Group:
         default = "apparatus_function"
         children[default] = write_record(records.FIELD, data.plane)
     return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": default}))
-
-
-def _changes_group(data: ApparatusData) -> Group:
-    """Return what one standard uncertainty of each input does to A G, beside the radii."""
-    names, changes = zip(*data.kernel_changes.items(), strict=True)
-    group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})
-    radii = si(data.radial_profile.r, "length", ("r",))
-    listed = to_json("inputs", list(names))
-    return replace(group, children={"names": listed, **group.children, "r": radii})
 
 
 def _read_changes(file: SafeFile) -> dict[str, FloatArray]:

@@ -31,7 +31,7 @@ from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, 
 from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
+from memscal.model.quantities import TRUTH, Quantity, Record, estimated_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import IdealReference, StressField, StressProfile
 
@@ -179,9 +179,10 @@ _COVARIANCE = (
 
 def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name."""
-    declared = declared_quantity(name)
-    if declared is not None and (not unit or reading != VOLTS):
-        return declared.read_in(reading).dimension
+    known = [declared for declared in TRUTH if name == declared or name.startswith(f"{declared}_")]
+    if known and (not unit or reading != VOLTS):
+        # The longest name that the parameter's begins with.
+        return TRUTH[max(known, key=len)].read_in(reading).dimension
     if unit:
         return dimension_of(unit, f"parameter {name}")
     raise InputError(

@@ -46,21 +46,19 @@ def opened_contacts(
     contacts: Contacts, *, accept_altered: bool = False
 ) -> tuple[Scan | MeasuredStress, ...]:
     """Return scans and measured stresses that are given themselves or as paths, at least one."""
-    opened = [_scan_or_stress(item, accept_altered) for item in _listed(contacts)]
+    opened: list[Scan | MeasuredStress] = []
+    for item in _listed(contacts):
+        if isinstance(item, MeasuredStress):
+            opened.append(item)
+        elif isinstance(item, str | PathLike):
+            with open_hdf5(item, accept_altered=accept_altered) as file:
+                is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
+                opened.append(stress_from(file) if is_stress else scan_from(file))
+        else:
+            opened.append(opened_scan(item))
     if len(opened) > 1:
         require_different(_contents(item) for item in opened if isinstance(item, Scan))
     return tuple(opened)
-
-
-def _scan_or_stress(item: Any, accept_altered: bool) -> Scan | MeasuredStress:
-    if isinstance(item, MeasuredStress):
-        return item
-    if not isinstance(item, str | PathLike):
-        return opened_scan(item)
-    with open_hdf5(item, accept_altered=accept_altered) as file:
-        if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
-            return stress_from(file)
-        return scan_from(file)
 
 
 def _contents(scan: Scan) -> tuple[str, Hashable]:

@@ -36,16 +36,20 @@ class FrictionFit:
 
         Loads that are ``held`` at no friction tell what errors all loads share.
         """
-
-        def likelihood_at(value: float, loads: Sequence[int]) -> Likelihood:
-            """Likelihood of some of the loads at one value."""
-            shear = None if self.shear is None else self.shear.at(value).only(loads)
-            return likelihood(self.channel.at(value).only(loads), shear)
-
-        frictionless = likelihood_at(float(self.channel.family.values[0]), held)
         along = self.whole.only(chosen).with_held(self.whole.only(held))
+        none = float(self.channel.family.values[0])
+        channel = self.channel.only(chosen)
+        frictionless = self.channel.at(none).only(held)
+        if self.shear is None:
+            without = likelihood(frictionless)
+            return self._estimate(
+                along, lambda value: likelihood(channel.at(value)).with_held(without)
+            )
+        shear = self.shear.only(chosen)
+        without = likelihood(frictionless, self.shear.at(none).only(held))
         return self._estimate(
-            along, lambda value: likelihood_at(value, chosen).with_held(frictionless)
+            along,
+            lambda value: likelihood(channel.at(value), shear.at(value)).with_held(without),
         )
 
     def coefficient_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
@@ -53,13 +57,9 @@ class FrictionFit:
         a = self.channel.sensor.conversion_constant
         noise = a * random_uncertainty(profile.maximum_budget)
         top = points_at(np.zeros(1), self.channel.points[index], a * profile.maximum, noise)
-
-        def likelihood_of(channel: Channel) -> Likelihood:
-            """Likelihood of the maximum alone."""
-            return likelihood(replace(channel.only([index]), points=[top]))
-
-        along = likelihood_of(self.fine)
-        return self._estimate(along, lambda value: likelihood_of(self.channel.at(value)))
+        channel = replace(self.channel.only([index]), points=[top])
+        along = likelihood(replace(self.fine.only([index]), points=[top]))
+        return self._estimate(along, lambda value: likelihood(channel.at(value)))
 
     def _estimate(self, along: Likelihood, at: Callable[[float], Likelihood]) -> BoundedEstimate:
         """Return the best coefficient with its interval; its budget by the slope at its value."""

@@ -29,9 +29,8 @@ from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
 from memscal.measurement.posterior import (
-    apparatus_changes,
     input_changes,
-    sensor_transfer,
+    sensor_changes,
     shared_changes,
 )
 from memscal.model.arrays import FloatArray
@@ -185,7 +184,7 @@ def sensor_of(
     shared = {name: change for name, change in known.items() if name in (*family.changes, "load")}
     inputs = [name for name in common if name not in shared]
     calibration = input_changes(apparatus, inputs, nodes.k)
-    changes = apparatus_changes(apparatus, nodes.k, [*shared, *calibration])
+    transfer, changes = sensor_changes(apparatus, nodes.k, [*shared, *calibration])
     shared |= {f"calibration_{name}": change for name, change in calibration.items()}
     if changes.shape[1]:
         # Any rotation of independent changes is another set of them: in this one few matter.
@@ -198,8 +197,7 @@ def sensor_of(
         _, sizes, axes = np.linalg.svd(np.concatenate(signals), full_matrices=False)
         changes = changes @ axes[sizes > _NEGLIGIBLE * sizes[0]].T
     constant = apparatus.conversion_constant
-    transfer = constant * sensor_transfer(apparatus, nodes.k)
-    return Sensor(nodes, transfer, changes, constant, family.order, shared)
+    return Sensor(nodes, constant * transfer, changes, constant, family.order, shared)
 
 
 @dataclass(frozen=True, eq=False)

@@ -171,7 +171,21 @@ def measure_stress(
         overridden += restore.accept_mismatches(data, sensor, override=override)
     for data in scans:
         require_span(data)
-    origins = tuple(one_load.measured_scan(data) for data in scans)
+    origins = []
+    for data in scans:
+        origin = MeasuredScan(
+            film=data.set_up.film,
+            indenter=data.set_up.indenter,
+            sensor=data.sensor,
+            load_cell=data.load_cell,
+            width=one_load.width_of(data),
+            lubrication=data.lubrication,
+            position_scale_uncertainty=data.position_scale_uncertainty,
+            synthetic=bool(data.synthetic),
+            source=data.source,
+            unit="" if data.unit == "V" else data.unit,
+        )
+        origins.append(origin)
     singles = [restore.single_loads(data) for data in scans]
     for single in chain(*singles):
         restore.require_contact_size(single)
@@ -184,7 +198,7 @@ def measure_stress(
     checks = stress_checks(profiles, restored)
     return MeasuredStress(
         profiles=profiles,
-        scans=origins,
+        scans=tuple(origins),
         conversion_constant=sensor.conversion_constant,
         conversion_constant_uncertainty=sensor.parameters.uncertainty("conversion_constant"),
         checks=checks,

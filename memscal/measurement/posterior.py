@@ -314,24 +314,17 @@ class Posterior:
     shifts: Mapping[str, FloatArray]  # (n, q) by source: change of the voltages, in V
     changes: Mapping[str, FloatArray]  # (s, q) by source: change of the state
     film_inputs: tuple[str, ...]  # whose uncertainties the columns of source ``film`` are
+    nodes: int  # how many entries of the state are the transform
+    first_drift: int  # place of the baseline, behind the free centre
     residual: FloatArray  # (n,), in V
     found_noise: float  # of a point of weight one, in V, or over the stated uncertainties
+    noise_ratio: float  # adopted noise over the Gaussian estimate's
     resolved_wavenumber: float  # where the uncertainty is a third of the Gaussian's, rad/m
 
     @property
     def covariance(self) -> FloatArray:
         """Covariance of the state, all sources together."""
         return np.asarray(np.sum(list(self.covariances.values()), axis=0))
-
-    @property
-    def noise_ratio(self) -> float:
-        """Adopted noise over the Gaussian estimate's."""
-        return self.estimate.adopted_noise(self.found_noise) / self.estimate.noise_scale
-
-    @property
-    def nodes(self) -> int:
-        """How many entries of the state are the transform."""
-        return self.estimate.model.k.size
 
     @property
     def stress(self) -> FloatArray:
@@ -341,17 +334,12 @@ class Posterior:
     @property
     def drift(self) -> FloatArray:
         """Baseline and drift, in V, that the drift's columns belong to."""
-        return self.state[self.nodes + int(self.estimate.points.free.sum()) :]
+        return self.state[self.first_drift :]
 
 
 def reach_of(points: ScanPoints) -> float:
     """Return the radius out to which a scan's stress is computed, in m."""
     return _REACH * float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
-
-
-def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
-    """Return the transform of G at ``k`` (rad/m), as a convolution with it has it."""
-    return _sensor_changes(apparatus, k.tobytes())[0]
 
 
 def posterior_of(
@@ -377,7 +365,7 @@ def posterior_of(
     of_film = np.reshape(by_film, (-1, nodes)).T
     of_kernel = np.reshape(by_sensor, (-1, nodes)).T
     together = of_film * transfer[:, None] + of_kernel * film[:, None]
-    sensor = apparatus_changes(apparatus, model.k, shared)
+    _, sensor = sensor_changes(apparatus, model.k, shared)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
     stretched = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
     shifts = {
@@ -407,8 +395,11 @@ def posterior_of(
         shifts=shifts,
         changes=changes,
         film_inputs=names,
+        nodes=nodes,
+        first_drift=nodes + int(estimate.points.free.sum()),
         residual=averaged.residual,
         found_noise=averaged.noise,
+        noise_ratio=estimate.adopted_noise(averaged.noise) / estimate.noise_scale,
         resolved_wavenumber=float(min(resolved, np.pi / estimate.points.step)),
     )
 
@@ -426,14 +417,15 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     return columns
 
 
-def apparatus_changes(
+def sensor_changes(
     apparatus: ApparatusFunction, k: FloatArray, without: Iterable[str] = ()
-) -> FloatArray:
-    """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa.
+) -> tuple[FloatArray, FloatArray]:
+    """Return the transform of G, as a convolution has it, and changes of that of A G, in V/Pa.
 
-    Those ``without`` which they are asked for are left to :func:`shared_changes`.
+    The changes (n, q) by one uncertainty are independent; those ``without`` which they are asked
+    for are left to :func:`shared_changes`.
     """
-    return _sensor_changes(apparatus, k.tobytes(), tuple(without))[1]
+    return _sensor_changes(apparatus, k.tobytes(), tuple(without))
 
 
 #: Properties of a film that sensor and contact have in common, by their names in budgets.

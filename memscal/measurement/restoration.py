@@ -14,7 +14,7 @@ from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.formats.reference import read_reference
-from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
+from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
@@ -176,7 +176,7 @@ class Restoration(Result, Checked):
     @property
     def baseline_uncertainty(self) -> float:
         """Standard uncertainty of :attr:`baseline`, in V."""
-        return float(np.sqrt(np.diag(self.posterior.covariance)[self._first_drift]))
+        return float(np.sqrt(np.diag(self.posterior.covariance)[self.posterior.first_drift]))
 
     @property
     def resolved_wavenumber(self) -> float:
@@ -232,7 +232,7 @@ class Restoration(Result, Checked):
 
     def blurred_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
-        transfer = sensor_transfer(self.apparatus, self.posterior.estimate.model.k)
+        transfer, _ = sensor_changes(self.apparatus, self.posterior.estimate.model.k)
         return np.asarray(self._synthesis(r) @ (transfer * self.posterior.stress))
 
     def compare(self, expected: Expected) -> StressComparison:
@@ -271,16 +271,12 @@ class Restoration(Result, Checked):
         Of the centre only the coordinates that the scan determines: shape (4, 4) or (5, 5).
         """
         nodes = self.posterior.nodes
-        first_drift = self._first_drift
+        first_drift = self.posterior.first_drift
         rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
         rows[0, :nodes] = self._at_zero
         rows[1, :nodes] = self._synthesis(0.0)
         rows[2:, nodes : first_drift + 1] = np.eye(first_drift + 1 - nodes)
         return np.asarray(rows @ self.posterior.covariance @ rows.T)
-
-    @property
-    def _first_drift(self) -> int:
-        return self.posterior.nodes + int(self.points.free.sum())
 
     @property
     def _at_zero(self) -> FloatArray:
@@ -292,7 +288,7 @@ class Restoration(Result, Checked):
 
     def _along_free(self, values: FloatArray) -> FloatArray:
         centre = np.zeros(2)
-        centre[self.points.free[0]] = values[self.posterior.nodes : self._first_drift]
+        centre[self.points.free[0]] = values[self.posterior.nodes : self.posterior.first_drift]
         return centre
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:

@@ -15,12 +15,11 @@ from memscal.errors import FitError, InputError
 from memscal.estimation import points as scan_points
 from memscal.estimation import profile
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
-from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
 from memscal.formats.opened import opened_scan
 from memscal.formats.reference import read_reference
-from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
+from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_changes
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
@@ -434,33 +433,25 @@ def gaussian_pressure(
     start: profile.ProfileEstimate | None = None,
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
-    through, transfer = _reference(scan, apparatus, points)
-    with _undetermined():
+    through, transfer = unit_force(scan, apparatus, points)
+    with undetermined():
         return profile.estimate_profile(points, through, start=start), transfer
 
 
-def plain_pressure(
-    scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
-) -> GaussianFit:
-    """Return the best Gaussian pressure without departures, in a tenth of the time."""
-    with _undetermined():
-        return profile.fitted_gaussian(points, _reference(scan, apparatus, points)[0])
-
-
-def _reference(
+def unit_force(
     scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
 ) -> tuple[RadialSpectrum, FloatArray]:
     """Transform of a unit force's voltages, in V m^2 / N, and that of A G, in V/Pa."""
     # A film passes nothing of exp(-kh) beyond kh = 20: 2e-9 of the load.
     wavenumbers = Wavenumbers.covering(20.0 / scan.set_up.film.thickness, reach_of(points))
-    transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
+    transfer = apparatus.conversion_constant * sensor_changes(apparatus, wavenumbers.k)[0]
     return RadialSpectrum(
         wavenumbers, transfer * film_transfer(scan.set_up.expected, wavenumbers)
     ), transfer
 
 
 @contextmanager
-def _undetermined() -> Iterator[None]:
+def undetermined() -> Iterator[None]:
     """Say of a pressure that no Gaussian fits what this means."""
     try:
         yield

@@ -240,12 +240,6 @@ TRUTH = ESTIMATED | by_name(_TRUTH)
 """The truth of a simulated experiment: what is estimated, film and indenter, what went wrong."""
 
 
-def declared_quantity(name: str) -> Quantity | None:
-    """Return the quantity that a parameter's name begins with, the longest that fits."""
-    names = [declared for declared in TRUTH if name == declared or name.startswith(f"{declared}_")]
-    return TRUTH[max(names, key=len)] if names else None
-
-
 def name_and_scan(name: str) -> tuple[str, str]:
     """Return a parameter's name without the number of its scan, and that number if it has one."""
     start, _, number = name.rpartition("_")

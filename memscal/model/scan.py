@@ -246,8 +246,7 @@ class Scan:
         self._check_signal_shape()
         self._freeze_readings()
         self._check_values()
-        self._check_load()
-        self._check_direction()
+        self._check_set_up()
         require_contacts(self)
         arrays.warn_of_units(self.film, self.indenter)
         if self.u_zz_correlation is not None:
@@ -447,7 +446,13 @@ class Scan:
             cure = "Leave it out, and state the one load of all points."
             raise InputError("normal_load is missing (NaN) at every point.", cure=cure)
 
-    def _check_load(self) -> None:
+    def _check_set_up(self) -> None:
+        if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
+            cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
+            raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
+        arrays.require_non_negative(
+            "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
+        )
         require_rod_friction(self.rod_friction)
         arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.load is None:
@@ -465,14 +470,6 @@ class Scan:
                 why="By a load that may be zero nothing is known of the stress.",
                 cure=f"Give it in N: 1 % of the load are {0.01 * self.load:g} N.",
             )
-
-    def _check_direction(self) -> None:
-        if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
-            cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
-            raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
-        arrays.require_non_negative(
-            "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
-        )
 
 
 def common_circumstances(scans: Sequence[Scan]) -> dict[str, Any]:
