@@ -98,7 +98,7 @@ def artifact_tree(data: ApparatusData) -> Group:
         group = replace(group, children={"names": listed, **group.children, "r": radii})
         children["kernel_changes"] = group
     if data.other is not None:
-        name = data.other.route
+        name = "bayesian" if data.other.method == "bayesian" else "division"
         radial = data.other.radial_profile
         children |= {
             f"radial_profile_{name}": write_record(records.RADIAL, radial),

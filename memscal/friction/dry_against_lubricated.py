@@ -27,6 +27,8 @@ _SAME_LOAD = 0.05
 #: Places that are nearer than this share of a step are one.
 _CLOSE = 0.25
 _FEWEST_PLACES = 6
+#: Arrays with one entry for each point.
+_BY_POINT = ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "flat")
 
 
 def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int]]:
@@ -52,14 +54,20 @@ def dry_against_lubricated(
     places = _common_places(averaged[0].offset, averaged[1].offset)
     if places[0].size < _FEWEST_PLACES:
         return None
-    dry, lubricated = (_at_places(*each) for each in zip(averaged, places, strict=True))
+    common = []
+    for points, chosen in zip(averaged, places, strict=True):
+        arrays: dict[str, Any] = {name: getattr(points, name)[chosen] for name in _BY_POINT}
+        if points.correlation is not None:
+            arrays["correlation"] = points.correlation[np.ix_(chosen, chosen)]
+        common.append(replace(points, **arrays))
+    dry, lubricated = common
     dry_contact = predict(dry, sensor, frictionless.family, pair[0])
     lubricated_contact = predict(lubricated, sensor, frictionless.family, pair[1])
 
     # Voltages: what the frictionless contact says of other places and loads is taken off both.
     voltage = dry.u - dry_contact.signal[0] - (lubricated.u - lubricated_contact.signal[0])
     noise, correlation = _noise_of_difference((dry, dry_contact), (lubricated, lubricated_contact))
-    by_centre = dry_contact.slope[0] * dry.side
+    by_centre = -dry_contact.slope[0] * np.sign(dry.offset)
     flat = np.column_stack([dry.flat, by_centre])
     apart = points_at(dry.offset, dry, voltage, noise)
     apart = replace(apart, flat=flat, correlation=correlation)
@@ -142,17 +150,6 @@ def _stress_at(profile: MeasuredProfile, places: IndexArray) -> tuple[FloatArray
     order = np.argsort((profile.x, profile.y)[profile.axis])[places]
     sources = [source for source in profile.roots if source != "conversion_constant"]
     return profile.s_zz[order], profile.errors_by(*sources)[order] ** 2
-
-
-def _at_places(points: LoadPoints, places: IndexArray) -> LoadPoints:
-    """Return the points at some places alone."""
-    arrays: dict[str, Any] = {
-        name: getattr(points, name)[places]
-        for name in ("u", "offset", "log_load", "noise", "load_errors", "x_errors", "flat")
-    }
-    if points.correlation is not None:
-        arrays["correlation"] = points.correlation[np.ix_(places, places)]
-    return replace(points, **arrays)
 
 
 def _noise_of_difference(

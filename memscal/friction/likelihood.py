@@ -62,11 +62,6 @@ class LoadPoints:
         return np.abs(self.offset)
 
     @property
-    def side(self) -> FloatArray:
-        """Change of the distance for a shift of the centre: one, minus one, or zero."""
-        return -np.sign(self.offset)
-
-    @property
     def degrees(self) -> int:
         """Points less flat parameters."""
         return int(self.u.size - self.flat.shape[1]) - int(self.free_centre)
@@ -372,7 +367,7 @@ class Standardised:
 def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     """Divide by the noise, and project out what is flat."""
     shape = predicted.signal.shape
-    by_centre = predicted.slope * points.side
+    by_centre = -predicted.slope * np.sign(points.offset)
     kinds = {
         "noise": np.broadcast_to(points.noise, shape),
         "load_scatter": predicted.by_load * points.load_errors,

@@ -216,11 +216,6 @@ class OtherEstimate:
     parameters: ParameterSet
     radial_profile: ApparatusRadial
 
-    @property
-    def route(self) -> str:
-        """``"bayesian"`` or ``"division"``."""
-        return self.method if self.method == "bayesian" else "division"
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ApparatusData(Checked):
