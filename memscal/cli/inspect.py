@@ -45,7 +45,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     rows = [("schema", f"{contents['schema']} {contents['schema_version']}")]
     named = [name for name in ("title", "sha256", "altered") if contents.get(name)]
     rows += [(name, contents[name]) for name in named]
-    yield Table(str(contents["file"]), ("", ""), rows)
+    yield Table(contents["file"], ("", ""), rows)
 
     quantities = [(_words(item), _value(item), item["path"]) for item in contents["quantities"]]
     title = "Quantities (± standard uncertainty, k = 1)"
@@ -105,12 +105,12 @@ def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
     """Return the unit in which the command line asks for such a quantity, and the factor to it."""
     from memscal.formats.units import dimension_of, to_si
 
-    unit = str(item["unit"])
-    path = str(item["path"])
+    unit = item["unit"]
+    path = item["path"]
     dimension = dimension_of(unit, path)
     if dimension == "length":
         return float(to_si(1e3, unit, dimension, path)), "mm"
-    if dimension == "stress" and str(item["name"]).endswith("modulus"):
+    if dimension == "stress" and item["name"].endswith("modulus"):
         return float(to_si(1e-6, unit, dimension, path)), "MPa"
     return 1.0, unit
 
@@ -130,6 +130,6 @@ def _provenance(provenance: Mapping[str, Any]) -> Iterator[Table]:
             groups.append(Table(words.capitalize(), ("", ""), held))
         else:
             lines = value if isinstance(value, list) else str(value).splitlines()
-            rows += [(words, str(line)) for line in lines if line]
+            rows += [(words, line) for line in lines if line]
     yield Table("Provenance", ("", ""), rows)
     yield from groups

@@ -71,7 +71,7 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     inside = radial.r <= _shown_radius(radial)
     smallest = np.min(np.maximum(radial.g_gaussian[inside], 10**-_LOG_DECADES * peak))
-    floor = max(0.3 * float(smallest), 10**-_LOG_DECADES * peak)
+    floor = max(0.3 * smallest, 10**-_LOG_DECADES * peak)
     _draw_profiles(axes, data, floor=0.1 * floor)
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
     axes.set_xlabel(ALONG_RADIUS)
@@ -81,7 +81,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     """Draw the transfer function's modulus, the window, and the resolved band."""
     transfer = data.transfer
     limit = transfer.resolved_wavenumber / PER_MM
-    end = float(transfer.k[-1]) / PER_MM
+    end = transfer.k[-1] / PER_MM
     if 0 < limit < np.inf:
         end = min(end, 2.0 * limit)
     k = np.linspace(0.0, end, _FINE)
@@ -132,7 +132,7 @@ def _shown_radius(radial: ApparatusRadial) -> float:
 
 def _largest(values: FloatArray, floor: float = 1e-300) -> float:
     finite = values[np.isfinite(values)]
-    return max(float(np.max(finite)), floor) if finite.size else floor
+    return max(np.max(finite), floor) if finite.size else floor
 
 
 _RESIDUALS = (-3.5, 3.5)

@@ -315,7 +315,7 @@ def _finite_errors(errors: FloatArray) -> FloatArray:
 
 def _limit_to_scan(axes: Axes, x: FloatArray) -> None:
     """Show the positions (m) of the scan, whatever the reference reaches."""
-    margin = 0.03 * float(np.ptp(x)) or MM
+    margin = 0.03 * np.ptp(x) or MM
     axes.set_xlim((np.min(x) - margin) / MM, (np.max(x) + margin) / MM)
 
 
@@ -325,7 +325,7 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     with_g, with_gaussian, scale = standardised(scan)
     # One outlier cannot stretch the axis.
     sizes = np.abs([with_g, with_gaussian])
-    limit = float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
+    limit = max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9)))
     style.draw_residual_band(axes)
     many = scan.x.size > style.SCATTER_THRESHOLD
     common = {"ls": "none", "ms": 1.2 if many else style.marker_size(scan.x.size)}
@@ -362,7 +362,7 @@ def standardised(scan: Reconvolution) -> tuple[FloatArray, FloatArray, str]:
     scale = "$u$"
     if not np.all(np.isfinite(errors) & (errors > 0)):
         # Without a stated uncertainty residuals are shown over their own rms.
-        rms = float(np.sqrt(np.mean(scan.residual**2)))
+        rms = np.sqrt(np.mean(scan.residual**2))
         errors = np.full(errors.shape, rms if rms > 0 else 1.0)
         scale = "own rms"
     return scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors, scale
@@ -382,7 +382,7 @@ def points_by_load(data: ApparatusData) -> Loads:
     parts = []
     for i in range(counts.size):
         points = some_points(scan, group == i)
-        load = float(scan.load[group == i].mean())
+        load = scan.load[group == i].mean()
         parts.append((f"{load:.3g} N", replace(data, load=load, reconvolution=points)))
     return parts
 

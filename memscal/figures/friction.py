@@ -68,7 +68,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
     shown[[0, -1]] = True
     drawn = {}
     for i in np.flatnonzero(shown):
-        mu = float(comparison.friction[i])
+        mu = comparison.friction[i]
         drawn[mu] = curves[:, i]
         (line,) = axes.plot(loads, drawn[mu], color=friction_colour(mu), lw=0.9)
         line.set_gid(f"mu={mu:g}")
@@ -105,7 +105,7 @@ def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArr
         axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= last])
         look |= {"xytext": (-7, 0), "ha": "right"}
     for group in groups:
-        height = float(np.mean(group[:, 0]))
+        height = np.mean(group[:, 0])
         low = group[:, 1].min()
         high = group[:, 1].max()
         name = _name_of_range(low, high)
@@ -124,7 +124,7 @@ def _name_of_range(low: float, high: float) -> str:
 def _apart(axes: Axes, curves: Mapping[float, FloatArray], end: int) -> list[FloatArray]:
     """Group the values of the curves at an end, (n, 2) with their coefficients, by nearness."""
     bottom, top = axes.get_ylim()
-    values = np.array(sorted((float(curve[end]), mu) for mu, curve in curves.items()))
+    values = np.array(sorted((curve[end], mu) for mu, curve in curves.items()))
     apart = np.diff(values[:, 0]) >= _APART * (top - bottom)
     return np.split(values, np.flatnonzero(apart) + 1)
 
@@ -325,4 +325,4 @@ def draw_levels(axes: Axes) -> None:
 
 def deviance_rise(reading: BoundedEstimate) -> FloatArray:
     """Return the deviance over its least value."""
-    return np.asarray(reading.deviance) - float(np.min(reading.deviance))
+    return reading.deviance - np.min(reading.deviance)

@@ -154,7 +154,7 @@ def profile_figure(
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         largest = 0.0
         for axes, index in zip(panels[1], (0, -1), strict=True):
-            friction = float(comparison.friction[index])
+            friction = comparison.friction[index]
             largest = max(largest, draw_residuals(axes, comparison, loads, friction))
         share_limits(panels[1], largest)
     return figure
@@ -195,7 +195,7 @@ def draw_profiles(
 def _finish_logarithmic(
     axes: Axes, loads: Sequence[LoadComparison], styles: Mapping[str, str]
 ) -> None:
-    top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
+    top = max(at_load.profile.s_zz.max() for at_load in loads) / KPA
     axes.set_yscale("log")
     axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
     for ls, label in styles.items():
@@ -207,7 +207,7 @@ def _finish_logarithmic(
 
 def _finish_linear(axes: Axes, loads: Sequence[LoadComparison], styles: Mapping[str, str]) -> None:
     draw_zero(axes)
-    axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
+    axes.set_xlim(0, max(at_load.profile.r[-1] for at_load in loads) / MM)
     lines = [lubricated_words(loads[0].lubrication)]
     if loads[0].loading:
         lines.append(f"{loads[0].loading} loading")
@@ -323,7 +323,7 @@ def _legend_of_friction(
     point.set_label(f"measured, {lubricated_words(at_load.lubrication)}")
     handles = [point]
     for i in _shown_indices(comparison):
-        mu = float(comparison.friction[i])
+        mu = comparison.friction[i]
         line = Line2D([], [], color=friction_colour(mu), lw=1.2)
         line.set_label(rf"$\mu$ = {friction_name(mu)}")
         handles.append(line)

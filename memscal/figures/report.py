@@ -389,5 +389,5 @@ def _provenance(report: Report) -> list[Table]:
 
 
 def _named_values(title: str, values: Mapping[str, Any]) -> Table:
-    rows = [(str(name), stated_text(value)) for name, value in values.items()]
+    rows = [(name, stated_text(value)) for name, value in values.items()]
     return Table(title, ("name", "value"), rows)

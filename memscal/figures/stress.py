@@ -119,7 +119,7 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
     points.set(label="scan, blurred stress $S_{zz} = U/A$", rasterized=many)
     points.set_markersize(1.2 if many else 0.8 * style.marker_size(count))
     style.draw_zero(axes)
-    axes.set_xlim(0, max(r[-1], float(restored.distance.max()) / MM))
+    axes.set_xlim(0, max(r[-1], restored.distance.max() / MM))
     axes.set_xlabel(ALONG_RADIUS)
     axes.set_ylabel(r"stress $\sigma_{zz}$ at the base, blurred stress $S_{zz}$ (kPa)")
     style.legend_above(axes, points=count, first=points)
@@ -128,7 +128,7 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
 def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     """Draw residuals over their noise; those beyond the axis are drawn at its edge."""
     z = restored.residual / restored.noise
-    limit = max(_LEAST_LIMIT, min(1.1 * float(np.abs(z).max()), 8.0))
+    limit = max(_LEAST_LIMIT, min(1.1 * np.abs(z).max(), 8.0))
     ordinary = np.abs(z) <= limit
     along = "x" if restored.points.free[0, 0] else "y"
     side = getattr(restored.points, along) / MM
@@ -171,7 +171,7 @@ def _draw_loads(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str])
     axes.plot(depth, load, color=COLOURS["muted"], lw=0.8)
     axes.scatter(depth, load, c=list(colours), s=14, zorder=3)
     axes.set_ylim(bottom=0)
-    axes.set_xlim(left=min(0.0, 1.05 * float(depth.min())))
+    axes.set_xlim(left=min(0.0, 1.05 * depth.min()))
     axes.set(xlabel="depth (µm)", ylabel="load (N)")
 
 
@@ -186,7 +186,7 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
         axes.plot(r / MM, pressure / KPA, color=colour, label=label)
         if contact.friction > 0:
             axes.plot(r / MM, contact.interface_shear(r) / KPA, color=colour, ls="--")
-        top = float(pressure.max())
+        top = pressure.max()
         if not math.isfinite(contact.max_interface_stress):
             top = _SHOWN_MEANS * contact.load / (math.pi * contact.contact_radius**2)
         highest = max(highest, top)

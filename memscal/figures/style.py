@@ -209,7 +209,7 @@ def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
         if radius - last > _CLOSE:
             kept.append(i)
             last = radius
-    return np.asarray(radial_spline(r[kept], values[:, kept].T)(fine)).T
+    return radial_spline(r[kept], values[:, kept].T)(fine).T
 
 
 def marker_size(points: int) -> float:

@@ -69,7 +69,7 @@ KINDS = {
     "text": Kind(lambda _, text: str(text), require_text),
     "note": Kind(lambda _, text: writer.note(text), require_text, inside="/data"),
     "truth": Kind(
-        lambda _, truth: writer.count(int(truth)),
+        lambda _, truth: writer.count(truth),
         lambda file, path: bool(require_scalar(file, path, "dimensionless")),
         always=True,
     ),

@@ -119,8 +119,8 @@ def tables(restored: Restoration) -> list[Table]:
 
 def _stress_table(restored: Restoration) -> Table:
     comparison = restored.comparison
-    strong = np.abs(restored.sigma_zz) > _TAIL * float(np.abs(restored.sigma_zz).max())
-    last = float(restored.r[np.flatnonzero(strong)[-1]])
+    strong = np.abs(restored.sigma_zz) > _TAIL * np.abs(restored.sigma_zz).max()
+    last = restored.r[np.flatnonzero(strong)[-1]]
     step = max(round(last / MM / (_SHOWN_RADII - 1) * 4) / 4, 0.05) * MM
     radii = np.arange(_SHOWN_RADII) * step
     radii = radii[radii <= restored.r[-1]]
@@ -131,7 +131,7 @@ def _stress_table(restored: Restoration) -> Table:
         head.append("calculated")
     rows = []
     for r, s, u in zip(radii, stress, errors, strict=True):
-        row = [f"{r / MM:.4g}", format_measured(float(s), float(u), "kPa")]
+        row = [f"{r / MM:.4g}", format_measured(s, u, "kPa")]
         if comparison is not None:
             row.append(f"{np.interp(r, restored.r, comparison.sigma_zz) / KPA:.4g} kPa")
         rows.append(row)

@@ -112,7 +112,7 @@ def _common_table(stress: MeasuredStress) -> Table:
         shown = quantity.read_in(stress.scans[0].reading)
         rows.append((shown.words, declared.cell(shown, stress, **ratio)))
     points = sum(profile.r.size for profile in stress.profiles)
-    farthest = max(float(profile.r[-1]) for profile in stress.profiles)
+    farthest = max(profile.r[-1] for profile in stress.profiles)
     rows.append(("points", f"{points}, from the axis to {farthest / MM:.3g} mm"))
     return Table("All profiles", ("", ""), rows)
 
@@ -160,8 +160,8 @@ def correlated(stress: MeasuredStress) -> dict[str, Any]:
                 value = value[profile.axis]
                 u = u[profile.axis]
             names.append(f"{name}_{i}")
-            values.append(float(value))
-            spread.append(float(u))
+            values.append(value)
+            spread.append(u)
     covariance = np.diag(np.square(spread))
     forces = slice(0, None, 4)
     for source in SHARED_SOURCES:

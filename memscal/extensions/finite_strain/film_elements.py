@@ -166,7 +166,7 @@ def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     thickness, _, refinement = size
     side = min(_SHARE_OF_CONTACT * contact, _WIDEST_NEAR * thickness) / refinement
-    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
+    even = np.linspace(0.0, contact, np.ceil(contact / side) + 1)
     return _tensor(even, side, _NEAR_A_SPHERE, size)
 
 
@@ -358,7 +358,7 @@ def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> tuple[Float
     gradients = np.zeros((*radius.shape, 5, 12))
     on_axis = radius < 1e-12
     for i, (field,) in enumerate(displacement.basis):
-        value = np.broadcast_to(np.asarray(field), radius.shape)
+        value = np.broadcast_to(field, radius.shape)
         slope = field.grad
         # u/r on the axis is the slope of u.
         hoop = np.where(on_axis, slope[0], value / np.where(on_axis, 1.0, radius))
@@ -370,5 +370,5 @@ def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> tuple[Float
             (3, 6 + i, slope[1]),
         ):
             gradients[:, :, row, column] = derivative
-    pressures = [np.broadcast_to(np.asarray(field), radius.shape) for (field,) in pressure.basis]
+    pressures = [np.broadcast_to(field, radius.shape) for (field,) in pressure.basis]
     return gradients, np.stack(pressures, axis=-1)

@@ -253,12 +253,12 @@ class Pressing:
         solution = tangent.factors.solve(-(change.T @ forces))
         sunk = goal.value - state.depth
         if isinstance(goal, Load):
-            load = -float(np.sum(forces[touching + n]))
+            load = -np.sum(forces[touching + n])
             sunk = (goal.value - load - tangent.pushed @ solution) / tangent.stiffness
         solution = solution + sunk * tangent.along
         free = np.zeros(self.elements.size)
         free[self._free(state)] = solution
-        moved = max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk))
+        moved = max(np.max(np.abs(free[: 2 * n])), abs(sunk))
         for share in _SHARES:
             place = state.place if self.sticking else state.place + share * free[touching]
             x = state.x + share * free
@@ -311,7 +311,7 @@ class Pressing:
         sunk = stiffness @ sinking
         pushed = change.T @ sunk
         along = -factors.solve(pushed)
-        return _Tangent(factors, pushed, along, float(sinking @ sunk + pushed @ along))
+        return _Tangent(factors, pushed, along, sinking @ sunk + pushed @ along)
 
 
 # The first step of a rod, as a share of its radius in depth; those of a sphere to the first goal,

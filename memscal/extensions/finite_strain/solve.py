@@ -267,7 +267,7 @@ class _Request:
         rod = isinstance(self.indenter, Rod)
         # Between the last node that touches and the next.
         field = FiniteStrainField(pressing, pressed)
-        last = int(np.flatnonzero(np.isin(elements.surface, pressed.touching))[-1])
+        last = np.flatnonzero(np.isin(elements.surface, pressed.touching))[-1]
         ends = field.displacements[0][last : last + 2] + field.displacements[2][last : last + 2]
         radius = min(float(np.mean(ends)), self.indenter.extent if rod else math.inf)
         energy = elements.energy(pressed.x) / _MM

@@ -45,7 +45,7 @@ def _distribution(axes: Axes, values: FloatArray, label: str) -> None:
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    centre = float(np.median(values))
+    centre = np.median(values)
     spread = robust_spread(values)
     limit = robust_limit(values.size)
     reach = 1.2 * limit * spread
@@ -97,7 +97,7 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
     y = fleet.wafer_y
     placed = np.isfinite(x) & np.isfinite(y)
     shown: dict[str, Any] = {"rasterized": a.size > _MANY, "linewidths": 0}
-    size = float(np.clip(4e3 / max(a.size, 1), 1, 40))
+    size = np.clip(4e3 / max(a.size, 1), 1, 40)
     if placed.any():
         some = placed & finite
         colours: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, **shown}

@@ -55,7 +55,7 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
             deviations[symbol] = np.zeros(values.size)
             continue
         # Where most values are the same, others are as far as their uncertainty says.
-        spread = robust_spread(known) or float(np.nanmedian(getattr(fleet, f"{name}_errors")))
+        spread = robust_spread(known) or np.nanmedian(getattr(fleet, f"{name}_errors"))
         deviations[symbol] = np.nan_to_num((values - np.median(known)) / (spread or 1.0))
     farthest = np.max([np.abs(z) for z in deviations.values()], axis=0)
     limit = _limit(fleet)

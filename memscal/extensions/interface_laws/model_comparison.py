@@ -101,7 +101,7 @@ def weigh_slip_length(
 
 def weigh_normal_compliance(channel: Channel) -> LawComparison:
     """Weigh a normal compliance against a rigid interface, both without friction."""
-    largest = float(channel.family.values[-1])
+    largest = channel.family.values[-1]
     prior = log_uniform_prior(*(share * largest for share in _NORMAL_SHARES))
     low, high = (share * largest for share in _NORMAL_SHARES_CALCULATED)
     along = curve(channel, also=np.geomspace(low, high, _LENGTHS))
@@ -189,7 +189,7 @@ def _channel(
     profiles: Sequence[MeasuredProfile], apparatus: ApparatusFunction, family: ProfileFamily
 ) -> Channel:
     """Return what was measured with the contacts of a family, one for each profile."""
-    reach = max(float(profile.r[-1]) for profile in profiles)
+    reach = max(profile.r[-1] for profile in profiles)
     points = []
     for profile, load in zip(profiles, family.loads, strict=True):
         stated = load_points(profile)
@@ -282,7 +282,7 @@ def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> Interf
     """Return the law with one parameter for all loads; degrees are points less nuisances."""
     # The evidence is the likelihood averaged over the prior.
     evidence = logsumexp(along.log_likelihood, b=np.diff(prior(along.edges)))
-    best = int(np.argmax(along.log_likelihood))
+    best = np.argmax(along.log_likelihood)
     chi_square = float(along.chi_square[best])
     return InterfaceLaw(
         name=name,
@@ -383,7 +383,7 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
     """Return the first coefficient at which the maximum is as large."""
     if top >= curve.max() * (1 - _STICK):
         return math.inf
-    above = int(np.argmax(curve >= top))
+    above = np.argmax(curve >= top)
     if above == 0:
         return float(values[0])
     below = above - 1
@@ -401,7 +401,7 @@ def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> Bound
         -2 * along.log_likelihood,
         along.chi_square,
         family.scale,
-        reason=lambda interval: _length_reason(what, interval, float(family.values[-1])),
+        reason=lambda interval: _length_reason(what, interval, family.values[-1]),
         two_sided=True,
         unit="m",
     )

@@ -136,7 +136,7 @@ def _run(parts: Iterable[bytes | memoryview], seconds: float, name: str) -> byte
             given.seek(0)
             done = subprocess.run(
                 # Isolated: environment and folder add no modules; the path is in the request.
-                [sys.executable, "-I", "-B", str(_WORKER)],
+                [sys.executable, "-I", "-B", _WORKER],
                 stdin=given,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
@@ -298,7 +298,7 @@ def _cells(
         ):
             raise _unusable(source, "a cell with a node that is not there")
         fields = {key: arrays[i] for key, i in block["data"].items()}
-        yield Cells(int(block["dimension"]), nodes, _fields(fields, len(nodes)))
+        yield Cells(block["dimension"], nodes, _fields(fields, len(nodes)))
 
 
 def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, FloatArray]:

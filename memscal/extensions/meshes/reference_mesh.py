@@ -53,7 +53,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     """Find which coordinates are radial and which is vertical; ``points`` (n, 3) are in m."""
     name = mesh.source.file_name
     inside = points[mesh.used]
-    tolerance = _TOLERANCE * float(np.abs(inside).max())
+    tolerance = _TOLERANCE * np.abs(inside).max()
     varying = [i for i in range(3) if np.ptp(inside[:, i]) > tolerance]
     if len(varying) < 2:
         cure = "Give a section of the film from the axis outward, or the film in 3-D."
@@ -72,7 +72,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     else:
         text = f"The mesh is a section: {AXES[radial[0]]} as the radius and {across} were taken."
     notes = import_notes([text])
-    wide, high = (float(np.ptp(inside[:, i])) * 1e3 for i in (radial[0], up))
+    wide, high = (np.ptp(inside[:, i]) * 1e3 for i in (radial[0], up))
     if high > wide:
         text = (
             f"the mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
@@ -86,8 +86,8 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
 def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
     """Find what lies on the base, at a level of the vertical axis in m: by default the lowest."""
     heights = frame.height[mesh.used]
-    lowest = float(heights.min())
-    highest = float(heights.max())
+    lowest = heights.min()
+    highest = heights.max()
     position = lowest if level is None else level
     # Only where nothing lies above it is the base the upper face of the film.
     outward = 1 if position >= highest - frame.tolerance else -1
@@ -108,7 +108,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
     base_nodes = np.unique(np.concatenate(nodes))
     level_text = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
     if base_nodes.size < _FEWEST:
-        nearest = float(heights[np.argmin(np.abs(heights - position))])
+        nearest = heights[np.argmin(np.abs(heights - position))]
         raise InputError(
             f"Only {base_nodes.size} nodes of the film in {mesh.source.file_name} lie on its base, "
             f"at {level_text}.",
@@ -129,7 +129,7 @@ def average_over_circles(
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
 
-    reach = float(np.hypot(*places.T).max()) or 1.0
+    reach = np.hypot(*places.T).max() or 1.0
     r = np.linspace(0.0, reach, _CIRCLES)
     # On the axis and along an edge of the mesh, rounding decides what is inside.
     directions = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
@@ -148,7 +148,7 @@ def average_over_circles(
     kept = share >= max(1, share.max() / 2)
     means = np.nansum(fields[kept], axis=1) / share[kept, None]
     spread = np.nanmax(np.abs(fields[kept, :, 0] - means[:, :1]))
-    peak = float(np.abs(means[:, 0]).max())
+    peak = np.abs(means[:, 0]).max()
     note = (
         f"Means over {kept.sum()} circles about the axis, interpolated linearly between "
         f"{distinct.shape[0]} places in the base; on a circle the normal stress differs from its "

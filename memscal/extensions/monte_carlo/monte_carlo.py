@@ -103,7 +103,7 @@ class DrawnScans:
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
         joined: dict[str, FloatArray] = dict(zip(self.effects, root @ normal, strict=True))
         if "model_form" in joined:
-            joined["model_form"] = np.asarray(np.sqrt(3) * (2 * ndtr(joined["model_form"]) - 1))
+            joined["model_form"] = np.sqrt(3) * (2 * ndtr(joined["model_form"]) - 1)
         return joined | {item.source: item.truncated(joined[item.source]) for item in self.solved}
 
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
@@ -417,7 +417,7 @@ def _compared(
     u = float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
     # The standard uncertainty of the standard deviation, by the kurtosis of the draws.
     square = (column - mean) ** 2
-    kurtosis = float(np.mean(square**2) / np.mean(square) ** 2) if spread > 0 else 1.0
+    kurtosis = np.mean(square**2) / np.mean(square) ** 2 if spread > 0 else 1.0
     error = spread * float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * column.size)))
     # Beyond what the number of draws allows: two standard errors.
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)

@@ -80,7 +80,7 @@ def _draw_seeds(
         level = np.full(places.size, 0.5 + 0.46 * sign)
         axes.plot(places, level, marker, transform=axes.get_xaxis_transform(), **look)
     if outside:
-        note = f"{outside} of {int(np.sum(np.isfinite(draws)))} draws beyond the axis"
+        note = f"{outside} of {np.sum(np.isfinite(draws))} draws beyond the axis"
         axes.set_title(note, loc="right", fontsize=7, color=COLOURS["muted"], pad=2)
 
 
@@ -97,12 +97,12 @@ def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
     if not shown.size:
         return 0.0, 1.0
     # The axis reaches no farther from the centre than some times the typical spread.
-    centre = float(np.median(known)) if known.size else 0.0
-    typical = float(np.quantile(np.abs(drawn - centre), 0.68)) if drawn.size else 0.0
-    steps = float(np.max(np.abs(known - centre), initial=0.0))
+    centre = np.median(known) if known.size else 0.0
+    typical = np.quantile(np.abs(drawn - centre), 0.68) if drawn.size else 0.0
+    steps = np.max(np.abs(known - centre), initial=0.0)
     reach = max(1.2 * steps, 4.0 * typical, 1e-3 * abs(centre))
-    low = max(float(np.min(shown)), centre - reach)
-    high = min(float(np.max(shown)), centre + reach)
+    low = max(np.min(shown), centre - reach)
+    high = min(np.max(shown), centre + reach)
     margin = 0.12 * (high - low) or 0.05 * abs(centre) or 1.0
     bottom = low - margin
     return (max(bottom, 0.0) if low >= 0 else bottom), high + margin
@@ -110,7 +110,7 @@ def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
 
 def _relative_axis(axes: Axes, amplitude: FloatArray, exact: FloatArray) -> None:
     """Add a right-hand axis: the change from the result at the rule's amplitude, in percent."""
-    base = float(exact[np.argmin(np.abs(np.log(amplitude)))])
+    base = exact[np.argmin(np.abs(np.log(amplitude)))]
     if not (np.isfinite(base) and base != 0):
         return
     both_ways = (lambda value: 100 * (value / base - 1), lambda change: base * (1 + change / 100))

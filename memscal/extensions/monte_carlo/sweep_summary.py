@@ -73,4 +73,4 @@ def _number(value: float, form: str) -> str:
 
 def _median(draws: FloatArray) -> float:
     known = draws[np.isfinite(draws)]
-    return float(np.median(known)) if known.size else np.nan
+    return np.median(known) if known.size else np.nan

@@ -95,7 +95,7 @@ class Plan:
                 "percent), or a voltage; measure it with the rod at rest.",
             )
         k = _LARGEST_KH / self.film.thickness
-        if abs(1 - float(self.kernel.transform(np.array([k]))[0])) < _A_POINT:
+        if abs(1 - self.kernel.transform(np.array([k]))[0]) < _A_POINT:
             raise InputError(
                 f"The apparatus function is a point to a film of {self.film.thickness * 1e3:.4g} "
                 "mm: it blurs nothing of what the film passes.",
@@ -321,7 +321,7 @@ def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, fl
         if value >= 1 and full != TARGETS["resolved"]:
             problem = f"The {name} is wanted to {value:.0%}, which is no uncertainty of use."
             raise InputError(problem, cure="Give the relative uncertainty: 0.01 is 1 %.")
-        named[full] = float(value)
+        named[full] = value
     if vary is not None and vary not in VARIED:
         cure = f"Choose from {', '.join(VARIED)}."
         raise InputError(f"The design is to vary {vary!r}, which cannot be varied.", cure=cure)

@@ -107,7 +107,7 @@ def _values(planned: Design, vary: str) -> list[float]:
         return sorted({max(1, round(number * factor)) for factor in _FACTORS})
     most = max(_MOST_POSITIONS, planned.plan.positions) / planned.plan.positions
     if vary == "step":
-        return [float(number * factor) for factor in _FACTORS if 1 / factor <= most]
-    values = [float(number * factor) for factor in _FACTORS if factor <= most]
+        return [number * factor for factor in _FACTORS if 1 / factor <= most]
+    values = [number * factor for factor in _FACTORS if factor <= most]
     # The scan has to reach over the sensor.
     return [value for value in values if value > abs(planned.plan.centre)]

@@ -98,7 +98,7 @@ class Disturbances:
 
     def level(self, x: FloatArray) -> FloatArray:
         """Return offset and drift at positions (m), as a share of the largest signal."""
-        half_range = 0.5 * float(np.ptp(x))
+        half_range = 0.5 * np.ptp(x)
         middle = 0.5 * (x.min() + x.max())
         return np.asarray(self.baseline + 0.5 * self.drift * (x - middle) / half_range)
 

@@ -30,7 +30,7 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
             cure="Give a GaussianMixture, a SmoothedDisc, or an object with these three methods.",
         )
     # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
-    integral = float(kernel.transform(np.array([1e-2]))[0])
+    integral = kernel.transform(np.array([1e-2]))[0]
     if not abs(integral - 1) <= 1e-6:
         problem = f"The kernel's transform is {integral:g} at k = 0, not 1."
         cure = "Divide the kernel by its integral; the conversion constant carries the size."
@@ -53,7 +53,7 @@ def blurred_stress(
 ) -> FloatArray:
     r"""Return :math:`G \otimes \sigma_{zz}` in Pa at ``radius`` (m), a row for each contact."""
     # Of order one: the radial component of the blurred base shear.
-    nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
+    nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, radius.max())
     transforms = [(c.base_shear_spectrum if order else c.base_spectrum)(nodes.k) for c in contacts]
     spectra = np.stack(transforms, axis=1) * kernel.transform(nodes.k)[:, None]
     return np.moveaxis(nodes.synthesise(spectra, radius, order=order), -1, 0)

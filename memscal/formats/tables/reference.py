@@ -75,7 +75,7 @@ def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
     """Check samples of a stress, sort them by radius, and hold their force against the load."""
     name = samples.source.file_name
     require_numbers(samples)
-    lowest = float(samples.columns["r"].min())
+    lowest = samples.columns["r"].min()
     if lowest < 0:
         why = "A reference is a profile against the distance from the axis."
         cure = "Give one half of a section through the axis, with r from 0."
@@ -102,8 +102,8 @@ def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, Float
     number = np.bincount(index)
     means = {name: np.bincount(index, weights=v) / number for name, v in columns.items()}
     means["r"] = r[np.searchsorted(index, np.arange(number.size))]
-    peak = float(np.abs(means["sigma_zz"]).max())
-    apart = float(np.abs(columns["sigma_zz"] - means["sigma_zz"][index]).max())
+    peak = np.abs(means["sigma_zz"]).max()
+    apart = np.abs(columns["sigma_zz"] - means["sigma_zz"][index]).max()
     text = (
         f"{r.size - number.size} {samples.plural} repeat a radius; they were averaged "
         f"(normal stresses differ from the mean by up to {apart / peak if peak else 0:.2g} "
@@ -130,7 +130,7 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message
         )
     ratio = force / load
     reach = profile.r[-1] * 1e3
-    tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
+    tail = abs(profile.sigma_zz[-1]) / np.abs(profile.sigma_zz).max()
     early = tail > _DECAYED
     within = f"within r = {reach:.4g} mm"
     if ratio > _REFUSED or (ratio < 1 / _REFUSED and not early):
@@ -204,6 +204,6 @@ def read_reference_table(
         item="data row",
         units=(r_unit, sigma_unit),
         sign=sign,
-        spacing=_SAME * float(np.nanmax(np.abs(columns["r"]), initial=0.0)),
+        spacing=_SAME * np.nanmax(np.abs(columns["r"]), initial=0.0),
     )
     return profile_of(samples, stated)

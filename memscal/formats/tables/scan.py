@@ -267,7 +267,7 @@ def _read_columns(
         columns["u_zz"] *= -1
         notes.append("The sign of u_zz was changed.")
     if noise is not None:
-        in_si = float(to_si(noise, u.unit, u.dimension, "noise"))
+        in_si = to_si(noise, u.unit, u.dimension, "noise")
         columns["u_zz_errors"] = np.full(columns["u_zz"].shape, in_si)
     if "branch" in columns:
         where = table.where(wanted["branch"].column)
@@ -301,7 +301,7 @@ def _scan_of(
     notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
     noise = "not stated"
     if "u_zz_errors" in columns:
-        noise = f"{reading.text(float(np.nanmedian(columns['u_zz_errors'])))} (median)"
+        noise = f"{reading.text(np.nanmedian(columns['u_zz_errors']))} (median)"
     notes.append(f"Standard uncertainty of each reading: {noise}.")
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
@@ -333,7 +333,7 @@ def _numbered_by_load(columns: Columns, notes: list[str]) -> str:
     groups = load_groups(loads)
     if not groups.any():
         return ""
-    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(int(groups.max()) + 1)]
+    levels = [f"{np.median(loads[groups == i]):.4g}" for i in range(groups.max() + 1)]
     words = f"of {', '.join(levels[:-1])} and {levels[-1]} N"
     if "repeat" not in columns:
         columns["repeat"] = groups
@@ -380,7 +380,7 @@ def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
 
 def _direction(columns: Columns, notes: list[str]) -> str:
     """Return the axis of a line; points of two axes that spread along one become one."""
-    x, y = (float(np.ptp(columns[name])) if name in columns else 0.0 for name in ("x", "y"))
+    x, y = (np.ptp(columns[name]) if name in columns else 0.0 for name in ("x", "y"))
     if "y" not in columns or min(x, y) > LINE * max(x, y):
         return "x"
     along, across = ("y", "x") if y > x else ("x", "y")
@@ -400,14 +400,14 @@ def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> N
     if len(values) == 1:
         return values[0]
     finite = np.logical_and.reduce([np.isfinite(column) for column in values])
-    number = np.zeros(int(finite.sum()), dtype=np.intp)
+    number = np.zeros(finite.sum(), dtype=np.intp)
     for column in values:
         distinct, index = np.unique(column[finite], return_inverse=True)
         number = np.unique(number * distinct.size + index, return_inverse=True)[1]
     lines = np.full(finite.size, np.nan)
     lines[finite] = 1 + number
     names = " and ".join(repr(column) for column in numbering)
-    combinations = int(number.max(initial=-1)) + 1
+    combinations = number.max(initial=-1) + 1
     notes.append(f"{combinations} lines: one for each combination of the columns {names}.")
     return lines
 
@@ -436,7 +436,7 @@ def _counted(columns: Columns) -> list[str]:
     y = columns.get("y", np.zeros(columns["x"].size))
     repeat = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
     places = places_of(x, y, repeat)
-    number = int(repeat.max()) + 1
+    number = repeat.max() + 1
     in_repeats = f" in {number} repeats" if number > 1 else ""
     step = " x ".join(f"{step * 1e3:.4g}" for step in places.steps if step)
     apart = f", typically {step} mm apart" if step else ""
@@ -447,7 +447,7 @@ def _counted(columns: Columns) -> list[str]:
     )
     notes = [f"{x.size} readings{in_repeats} at {places.count} places{apart}; {reach}."]
     if "branch" in columns:
-        counts = [int((columns["branch"] == number).sum()) for number in (1, 2, 0)]
+        counts = [(columns["branch"] == number).sum() for number in (1, 2, 0)]
         words = "{} readings on approach, {} on retreat, {} of neither branch."
         notes.append(words.format(*counts))
     full = number * places.count - x.size
@@ -457,7 +457,7 @@ def _counted(columns: Columns) -> list[str]:
         gaps = np.sort(np.diff(np.sort(x)))
         # The gap in which half of the length lies: repeated positions do not change it.
         typical = gaps[np.searchsorted(np.cumsum(gaps), 0.5 * np.ptp(x))] if np.ptp(x) else 0.0
-        close = int(np.sum(gaps < _CLOSE * typical))
+        close = np.sum(gaps < _CLOSE * typical)
         if close > _MANY * x.size:
             notes.append(
                 f"{close} of {x.size} positions lie closer to another than {_CLOSE:.0%} of the "
