@@ -73,16 +73,7 @@ NOT_RANDOM = ("regularisation", "window", "misfit")
 
 @dataclass(frozen=True, eq=False)
 class InputEffect:
-    """What one standard uncertainty of an input does.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> effect = calibration.effects["thickness"]  # of its standard uncertainty
-    >>> effect.voltage.shape  # V, at each point of the scan
-    (65,)
-    """
+    """What one standard uncertainty of an input does."""
 
     voltage: FloatArray  # (n,): change of the voltages that it would be mistaken for, in V
     scaling: float = 0.0  # relative change of A beside that

@@ -88,16 +88,7 @@ MINIMUM_POSITIONS = 6
 
 @dataclass(frozen=True, eq=False)
 class ScanPoints:
-    """Every measured point of a scan, missing ones left out.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> points = calibration.solution.estimate.points
-    >>> points.u.shape  # V
-    (65,)
-    """
+    """Every measured point of a scan, missing ones left out."""
 
     x: FloatArray  # (n,): position of the indenter, in m; zero across a line scan
     y: FloatArray

@@ -40,20 +40,7 @@ _OF_RESTORED = "Measured, not calculated: restored with an apparatus function."
 
 @dataclass(frozen=True, eq=False)
 class StressComparison:
-    """How a calculated stress agrees with a scan and with the stress restored from it.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> film = memscal.ElasticFilm(
-    ...     young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="linear"
-    ... )
-    >>> scan = memscal.simulate(film=film, seed=2)
-    >>> expected = memscal.indent(film, scan.indenter, load=1.0)
-    >>> restored = memscal.restore(scan, memscal.calibrate(scan).apparatus, expected=expected)
-    >>> 0 <= restored.comparison.p_value <= 1
-    True
-    """
+    """How a calculated stress agrees with a scan and with the stress restored from it."""
 
     stress: StressProfile | Contact
     sigma_zz: FloatArray  # (n,): calculated, at the restoration's radii, in Pa

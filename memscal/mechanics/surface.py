@@ -67,14 +67,6 @@ class FilmField(Protocol):
     """The field in a film under given tractions at its two faces; radii in m, of any shape.
 
     Of order zero it is the normal component, of order one the radial one.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> contact = memscal.indent(film, memscal.Sphere(radius=0.1), load=0.5, friction=0.1)
-    >>> float(contact.inside.base(0.0, order=0)) == float(contact.base_stress(0.0))
-    True
     """
 
     def base(self, r: FloatArray, order: int) -> FloatArray:

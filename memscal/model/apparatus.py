@@ -202,14 +202,6 @@ class OtherEstimate:
     """A and G of the same scan by the route that was not chosen: a division, or ``bayesian``.
 
     ``parameters``: the conversion constant and the widths of G; ``radial_profile``: G(r).
-
-    Examples
-    --------
-    >>> import memscal
-    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
-    >>> other = apparatus.other
-    >>> other.method, other.parameters.names[0]
-    ('bayesian', 'conversion_constant')
     """
 
     method: str

@@ -9,16 +9,7 @@ from memscal.model.arrays import IndexArray
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of the points of one scan.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> [places] = calibration.solution.estimate.points.places
-    >>> places.count, round(places.steps[0] * 1e3, 3)  # mm
-    (65, 0.25)
-    """
+    """Places of the points of one scan."""
 
     index: IndexArray  # (n,): the place of each point
     row: IndexArray  # (n,): its row along y, 0 on a line

@@ -208,16 +208,7 @@ _NOT_LINEAR = (
 
 @dataclass(frozen=True, eq=False)
 class BudgetComparison:
-    """One parameter by draws and by the first-order budget, in its SI unit.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(seed=1))
-    >>> width = memscal.monte_carlo(calibration, draws=4)["gaussian_sigma"]
-    >>> width.uncertainty < 1e-4, width.first_order < 1e-4  # m; by draws, by the budget
-    (True, True)
-    """
+    """One parameter by draws and by the first-order budget, in its SI unit."""
 
     name: str
     value: float  # the calibration's
