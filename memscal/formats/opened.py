@@ -1,4 +1,4 @@
-"""Scans and measured stress, given as objects or as the paths of their files."""
+"""Scans, given as objects or as the paths of their files."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from os import PathLike
@@ -7,17 +7,11 @@ from typing import Any, TypeAlias
 from memscal.errors import InputError
 from memscal.formats.files import FilePath
 from memscal.formats.hdf5.reader import open_hdf5
-from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import scan_from
-from memscal.formats.stress import stress_from
-from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
 Scans: TypeAlias = Scan | FilePath | Sequence[Scan | FilePath]
 """One scan or several, each itself or as the path of its file."""
-
-Contacts: TypeAlias = Scan | MeasuredStress | FilePath | Sequence[Scan | MeasuredStress | FilePath]
-"""Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
 def opened_scan(scan: Any, most: int | None = None, *, accept_altered: bool = False) -> Scan:
@@ -35,33 +29,15 @@ def opened_scans(
     scans: Scans, most: int | None = None, *, accept_altered: bool = False
 ) -> tuple[Scan, ...]:
     """Return scans that are given themselves or as paths, at least one; of ``most`` points each."""
-    listed = _listed(scans)
+    listed = listed_items(scans)
     opened = [opened_scan(scan, most, accept_altered=accept_altered) for scan in listed]
     if len(opened) > 1:
-        require_different(map(_contents, opened))
+        require_different(map(contents_of, opened))
     return tuple(opened)
 
 
-def opened_contacts(
-    contacts: Contacts, *, accept_altered: bool = False
-) -> tuple[Scan | MeasuredStress, ...]:
-    """Return scans and measured stresses that are given themselves or as paths, at least one."""
-    opened: list[Scan | MeasuredStress] = []
-    for item in _listed(contacts):
-        if isinstance(item, MeasuredStress):
-            opened.append(item)
-        elif isinstance(item, str | PathLike):
-            with open_hdf5(item, accept_altered=accept_altered) as file:
-                is_stress = file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA
-                opened.append(stress_from(file) if is_stress else scan_from(file))
-        else:
-            opened.append(opened_scan(item))
-    if len(opened) > 1:
-        require_different(_contents(item) for item in opened if isinstance(item, Scan))
-    return tuple(opened)
-
-
-def _contents(scan: Scan) -> tuple[str, Hashable]:
+def contents_of(scan: Scan) -> tuple[str, Hashable]:
+    """Return a scan's name, and what tells it from another."""
     arrays = scan.x, scan.y, scan.u_zz, scan.normal_load, *scan.channels.values()
     stated = scan.direction, scan.load, scan.unit, scan.lubrication
     named = scan.source.file_name if scan.source else f"A scan of {scan.u_zz.size} points"
@@ -82,9 +58,10 @@ def require_different(named: Iterable[tuple[str, Hashable]]) -> None:
         seen.add(content)
 
 
-def _listed(items: Any) -> list[Any]:
-    single = isinstance(items, str | PathLike | Scan | MeasuredStress)
-    listed = [items] if single or not isinstance(items, Iterable) else list(items)
+def listed_items(items: Any) -> list[Any]:
+    """Return the items of a list, or the one that is given by itself."""
+    single = isinstance(items, str | PathLike) or not isinstance(items, Iterable)
+    listed = [items] if single else list(items)
     if not listed:
         raise InputError("There is no scan.", cure="Give a scan, or several.")
     return listed
