@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import os
 import pkgutil
 import sys
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from types import FrameType
 
 import memscal
 
-PACKAGE = Path(memscal.__path__[0])
+PACKAGE = memscal.__path__[0] + os.sep
 DATA = Path(__file__).parents[2] / "calibration_data"
 
 
@@ -21,8 +22,8 @@ def functions_run(job: Callable[[], object]) -> int:
 
     def note(frame: FrameType, event: str, _: object) -> None:
         code = frame.f_code
-        is_function = code.co_flags & CO_OPTIMIZED and not code.co_name.startswith("<")
-        if event == "call" and is_function and Path(code.co_filename).is_relative_to(PACKAGE):
+        inside = event == "call" and code.co_filename.startswith(PACKAGE)
+        if inside and code.co_flags & CO_OPTIMIZED and not code.co_name.startswith("<"):
             found.add((code.co_filename, code.co_firstlineno))
 
     sys.setprofile(note)
