@@ -1,0 +1,91 @@
+"""Sizes at which what a calibration takes for granted moves its result by one uncertainty."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from memscal.calibration.stages import Solution
+from memscal.calibration.uncertainty import Results
+from memscal.estimation.influences import Influence, influences
+from memscal.estimation.voltage_map import DENSE
+from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
+
+#: Correlations of neighbours that are tried.
+_CORRELATIONS = np.linspace(0.02, 0.98, 49)
+#: By name the uncertainty that a scan, its film or its sensor states.
+_STATEMENTS = {
+    "roundness": "roundness_uncertainty",
+    "line_offset": "line_offset_uncertainty",
+    "stage_scale": "position_scale_uncertainty",
+    "base_slip": "base_slip_uncertainty",
+    "baseline_curvature": "baseline_curvature_uncertainty",
+    "gain_curvature": "gain_curvature_uncertainty",
+    "load_scale": "load_uncertainty",
+    "noise_correlation": "u_zz_correlation",
+    "rod_friction": "rod_friction",
+}
+
+
+def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ...]:
+    """Return what a calibration takes for granted, each with its sizes for one uncertainty."""
+    effects = influences(solution.scans, solution.estimate)
+    sizes = {name: _sizes(effect, results) for name, effect in effects.items()}
+    if solution.estimate.points.u.size <= DENSE:
+        sizes["noise_correlation"] = _correlations(solution, results)
+    known = [name for name in NAMES if name in sizes]
+    return tuple(Assumption(name, _state(solution, name), sizes[name]) for name in known)
+
+
+def _state(solution: Solution, name: str) -> str:
+    """Say whether something is assumed, stated by every scan, or measured by them."""
+    points = solution.estimate.points
+    if name in ("roundness", "line_offset") and points.ellipse:
+        return MEASURED
+    stated = []
+    for scan in solution.scans:
+        if name == "film_law":
+            stated.append(bool(scan.film and scan.film.law))
+        elif name in ("poisson_ratio", "thickness"):
+            stated.append(getattr(scan.film, f"{name}_uncertainty", None) is not None)
+        else:
+            stated.append(getattr(scan, _STATEMENTS.get(name, ""), None) is not None)
+    return STATED if all(stated) else ASSUMED
+
+
+def _sizes(effect: Influence, results: Results) -> dict[str, float]:
+    """Sizes of an influence that move each parameter by one standard uncertainty."""
+    parameters = results.parameters
+    moved = (results.by_voltage @ effect.voltage[:, None])[:, 0]
+    sizes = {}
+    for parameter in MOVED:
+        row = parameters.names.index(parameter)
+        by_one = abs(moved[row])
+        if parameter == "conversion_constant":
+            by_one = abs(moved[row] + effect.scaling * parameters[parameter])
+        size = parameters.uncertainty(parameter) / by_one if by_one > 0 else math.inf
+        sizes[parameter] = float(size**0.5 if effect.squared else size)
+    return sizes
+
+
+def _correlations(solution: Solution, results: Results) -> Mapping[str, float]:
+    """Correlations of neighbours that add a squared uncertainty to the variance by noise."""
+    # Of noise whose correlation falls off exponentially along each pass.
+    estimate = solution.estimate
+    points = estimate.points
+    order = np.lexsort((points.x, points.y, points.repeat))
+    passes = points.repeat[order]
+    by_noise = results.by_voltage.dense() * estimate.noise
+    names = results.parameters.names
+    sizes = {}
+    for parameter in MOVED:
+        row = by_noise[names.index(parameter), order]
+        added = 0.0
+        for number in np.unique(passes):
+            alike = row[passes == number]
+            lags = np.arange(1, alike.size)
+            products = np.correlate(alike, alike, "full")[alike.size :]
+            added = added + 2 * (_CORRELATIONS[:, None] ** lags) @ products
+        beyond = np.flatnonzero(added >= results.parameters.uncertainty(parameter) ** 2)
+        sizes[parameter] = float(_CORRELATIONS[beyond[0]]) if beyond.size else math.inf
+    return sizes

@@ -1,0 +1,147 @@
+r"""What one unit of each thing that a scan takes for granted does to its voltages.
+
+A sensor of axis ratio :math:`1 + \epsilon` along the line has the response of an elliptic
+Gaussian, to first order in :math:`\epsilon`; a line at a distance :math:`y_0` from the centre reads
+:math:`U(\sqrt{x^2 + y_0^2})`, of which the change begins with :math:`y_0^2`; a film that slides on
+its base carries :math:`T = 2(\sinh x + x\cosh x)/(\sinh 2x + 2x)`, x = kh, of a pressure (Sneddon,
+Fourier Transforms, 1951), in place of what a bonded one does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference_spectra import (
+    RECTANGLE,
+    film_sensitivities,
+    law_sensitivities,
+    relative,
+)
+from memscal.mechanics.film_response import base_normal_from_pressure, base_shear_from_pressure
+from memscal.model.arrays import FloatArray
+from memscal.model.scan import Scan
+
+#: Distance of a line from the centre, over the width of the Gaussian, at which its change is taken.
+_OFF = 0.2
+#: Relative steps of the film's properties.
+_STEP = 0.01
+#: What two models of a film differ by, by the names of budget and assumption.
+_LAW = {"model_form": "film_law", "rod_friction": "rod_friction"}
+#: Wavenumbers times thickness beyond which nothing reaches the base.
+_LARGEST_KH = 38.0
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """What one unit (m of a length) of one thing does to the voltages, (n,), in V."""
+
+    voltage: FloatArray
+    squared: bool = False  # the change is in proportion to the square of the size
+    scaling: float = 0.0  # relative change of A beside that
+
+
+def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Influence]:
+    """Return the influence of everything that is taken for granted, by name."""
+    signal = estimate.predicted - estimate.background
+    largest = estimate.largest_signal
+    model = estimate.model
+    slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
+    found = {
+        "stage_scale": Influence(slope * estimate.distance),
+        "baseline_curvature": Influence(largest * _parabolas(estimate)),
+        "gain_curvature": Influence(-signal * np.abs(signal) / largest),
+        "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
+    }
+    if not model.order:
+        found |= _of_lines(estimate)
+        found |= _of_film(scans, estimate)
+    return found
+
+
+def _parabolas(estimate: ProfileEstimate) -> FloatArray:
+    """Square of the distance from the middle of each scan over its half range, (n,)."""
+    columns = np.zeros_like(estimate.points.u)
+    for scan in range(estimate.points.scans):
+        inside = estimate.points.scan == scan
+        for position in (estimate.points.x[inside], estimate.points.y[inside]):
+            half = np.ptp(position) / 2
+            if half > 0:
+                columns[inside] += ((position - position.min() - half) / half) ** 2
+    return columns
+
+
+def _of_lines(estimate: ProfileEstimate) -> dict[str, Influence]:
+    """Influences of a sensor that is not round, and of a line that passes beside it."""
+    model = estimate.model
+    fit = estimate.gaussian
+    second = ((fit.sigma * model.k) ** 2 / 2 * gaussian_transfer(model.k, fit.sigma))[:, None]
+    oval = model.around(2, second, second[:, :0], fit.centre)[:, 0]
+    away = _OFF * fit.sigma
+    passing = model.geometry(estimate.centres)
+    beside = replace(passing, radius=np.hypot(passing.radius, away))
+    change = model.signal(beside, estimate.kernel) - model.signal(passing, estimate.kernel)
+    return {
+        "roundness": Influence(fit.conversion_constant * oval),
+        "line_offset": Influence(change / away**2, squared=True),
+    }
+
+
+def _of_film(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Influence]:
+    """Influences of base, shear, law, Poisson's ratio and thickness of the films."""
+    by_scan = [_film_changes(scan, estimate, i) for i, scan in enumerate(scans)]
+    names = set.intersection(*map(set, by_scan))
+    return {name: _by_spectra(estimate, [each[name] for each in by_scan]) for name in sorted(names)}
+
+
+def _by_spectra(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> Influence:
+    """Influence of changes of the references' transforms."""
+    model = estimate.model
+    changed = zip(model.references, changes, strict=True)
+    references = tuple(replace(reference, values=values) for reference, values in changed)
+    voltage = replace(model, references=references).signal(
+        estimate.gaussian.geometry, estimate.kernel
+    )
+    return Influence(voltage)
+
+
+def _film_changes(scan: Scan, estimate: ProfileEstimate, number: int) -> dict[str, FloatArray]:
+    """Changes of one scan's reference by one unit of what is taken for granted of its film."""
+    reference = estimate.model.references[number]
+    if scan.film is None or scan.indenter is None or reference.source:
+        return {}
+    film = scan.film.expected
+    k = reference.wavenumbers.k
+    x = np.minimum(k * film.thickness, _LARGEST_KH)
+    bonded = base_normal_from_pressure(x, film.poisson_ratio)
+    sliding = 2 * (np.sinh(x) + x * np.cosh(x)) / (np.sinh(2 * x) + 2 * x)
+    sliding[x == 0] = 1.0
+    shear = base_shear_from_pressure(x, film.poisson_ratio)
+    changes = {
+        "base_slip": reference.values * (relative(sliding, bonded) - 1),
+        "shear_sensitivity": -reference.values * k * relative(shear, bonded),
+    }
+    stated = replace(
+        scan.film,
+        poisson_ratio_uncertainty=_STEP,
+        thickness_uncertainty=_STEP * film.thickness,
+        young_modulus_uncertainty=None,
+    )
+    by_film = film_sensitivities(scan.set_up._replace(film=stated), reference)
+    set_up = scan.set_up.expected
+    changes["poisson_ratio"] = by_film["poisson_ratio"] / _STEP
+    changes["thickness"] = by_film["thickness"] / (_STEP * film.thickness)
+    for name, sign in (("model_form", 1.0), ("rod_friction", -1.0)):
+        law = "" if name == "model_form" else film.law
+        unstated = replace(
+            film, law=law, mooney_rivlin_ratio=film.mooney_rivlin_ratio if law else None
+        )
+        open_law = set_up._replace(film=unstated, rod_friction=None)
+        change = law_sensitivities(open_law, reference).get(name)
+        if change is not None:
+            changes[_LAW[name]] = sign * change / RECTANGLE
+    return changes

@@ -1,0 +1,122 @@
+"""What a calibration takes for granted, with the sizes at which that would matter."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+#: Whether a size is taken for granted, stated with an uncertainty that is counted, or measured.
+ASSUMED = "assumed"
+STATED = "stated"
+MEASURED = "measured"
+STATES = (ASSUMED, STATED, MEASURED)
+
+#: Numbers that an assumption moves: A, the Gaussian's width, and the full width of G.
+MOVED = ("conversion_constant", "gaussian_sigma", "fwhm")
+
+#: By name: what is taken for granted, the word for its size, and whether that is a length.
+_KNOWN = {
+    "roundness": ("The sensor is round.", "axis ratio less one", False),
+    "line_offset": (
+        "The line passes over the sensor's centre.",
+        "distance of the line from the centre",
+        True,
+    ),
+    "stage_scale": ("The stage moves as far as it says.", "relative error of its scale", False),
+    "base_slip": (
+        "The film is bonded to its base.",
+        "share of the difference to a base that slides freely",
+        False,
+    ),
+    "baseline_curvature": (
+        "The baseline is a straight line.",
+        "edge to centre over the largest signal",
+        False,
+    ),
+    "gain_curvature": (
+        "The reading is proportional to the stress.",
+        "b in U (1 - b U/U_max)",
+        False,
+    ),
+    "shear_sensitivity": (
+        "The sensor does not respond to shear.",
+        "length times the divergence of the shear at the base",
+        True,
+    ),
+    "film_law": (
+        "The film follows the law of the reference.",
+        "share of the difference between a linear and a neo-Hookean film",
+        False,
+    ),
+    "rod_friction": (
+        "The film is held, or slides, under the rod as the reference has it.",
+        "share from sticking to sliding",
+        False,
+    ),
+    "noise_correlation": (
+        "The noise of a reading is independent of its neighbours.",
+        "correlation of neighbouring readings",
+        False,
+    ),
+    "poisson_ratio": ("Poisson's ratio is as stated.", "error of Poisson's ratio", False),
+    "thickness": ("The film is as thick as stated.", "error of the thickness", True),
+    "load_scale": ("The load is as stated.", "relative error of the load", False),
+}
+NAMES = tuple(_KNOWN)
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What a result takes for granted of one thing, and how large an error of it would matter.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``roundness``; see docs/assumptions.md.
+    state : str
+        ``"assumed"``: taken for granted, and in no uncertainty; ``"stated"``: the scan states its
+        uncertainty, which is in the budget; ``"measured"``: the scan itself determines it.
+    sizes : mapping of str to float
+        By parameter (``conversion_constant``, ``gaussian_sigma``, ``fwhm``) the size, in m of a
+        length, that moves it by one standard uncertainty; infinite where none does.
+    """
+
+    name: str
+    state: str
+    sizes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def sentence(self) -> str:
+        """What is taken for granted, in words."""
+        return _KNOWN[self.name][0] if self.name in _KNOWN else ""
+
+    @property
+    def measure(self) -> str:
+        """What the size is of, in words."""
+        return _KNOWN[self.name][1] if self.name in _KNOWN else ""
+
+    @property
+    def is_length(self) -> bool:
+        """Whether the size is a length."""
+        return self.name in _KNOWN and _KNOWN[self.name][2]
+
+    @property
+    def unit(self) -> str:
+        """Unit in which the size is shown."""
+        return "mm" if self.is_length else "1"
+
+    def size(self, parameter: str) -> float:
+        """Size for one standard uncertainty of a parameter, in the unit in which it is shown."""
+        return self.sizes[parameter] / (1e-3 if self.is_length else 1.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON holds; a size that no error reaches is null."""
+        values: dict[str, Any] = {
+            "name": self.name,
+            "sentence": self.sentence,
+            "state": self.state,
+        }
+        keys = ("size_for_one_u", "size_for_one_u_of_sigma", "size_for_one_u_of_fwhm")
+        for key, parameter in zip(keys, MOVED, strict=True):
+            size = self.size(parameter)
+            values[key] = {"value": size if size < float("inf") else None, "unit": self.unit}
+        return values
