@@ -22,6 +22,7 @@ from memscal.model.apparatus import (
     Reconvolution,
     TransferFunction,
 )
+from memscal.model.assumptions import Assumption
 from memscal.model.checks import QualityCheck
 from memscal.model.provenance import Process
 from memscal.model.scan import common_circumstances
@@ -37,6 +38,7 @@ def assemble(
     other: Results | None,
     checks: tuple[QualityCheck, ...],
     laws: FilmLawComparison | None,
+    assumptions: tuple[Assumption, ...],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are as stated by the scan where nothing was calculated with them.
@@ -69,12 +71,13 @@ def assemble(
         reference=reference,
         process=Process.of_now(
             configuration=_configuration(prepared, solution, laws),
-            messages=calibration_messages(prepared, solution, results, checks, laws),
+            messages=calibration_messages(prepared, solution, results, checks, laws, assumptions),
             input_scan=scan.source,
             input_reference=reference.source,
         ),
         budget=results.budget,
         kernel_changes=results.kernel_changes,
+        assumptions=assumptions,
         **common_circumstances(solution.scans),
         other=other_estimate,
     )

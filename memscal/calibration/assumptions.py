@@ -11,6 +11,7 @@ from memscal.estimation.influences import Influence, influences
 from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
 
+_ASKED_FOR = ("poisson_ratio", "thickness", "load_scale")
 #: Correlations of neighbours that are tried.
 _CORRELATIONS = np.linspace(0.02, 0.98, 49)
 #: By name the uncertainty that a scan, its film or its sensor states.
@@ -33,8 +34,13 @@ def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ..
     sizes = {name: _sizes(effect, results) for name, effect in effects.items()}
     if solution.estimate.points.u.size <= DENSE:
         sizes["noise_correlation"] = _correlations(solution, results)
-    known = [name for name in NAMES if name in sizes]
-    return tuple(Assumption(name, _state(solution, name), sizes[name]) for name in known)
+    assumptions = []
+    for name in NAMES:
+        state = _state(solution, name)
+        # What every calibration asks for is listed where it is missing.
+        if name in sizes and (state != STATED or name not in _ASKED_FOR):
+            assumptions.append(Assumption(name, state, sizes[name]))
+    return tuple(assumptions)
 
 
 def _state(solution: Solution, name: str) -> str:

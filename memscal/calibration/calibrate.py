@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
+from memscal.calibration.assumptions import assumptions_of
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.fields import RasterFields
@@ -242,7 +243,8 @@ def calibrate(
     laws = None if relative or solution.stress.form else weigh_laws(solution)
     if not other:
         by_other_route = None
-    apparatus = assemble(prepared, solution, results, by_other_route, checks, laws)
+    assumptions = assumptions_of(solution, results)
+    apparatus = assemble(prepared, solution, results, by_other_route, checks, laws, assumptions)
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 
 

@@ -1,5 +1,7 @@
 """Messages of a calibration: what a user has to know of its result beside the checks."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +20,7 @@ from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import is_tabulated
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
+from memscal.model.assumptions import ASSUMED, Assumption
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import LINEAR, NEO_HOOKEAN
 
@@ -25,14 +28,6 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Tails of less probability are not mentioned.
 _LEAST_PROBABILITY = 0.001
-#: Properties of the film by their names in messages, with their symbols; the share by which one
-#: that states no uncertainty is varied.
-_FILM_PROPERTIES = {
-    "film thickness": ("thickness", "h"),
-    "Young's modulus": ("young_modulus", "E"),
-    "Poisson's ratio": ("poisson_ratio", "nu"),
-}
-_VARIED = 0.01
 
 
 def calibration_messages(
@@ -41,6 +36,7 @@ def calibration_messages(
     results: Results,
     checks: tuple[QualityCheck, ...],
     laws: FilmLawComparison | None,
+    assumptions: tuple[Assumption, ...],
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result: what was decided, then warnings first."""
     estimate = solution.estimate
@@ -89,7 +85,8 @@ def calibration_messages(
         text = "The reference states no convergence: its own error is not counted."
         messages.append(Message("convergence_unstated", text))
     if form is None:
-        messages += _law(solution, results) + _unstated(solution, results)
+        messages += _law(solution, results) + _unstated(solution)
+    messages += _assumed(assumptions)
     if solution.scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
@@ -217,32 +214,32 @@ def _relative_changes(results: Results, change: FloatArray) -> FloatArray:
     return change[rows] / results.parameters.values[rows]
 
 
-def _unstated(solution: Solution, results: Results) -> list[Message]:
-    """Return which inputs state no uncertainty, and how much hangs on those of the film."""
-    scan = solution.scan
-    film = scan.film
-    uncertainties = {}
-    shares = {}
-    if film is not None:
-        for words, (name, _) in _FILM_PROPERTIES.items():
-            # At a given load the stress in a linear film does not depend on its modulus.
-            if name != "young_modulus" or film.law not in ("", LINEAR):
-                uncertainties[words] = getattr(film, f"{name}_uncertainty")
-                if uncertainties[words] is None:
-                    shares[f"{name}_uncertainty"] = _VARIED * getattr(film, name)
-        uncertainties["rod radius"] = scan.set_up.indenter.radius_uncertainty
-    if results.parameters.reading.per == "Pa":
-        uncertainties["load"] = scan.load_uncertainty
-    messages = quality.uncertainty_unstated_messages(uncertainties)
-    changes = _changes(solution, results, **shares) if shares else {}
-    slopes = []
-    for name, symbol in _FILM_PROPERTIES.values():
-        # A share of a value near zero changes nothing.
-        if f"{name}_uncertainty" in shares and name in changes:
-            a, sigma = _relative_changes(results, changes[name]) / _VARIED
-            slopes.append(f"d ln A/d ln {symbol} = {a:+.2f}")
-            slopes.append(f"d ln sigma/d ln {symbol} = {sigma:+.2f}")
-    if slopes:
-        text = f"{messages[0].text} {', '.join(slopes)}."
-        messages = [replace(messages[0], text=text)]
-    return messages
+def _unstated(solution: Solution) -> list[Message]:
+    """Return which inputs that no assumption is about state no uncertainty."""
+    film = solution.scan.film
+    if film is None:
+        return []
+    uncertainties = {"rod radius": solution.scan.set_up.indenter.radius_uncertainty}
+    # At a given load the stress in a linear film does not depend on its modulus.
+    if film.law not in ("", LINEAR):
+        uncertainties["Young's modulus"] = film.young_modulus_uncertainty
+    return quality.uncertainty_unstated_messages(uncertainties)
+
+
+def _assumed(assumptions: Sequence[Assumption]) -> list[Message]:
+    """Return what is taken for granted, and the size of each that moves A by one u."""
+    listed = []
+    for assumption in assumptions:
+        size = assumption.size("conversion_constant")
+        if assumption.state == ASSUMED:
+            unit = f" {assumption.unit}" if assumption.is_length else ""
+            reached = f"{size:.2g}{unit}" if size < math.inf else "none does"
+            listed.append(f"{assumption.words} ({assumption.measure}: {reached})")
+    if not listed:
+        return []
+    text = (
+        "Taken for granted, and in no uncertainty; in brackets the size that moves A by one "
+        f"standard uncertainty: {'; '.join(listed)}. State the uncertainty of one to have it "
+        "counted."
+    )
+    return [Message("assumptions", text)]

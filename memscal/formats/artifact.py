@@ -62,6 +62,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         reference=groups.read_profile(file, load=load),
         process=process,
         kernel_changes=_read_changes(file),
+        assumptions=groups.read_assumptions(file, "/entry/assumptions"),
         other=_read_other(file, reading),
     )
 
@@ -90,6 +91,8 @@ def artifact_tree(data: ApparatusData) -> Group:
         **groups.reference_groups(data.reference),
         "process": write_record(records.PROCESS, data.process),
     }
+    if data.assumptions:
+        children["assumptions"] = groups.assumption_group(data.assumptions)
     if data.kernel_changes:
         names, changes = zip(*data.kernel_changes.items(), strict=True)
         group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})

@@ -25,6 +25,7 @@ from memscal.formats.values import (
 )
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.assumptions import Assumption
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
@@ -478,6 +479,27 @@ def read_process(file: SafeFile, path: str) -> Process:
     """Read what was done."""
     defaults = {"program": "", "version": "", "date": ""}
     return Process(**read_record(records.PROCESS, file, path, defaults=defaults))
+
+
+def assumption_group(assumptions: tuple[Assumption, ...]) -> Group:
+    """Return what was taken for granted, one NXcollection each; ``names`` keeps their order."""
+    children: dict[str, Node] = {}
+    for assumption in assumptions:
+        declared = records.assumption_record(is_length=assumption.is_length)
+        stated = {"state": assumption.state, **assumption.sizes}
+        children[assumption.name] = write_record(declared, stated)
+    return Group("NXcollection", {"names": to_json("assumptions", list(children)), **children})
+
+
+def read_assumptions(file: SafeFile, path: str) -> tuple[Assumption, ...]:
+    """Read what was taken for granted, where a file states it."""
+    names = text_list(file, f"{path}/names") if file.has(f"{path}/names") else ()
+    assumptions = []
+    for name in names:
+        declared = records.assumption_record(is_length=Assumption(name, "").is_length)
+        sizes = read_record(declared, file, f"{path}/{name}")
+        assumptions.append(Assumption(name, sizes.pop("state"), sizes))
+    return tuple(assumptions)
 
 
 def quality_group(checks: tuple[QualityCheck, ...]) -> Group:

@@ -11,6 +11,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, FrozenArrays
+from memscal.model.assumptions import Assumption
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -219,8 +220,8 @@ class ApparatusData(Checked):
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
     of the conversion constant and of both Gaussian widths by source; ``kernel_changes`` (n,), at
     the radii of ``radial_profile``, are those of A G over A by one standard uncertainty of each
-    input, in 1/m^2, empty where inputs are correlated; ``other`` is the estimate by the route that
-    was not chosen, where there is one.
+    input, in 1/m^2, empty where inputs are correlated; ``assumptions`` are what the result takes
+    for granted; ``other`` is the estimate by the route that was not chosen, where there is one.
     """
 
     plane: ApparatusField | None
@@ -237,6 +238,7 @@ class ApparatusData(Checked):
     process: Process
     budget: Mapping[str, Mapping[str, float]]
     kernel_changes: Mapping[str, FloatArray] = dataclass_field(default_factory=dict)
+    assumptions: tuple[Assumption, ...] = ()
     other: OtherEstimate | None = None
     load_cell: LoadCell = dataclass_field(default_factory=LoadCell)
     stage: Equipment = dataclass_field(default_factory=Equipment)

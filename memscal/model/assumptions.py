@@ -90,6 +90,13 @@ class Assumption:
         return _KNOWN[self.name][0] if self.name in _KNOWN else ""
 
     @property
+    def words(self) -> str:
+        """The sentence as a part of another."""
+        sentence = self.sentence
+        start = sentence if sentence.startswith("Poisson") else sentence[:1].lower() + sentence[1:]
+        return start.removesuffix(".")
+
+    @property
     def measure(self) -> str:
         """What the size is of, in words."""
         return _KNOWN[self.name][1] if self.name in _KNOWN else ""

@@ -254,6 +254,20 @@ CHECK = record(
     Quantity("meaning", "text", "meaning"),
     Quantity("p_value", _ONE, "chance of such a value, or a larger one", "p"),
 )
+
+
+def assumption_record(*, is_length: bool) -> Record:
+    """Return the record of the sizes at which an assumption moves each parameter by one u."""
+    dimension = _L if is_length else _ONE
+    sizes = (
+        Quantity("conversion_constant", dimension, "size for u(A)", stored="size_for_one_u"),
+        Quantity("gaussian_sigma", dimension, "size for u(σ)", stored="size_for_one_u_of_sigma"),
+        Quantity("fwhm", dimension, "size for u(FWHM)", stored="size_for_one_u_of_fwhm"),
+    )
+    state = Quantity("state", "text", "assumed, stated or measured", required=True)
+    return record("NXcollection", state, *required(*sizes))
+
+
 _ENVIRONMENT = "Versions of Python and of the numerical libraries."
 PROCESS = record(
     "NXprocess",

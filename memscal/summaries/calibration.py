@@ -165,6 +165,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
             "chi2_reduced": finite(misfit.chi2_reduced),
             "gaussian_chi2_reduced": finite(gaussian.chi2_reduced),
         }
+    values["assumptions"] = [assumption.to_dict() for assumption in apparatus.assumptions]
     values["checks"] = checks_json(apparatus.checks)
     values["warnings"] = texts_of(apparatus.process.messages)
     return values
