@@ -29,6 +29,7 @@ from memscal.calibration.fields import RasterFields, cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
+from memscal.estimation.influences import influences
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
     RECTANGLE,
@@ -41,7 +42,7 @@ from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, trian
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import BoolArray, FloatArray
-from memscal.model.scan import Scan
+from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
 
 #: Windows below this have closed.
@@ -99,16 +100,29 @@ def input_effects(
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
     effects = {name: InputEffect(_mistaken(estimate, change)) for name, change in changes.items()}
-    shares = np.array([scan.position_scale_uncertainty or 0.0 for scan in scans])
-    if shares.any():
-        slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
-        error = slope * estimate.distance * shares[estimate.points.scan]
-        effects["position_scale"] = InputEffect(-error)
-    effects |= _load_effects(scans, stresses, estimate)
+    effects |= _taken_for_granted(scans, estimate) | _load_effects(scans, stresses, estimate)
     if "load" in effects:
         # Beside its scaling: at finite strain a larger load spreads the stress.
         spread = _mistaken(estimate, load_sensitivities(scans, model.references))
         effects["load"] = replace(effects["load"], voltage=effects["load"].voltage + spread)
+    return effects
+
+
+def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, InputEffect]:
+    """Effects of what scans take for granted, where they state its uncertainty."""
+    stated = {}
+    for name in STATED_ERRORS:
+        u = np.array([getattr(scan, f"{name}_uncertainty") or 0.0 for scan in scans])
+        if u.any() and name != "gain":
+            stated[name] = u[estimate.points.scan]
+    found = influences(scans, estimate) if stated else {}
+    effects = {}
+    for name, u in stated.items():
+        influence = found.get({"position_scale": "stage_scale"}.get(name, name))
+        if influence is not None:
+            # Of a square that is normally distributed the mean is corrected.
+            size = 2**0.5 * u**2 if influence.squared else u
+            effects[name] = InputEffect(-size * influence.voltage)
     return effects
 
 
@@ -133,6 +147,7 @@ def _load_effects(
     shares: dict[str, Sequence[float | None]] = {
         "reference_force": [abs(carried_force(*pair) - 1.0) for pair in pairs],
         "load": loads,
+        "gain": [scan.gain_uncertainty for scan in scans],
         "reference_convergence": [stress.convergence for stress in stresses],
     }
     effects = {}

@@ -81,6 +81,16 @@ _COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "repeat", 
 _LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds")
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
 _UNCERTAINTIES = ("noise", "load_uncertainty")
+#: Powers of ten of the units in which what a scan takes for granted is stated.
+_TAKEN_FOR_GRANTED = {
+    "position_scale_uncertainty": -2,
+    "gain_uncertainty": -2,
+    "gain_curvature_uncertainty": 0,
+    "roundness_uncertainty": 0,
+    "line_offset_uncertainty": -3,
+    "base_slip_uncertainty": 0,
+    "baseline_curvature_uncertainty": 0,
+}
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
@@ -90,6 +100,7 @@ _ONLY = {
         *_LAYOUT,
         *_CONDITIONS,
         *_UNCERTAINTIES,
+        *_TAKEN_FOR_GRANTED,
         *("load_scatter", "position_error", "figures", "laboratory"),
         *_SENSOR_NAMES.values(),
         *_CELL_NAMES.values(),
@@ -151,6 +162,27 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 )
 @option("--position-error", Quantity("um", open_low=False))(
     "Scan: standard uncertainty of each position, independent from point to point, in um."
+)
+@option("--position-scale-uncertainty", Quantity("percent", open_low=False))(
+    "Scan: standard uncertainty of the stage's scale, common to all positions, in percent."
+)
+@option("--gain-uncertainty", Quantity("percent", open_low=False))(
+    "Scan: standard uncertainty of the gain of the sensor's chain, in percent."
+)
+@option("--gain-curvature-uncertainty", Quantity("ratio", open_low=False))(
+    "Scan: standard uncertainty of b, where a reading is U (1 - b U/Umax)."
+)
+@option("--roundness-uncertainty", Quantity("ratio", open_low=False))(
+    "Scan: standard uncertainty of the sensor's axis ratio, which is taken to be one."
+)
+@option("--line-offset-uncertainty", Quantity("mm", open_low=False))(
+    "Scan: standard uncertainty of the distance at which the line passes the sensor, in mm."
+)
+@option("--base-slip-uncertainty", Quantity("ratio", high=1.0, open_low=False))(
+    "Scan: standard uncertainty of the film's slip on its base: 0 bonded, 1 free."
+)
+@option("--baseline-curvature-uncertainty", Quantity("ratio", open_low=False))(
+    "Scan: standard uncertainty of the baseline from edge to centre, over the largest signal."
 )
 @option("--lubrication", click.Choice(["dry", "lubricated"]))(
     "Scan: what was between indenter and film."
@@ -320,6 +352,7 @@ def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
         **_stated(options, _UNCERTAINTIES),
         load_scatter=si(options["load_scatter"], -2),
         x_error=si(options["position_error"], -6),
+        **{name: si(options[name], power) for name, power in _TAKEN_FOR_GRANTED.items()},
     )
     return import_table(
         path,

@@ -58,7 +58,8 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
     if not model.order:
-        found |= _of_lines(estimate)
+        # A scan over the plane, or crossed lines, measures both.
+        found |= {} if estimate.points.ellipse else _of_lines(estimate)
         found |= _of_film(scans, estimate)
     return found
 

@@ -16,7 +16,14 @@ from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
-from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
+from memscal.model.scan import (
+    BRANCHES,
+    LIKE_SIGNAL,
+    STATED_ERRORS,
+    Scan,
+    branch_numbers,
+    require_rod_friction,
+)
 from memscal.model.sizes import too_large
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
@@ -128,9 +135,10 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
     arrays: dict[str, Any] = {}
-    scale = f"{_DATA}/position_scale_errors"
-    if file.has(scale):
-        arrays["position_scale_uncertainty"] = values.require_scalar(file, scale, "dimensionless")
+    for name in STATED_ERRORS:
+        path = f"{_DATA}/{name}_errors"
+        if file.has(path):
+            arrays[f"{name}_uncertainty"] = values.require_scalar(file, path, _dimension(name))
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
@@ -138,6 +146,11 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]
             dimension = quantity.read_in(reading).dimension
             arrays[name] = values.require_array(file, path, dimension, ndim=ndim)
     return arrays
+
+
+def _dimension(name: str) -> str:
+    """Dimension of what a scan takes for granted."""
+    return "length" if name == "line_offset" else "dimensionless"
 
 
 def write_scan(scan: Scan, path: FilePath, *, overwrite: bool = False) -> None:
@@ -204,8 +217,10 @@ def _data_group(scan: Scan) -> Group:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, positions, axes if points else (along,))
-    if scan.position_scale_uncertainty is not None:
-        data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
+    for name in STATED_ERRORS:
+        stated = getattr(scan, f"{name}_uncertainty")
+        if stated is not None:
+            data[f"{name}_errors"] = si(stated, _dimension(name))
     data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:
         pairs = zip(_PAIRS, scan.u_zz_correlation.shape, strict=True)

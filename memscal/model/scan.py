@@ -30,6 +30,17 @@ LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors")
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
 
+STATED_ERRORS = (
+    "position_scale",
+    "gain",
+    "gain_curvature",
+    "roundness",
+    "line_offset",
+    "base_slip",
+    "baseline_curvature",
+)
+"""What a scan takes for granted unless it states a standard uncertainty, by its budget's names."""
+
 BRANCHES = {"approach": 1, "retreat": 2}
 """Numbers of the indenter's branches; 0 where none is stated."""
 
@@ -129,7 +140,7 @@ class SetUp(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scan:
-    """Sensor voltage against the position of the indenter, with what it was measured on.
+    r"""Sensor voltage against the position of the indenter, with what it was measured on.
 
     A scan has one of four forms, named by ``kind``:
 
@@ -180,6 +191,15 @@ class Scan:
         ``"x"`` or ``"y"``: which way a line scan ran across the sensor; its positions are in ``x``.
     position_scale_uncertainty : float, optional
         Relative standard uncertainty of the stage's scale, common to all positions.
+    gain_uncertainty, gain_curvature_uncertainty : float, optional
+        Relative standard uncertainty of the sensor's chain, common to all readings; and b of a
+        reading :math:`U (1 - b\,U/U_{max})`.
+    roundness_uncertainty, line_offset_uncertainty : float, optional
+        Standard uncertainty of the sensor's axis ratio less one, and of the distance at which a
+        line passes its centre, in m.
+    base_slip_uncertainty, baseline_curvature_uncertainty : float, optional
+        That of the share of the difference to a base on which the film slides freely; and of the
+        baseline from the edge of the scan to its centre, over the largest signal.
     channels : mapping of str to ndarray, shape of ``u_zz``
         Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
         (``u_xz_errors``, ``u_yz_errors``).
@@ -227,6 +247,12 @@ class Scan:
     u_zz_correlation: FloatArray | None = None
     direction: str = "x"
     position_scale_uncertainty: float | None = None
+    gain_uncertainty: float | None = None
+    gain_curvature_uncertainty: float | None = None
+    roundness_uncertainty: float | None = None
+    line_offset_uncertainty: float | None = None
+    base_slip_uncertainty: float | None = None
+    baseline_curvature_uncertainty: float | None = None
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
     rod_friction: float | None = None
@@ -450,9 +476,9 @@ class Scan:
         if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
             cure = "A line scan runs along 'x' or 'y'; a raster has its own y."
             raise InputError(f"The direction of the scan is {self.direction!r}.", cure=cure)
-        arrays.require_non_negative(
-            "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
-        )
+        for name in STATED_ERRORS:
+            words = f"{name.replace('_', ' ')} uncertainty of the scan"
+            arrays.require_non_negative(words, getattr(self, f"{name}_uncertainty"))
         require_rod_friction(self.rod_friction)
         arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         if self.load is None:

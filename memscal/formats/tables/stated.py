@@ -115,6 +115,10 @@ class ScanUncertainties:
         Of the load, common to all points, in N; and of each point's own, relative.
     x_error, position_scale_uncertainty : float, optional
         Of each position, independent from point to point, in m; and of the stage's scale, relative.
+    gain_uncertainty, gain_curvature_uncertainty, roundness_uncertainty : float, optional
+        As in :class:`memscal.Scan`, with the next three; relative, or a share.
+    line_offset_uncertainty, base_slip_uncertainty, baseline_curvature_uncertainty : float, optional
+        The first in m.
     u_zz_correlation : ndarray, optional
         Correlation of the noise between points, as in :class:`memscal.Scan`.
 
@@ -132,4 +136,10 @@ class ScanUncertainties:
     load_scatter: float | None = None
     x_error: float | None = None
     position_scale_uncertainty: float | None = None
+    gain_uncertainty: float | None = None
+    gain_curvature_uncertainty: float | None = None
+    roundness_uncertainty: float | None = None
+    line_offset_uncertainty: float | None = None
+    base_slip_uncertainty: float | None = None
+    baseline_curvature_uncertainty: float | None = None
     u_zz_correlation: FloatArray | None = None
