@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from memscal.calibration.stages import Solution
+from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import Results
 from memscal.estimation.influences import Influence, influences
+from memscal.estimation.points import measured_mask
 from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
 
@@ -41,6 +43,24 @@ def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ..
         if name in sizes and (state != STATED or name not in _ASKED_FOR):
             assumptions.append(Assumption(name, state, sizes[name]))
     return tuple(assumptions)
+
+
+def less_mean_offset(solution: Solution) -> Solution:
+    """Solve again without what lines read less on average for passing beside the centre."""
+    # Of an offset of mean zero the square has the mean u^2, whichever side the line passes on.
+    points = solution.estimate.points
+    u = np.array([scan.line_offset_uncertainty or 0.0 for scan in solution.scans])
+    if points.ellipse or points.order or not u.any():
+        return solution
+    offset = influences(solution.scans, solution.estimate)["line_offset"]
+    mean = offset.voltage * u[points.scan] ** 2
+    scans = []
+    for i, scan in enumerate(solution.scans):
+        readings = scan.u_zz.copy()
+        readings[measured_mask(scan)] -= mean[points.scan == i]
+        scans.append(replace(scan, u_zz=readings))
+    corrected = solve(scans, solution.stresses, solution.method, owners=solution.owners)
+    return replace(corrected, apart=solution.apart)
 
 
 def _state(solution: Solution, name: str) -> str:
