@@ -53,7 +53,7 @@ def less_mean_offset(solution: Solution) -> Solution:
     if points.ellipse or points.order or not u.any():
         return solution
     offset = influences(solution.scans, solution.estimate)["line_offset"]
-    mean = offset.voltage * u[points.scan] ** 2
+    mean = offset.squared * u[points.scan] ** 2
     scans = []
     for i, scan in enumerate(solution.scans):
         readings = scan.u_zz.copy()
@@ -80,17 +80,20 @@ def _state(solution: Solution, name: str) -> str:
 
 
 def _sizes(effect: Influence, results: Results) -> dict[str, float]:
-    """Sizes of an influence that move each parameter by one standard uncertainty."""
+    """Sizes of an influence, of the sign that needs less, that move each parameter by its u."""
     parameters = results.parameters
-    moved = (results.by_voltage @ effect.voltage[:, None])[:, 0]
+    squared = np.broadcast_to(effect.squared, effect.voltage.shape)
+    moved = np.abs(results.by_voltage @ np.stack([effect.voltage, squared], axis=1))
     sizes = {}
     for parameter in MOVED:
         row = parameters.names.index(parameter)
-        by_one = abs(moved[row])
+        u = parameters.uncertainty(parameter)
+        by_one, by_square = moved[row]
         if parameter == "conversion_constant":
-            by_one = abs(moved[row] + effect.scaling * parameters[parameter])
-        size = parameters.uncertainty(parameter) / by_one if by_one > 0 else math.inf
-        sizes[parameter] = float(size**0.5 if effect.squared else size)
+            by_one += abs(effect.scaling) * parameters[parameter]
+        # The root of by_square d^2 + by_one d = u, in a form without cancellation.
+        divisor = by_one + math.sqrt(by_one**2 + 4 * by_square * u)
+        sizes[parameter] = float(2 * u / divisor) if divisor > 0 else math.inf
     return sizes
 
 

@@ -120,9 +120,9 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
     for name, u in stated.items():
         influence = found.get({"position_scale": "stage_scale"}.get(name, name))
         if influence is not None:
-            # Of a square that is normally distributed the mean is corrected.
-            size = 2**0.5 * u**2 if influence.squared else u
-            effects[name] = InputEffect(-size * influence.voltage)
+            # The mean of a square is corrected; its standard deviation is left.
+            change = u * influence.voltage + 2**0.5 * u**2 * influence.squared
+            effects[name] = InputEffect(-change)
     return effects
 
 

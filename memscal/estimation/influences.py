@@ -18,7 +18,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
     RECTANGLE,
-    film_sensitivities,
+    difference,
     law_sensitivities,
     relative,
 )
@@ -28,8 +28,9 @@ from memscal.model.scan import Scan
 
 #: Distance of a line from the centre, over the width of the Gaussian, at which its change is taken.
 _OFF = 0.2
-#: Relative steps of the film's properties.
-_STEP = 0.01
+#: Steps of the thickness, relative, and of Poisson's ratio.
+_STEP = 0.05
+_STEP_OF_RATIO = 0.015
 #: What two models of a film differ by, by the names of budget and assumption.
 _LAW = {"model_form": "film_law", "rod_friction": "rod_friction"}
 #: Wavenumbers times thickness beyond which nothing reaches the base.
@@ -38,10 +39,10 @@ _LARGEST_KH = 38.0
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """What one unit (m of a length) of one thing does to the voltages, (n,), in V."""
+    """What a size of one thing does to the voltages, (n,), in V: by one unit, and by its square."""
 
     voltage: FloatArray
-    squared: bool = False  # the change is in proportion to the square of the size
+    squared: FloatArray | float = 0.0
     scaling: float = 0.0  # relative change of A beside that
 
 
@@ -88,61 +89,63 @@ def _of_lines(estimate: ProfileEstimate) -> dict[str, Influence]:
     change = model.signal(beside, estimate.kernel) - model.signal(passing, estimate.kernel)
     return {
         "roundness": Influence(fit.conversion_constant * oval),
-        "line_offset": Influence(change / away**2, squared=True),
+        "line_offset": Influence(np.zeros_like(change), change / away**2),
     }
 
 
 def _of_film(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Influence]:
     """Influences of base, shear, law, Poisson's ratio and thickness of the films."""
     by_scan = [_film_changes(scan, estimate, i) for i, scan in enumerate(scans)]
-    names = set.intersection(*map(set, by_scan))
-    return {name: _by_spectra(estimate, [each[name] for each in by_scan]) for name in sorted(names)}
+    found = {}
+    for name in set.intersection(*map(set, by_scan)):
+        orders = zip(*(each[name] for each in by_scan), strict=True)
+        found[name] = Influence(*(_by_spectra(estimate, changes) for changes in orders))
+    return found
 
 
-def _by_spectra(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> Influence:
-    """Influence of changes of the references' transforms."""
+def _by_spectra(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> FloatArray:
+    """Voltages by changes of the references' transforms."""
     model = estimate.model
     changed = zip(model.references, changes, strict=True)
     references = tuple(replace(reference, values=values) for reference, values in changed)
-    voltage = replace(model, references=references).signal(
-        estimate.gaussian.geometry, estimate.kernel
-    )
-    return Influence(voltage)
+    model = replace(model, references=references)
+    return model.signal(estimate.gaussian.geometry, estimate.kernel)
 
 
-def _film_changes(scan: Scan, estimate: ProfileEstimate, number: int) -> dict[str, FloatArray]:
-    """Changes of one scan's reference by one unit of what is taken for granted of its film."""
+def _film_changes(
+    scan: Scan, estimate: ProfileEstimate, number: int
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Changes of one scan's reference by one unit of each property of its film, and its square."""
     reference = estimate.model.references[number]
     if scan.film is None or scan.indenter is None or reference.source:
         return {}
-    film = scan.film.expected
+    set_up = scan.set_up.expected
+    film = set_up.film
     k = reference.wavenumbers.k
+    nothing = np.zeros_like(k)
     x = np.minimum(k * film.thickness, _LARGEST_KH)
     bonded = base_normal_from_pressure(x, film.poisson_ratio)
     sliding = 2 * (np.sinh(x) + x * np.cosh(x)) / (np.sinh(2 * x) + 2 * x)
-    sliding[x == 0] = 1.0
     shear = base_shear_from_pressure(x, film.poisson_ratio)
     changes = {
-        "base_slip": reference.values * (relative(sliding, bonded) - 1),
-        "shear_sensitivity": -reference.values * k * relative(shear, bonded),
+        "base_slip": (reference.values * (relative(sliding, bonded) - 1), nothing),
+        "shear_sensitivity": (-reference.values * k * relative(shear, bonded), nothing),
     }
-    stated = replace(
-        scan.film,
-        poisson_ratio_uncertainty=_STEP,
-        thickness_uncertainty=_STEP * film.thickness,
-        young_modulus_uncertainty=None,
-    )
-    by_film = film_sensitivities(scan.set_up._replace(film=stated), reference)
-    set_up = scan.set_up.expected
-    changes["poisson_ratio"] = by_film["poisson_ratio"] / _STEP
-    changes["thickness"] = by_film["thickness"] / (_STEP * film.thickness)
+    for name, step in (("poisson_ratio", _STEP_OF_RATIO), ("thickness", _STEP * film.thickness)):
+        if getattr(scan.film, f"{name}_uncertainty") is None:
+            value = getattr(film, name)
+            # Beyond 1/2 there is no Poisson's ratio.
+            steps = (-2 * step, -step) if name == "poisson_ratio" else (-step, step)
+            varied = [set_up._replace(film=replace(film, **{name: value + d})) for d in steps]
+            pairs = zip(varied, steps, strict=True)
+            by_step = [difference(set_up, reference, more, set_up) / d for more, d in pairs]
+            square = (by_step[1] - by_step[0]) / (steps[1] - steps[0])
+            changes[name] = (by_step[0] - square * steps[0], square)
     for name, sign in (("model_form", 1.0), ("rod_friction", -1.0)):
         law = "" if name == "model_form" else film.law
-        unstated = replace(
-            film, law=law, mooney_rivlin_ratio=film.mooney_rivlin_ratio if law else None
-        )
-        open_law = set_up._replace(film=unstated, rod_friction=None)
-        change = law_sensitivities(open_law, reference).get(name)
-        if change is not None:
-            changes[_LAW[name]] = sign * change / RECTANGLE
+        ratio = film.mooney_rivlin_ratio if law else None
+        unstated = replace(film, law=law, mooney_rivlin_ratio=ratio)
+        by_law = law_sensitivities(set_up._replace(film=unstated, rod_friction=None), reference)
+        if name in by_law:
+            changes[_LAW[name]] = (sign * by_law[name] / RECTANGLE, nothing)
     return changes

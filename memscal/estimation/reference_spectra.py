@@ -51,7 +51,7 @@ def expected_spectra(
         same_ratio = film and made_on and film.poisson_ratio == made_on.poisson_ratio
         if film and same_ratio and film.expected != film:
             set_up = scan.set_up
-            change = _difference(set_up, reference, set_up.expected, set_up)
+            change = difference(set_up, reference, set_up.expected, set_up)
             reference = replace(reference, values=reference.values + change)
         moved.append(reference)
     return tuple(moved)
@@ -205,7 +205,7 @@ def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str,
         if ends:
             more, less, share = ends
             varied = (set_up._replace(film=more), set_up._replace(film=less))
-            changes[name] = share * _difference(set_up, reference, *varied)
+            changes[name] = share * difference(set_up, reference, *varied)
     return changes
 
 
@@ -217,7 +217,7 @@ def rod_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
         return {}
     more = set_up._replace(indenter=replace(rod, radius=rod.radius + u))
     less = set_up._replace(indenter=replace(rod, radius=max(rod.radius - u, rod.radius / 2)))
-    return {"rod_radius": _difference(set_up, reference, more, less) / 2}
+    return {"rod_radius": difference(set_up, reference, more, less) / 2}
 
 
 def load_sensitivities(
@@ -231,7 +231,7 @@ def load_sensitivities(
             set_up = scan.set_up.expected
             more = set_up._replace(load=set_up.load + scan.load_uncertainty)
             less = set_up._replace(load=set_up.load - scan.load_uncertainty)
-            changes[i] = _difference(set_up, reference, more, less) / 2
+            changes[i] = difference(set_up, reference, more, less) / 2
     return changes
 
 
@@ -278,7 +278,7 @@ _SENSITIVITIES = {
 }
 
 
-def _difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:
+def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     law = law_at_once(set_up)
     k = reference.wavenumbers.k.tobytes()

@@ -1,0 +1,64 @@
+"""What scans do not state: sizes of assumptions against scans of another forward calculation."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.outside import ROUND, A, World, elliptic
+from helpers.outside import scan as perturbed_scan
+
+import memscal
+
+pytestmark = pytest.mark.accuracy
+
+PERTURBED: dict[str, Callable[[float], World]] = {
+    "roundness": lambda size: elliptic(1 + size),
+    "line_offset": lambda size: replace(ROUND, line_offset=size),
+    "stage_scale": lambda size: replace(ROUND, stage_scale=1 + size),
+    "base_slip": lambda size: replace(ROUND, base_slip=size),
+    "baseline_curvature": lambda size: replace(ROUND, parabola=size),
+    "gain_curvature": lambda size: replace(ROUND, gain_curvature=size),
+    "shear_sensitivity": lambda size: replace(ROUND, shear_sensitivity=size),
+    "load_scale": lambda size: replace(ROUND, load_scale=1 + size),
+    "poisson_ratio": lambda size: replace(ROUND, poisson_ratio=0.5 - size),
+    "thickness": lambda size: replace(ROUND, thickness=2e-3 + size),
+}
+EITHER_SIGN = ("thickness", "shear_sensitivity")
+MOST = {"thickness": 0.1e-3}
+
+
+def unstated(world: World, noise: float) -> memscal.Scan:
+    """A scan without noise whose film and load state no uncertainty."""
+    made = perturbed_scan(world, 0, noise=noise)
+    film = replace(
+        made.film,
+        poisson_ratio_uncertainty=None,
+        thickness_uncertainty=None,
+        young_modulus_uncertainty=None,
+    )
+    return replace(made, u_zz=world.voltages(made.x), film=film, load_uncertainty=None)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.005])
+@pytest.mark.parametrize("method", ["white-noise", "bayesian"])
+def test_sizes_for_one_uncertainty_are_those_of_perturbed_scans(method: str, noise: float) -> None:
+    exact = memscal.calibrate(unstated(ROUND, noise), method=method).apparatus
+    sizes = {assumption.name: assumption.sizes for assumption in exact.assumptions}
+    assert set(PERTURBED) <= set(sizes)
+    ratios = {}
+    for name, perturbed in PERTURBED.items():
+        for parameter in ("conversion_constant", "gaussian_sigma"):
+            size = sizes[name][parameter]
+            # Larger ones are beyond what derivatives tell: A hardly depends on the thickness.
+            if size > MOST.get(name, 0.3):
+                continue
+            moved = []
+            for signed in (size, -size) if name in EITHER_SIGN else (size,):
+                scan = unstated(perturbed(signed), noise)
+                made = memscal.calibrate(scan, method=method).apparatus
+                moved.append(abs(made.parameters[parameter] - exact.parameters[parameter]))
+            ratios[name, parameter] = max(moved) / exact.parameters.uncertainty(parameter)
+    assert {name for name, _ in ratios} == set(PERTURBED)
+    assert {key: ratio for key, ratio in ratios.items() if not 1 / 1.5 < ratio < 1.5} == {}
+    assert np.isclose(exact.conversion_constant, A, rtol=2e-3)
