@@ -8,7 +8,7 @@ import numpy as np
 
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import Results
-from memscal.estimation.influences import Influence, influences
+from memscal.estimation.influences import Influence, influences, measured_by
 from memscal.estimation.points import measured_mask
 from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
@@ -50,7 +50,7 @@ def less_mean_offset(solution: Solution) -> Solution:
     # Of an offset of mean zero the square has the mean u^2, whichever side the line passes on.
     points = solution.estimate.points
     u = np.array([scan.line_offset_uncertainty or 0.0 for scan in solution.scans])
-    if points.ellipse or points.order or not u.any():
+    if points.order or not u.any() or "line_offset" in measured_by(points):
         return solution
     offset = influences(solution.scans, solution.estimate)["line_offset"]
     mean = offset.squared * u[points.scan] ** 2
@@ -66,7 +66,7 @@ def less_mean_offset(solution: Solution) -> Solution:
 def _state(solution: Solution, name: str) -> str:
     """Say whether something is assumed, stated by every scan, or measured by them."""
     points = solution.estimate.points
-    if name in ("roundness", "line_offset") and points.ellipse:
+    if name in measured_by(points):
         return MEASURED
     stated = []
     for scan in solution.scans:

@@ -26,6 +26,7 @@ from memscal.estimation.set_up import reference_profile
 from memscal.extensions import hook
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
+from memscal.model.assumptions import Assumption
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.sizes import MOST_OF_LINES
@@ -74,6 +75,11 @@ class Calibration(Result):
     def passed(self) -> bool:
         """Whether every quality check passed."""
         return self.apparatus.passed
+
+    @property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """What the result takes for granted, with the sizes at which that would matter."""
+        return self.apparatus.assumptions
 
     @single_threaded()
     def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> "Sweep":

@@ -29,7 +29,7 @@ from memscal.calibration.fields import RasterFields, cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
-from memscal.estimation.influences import influences
+from memscal.estimation.influences import influences, measured_by
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
     RECTANGLE,
@@ -113,7 +113,7 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
     stated = {}
     for name in STATED_ERRORS:
         u = np.array([getattr(scan, f"{name}_uncertainty") or 0.0 for scan in scans])
-        if u.any() and name != "gain":
+        if u.any() and name not in ("gain", *measured_by(estimate.points)):
             stated[name] = u[estimate.points.scan]
     found = influences(scans, estimate) if stated else {}
     effects = {}

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
     RECTANGLE,
@@ -23,7 +24,9 @@ from memscal.estimation.reference_spectra import (
     relative,
 )
 from memscal.mechanics.film_response import base_normal_from_pressure, base_shear_from_pressure
+from memscal.mechanics.press_rod import is_tabulated
 from memscal.model.arrays import FloatArray
+from memscal.model.film import NEO_HOOKEAN
 from memscal.model.scan import Scan
 
 #: Distance of a line from the centre, over the width of the Gaussian, at which its change is taken.
@@ -59,10 +62,16 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
     if not model.order:
-        # A scan over the plane, or crossed lines, measures both.
-        found |= {} if estimate.points.ellipse else _of_lines(estimate)
+        found |= _of_lines(estimate)
         found |= _of_film(scans, estimate)
     return found
+
+
+def measured_by(points: ScanPoints) -> tuple[str, ...]:
+    """Return what points show by themselves: lines that cross an ellipse, a plane its centre too."""
+    if points.planar:
+        return "roundness", "line_offset"
+    return ("roundness",) if points.ellipse else ()
 
 
 def _parabolas(estimate: ProfileEstimate) -> FloatArray:
@@ -141,6 +150,8 @@ def _film_changes(
             by_step = [difference(set_up, reference, more, set_up) / d for more, d in pairs]
             square = (by_step[1] - by_step[0]) / (steps[1] - steps[0])
             changes[name] = (by_step[0] - square * steps[0], square)
+    if not is_tabulated(*set_up.under(NEO_HOOKEAN)._replace(rod_friction=None)):
+        return changes
     for name, sign in (("model_form", 1.0), ("rod_friction", -1.0)):
         law = "" if name == "model_form" else film.law
         ratio = film.mooney_rivlin_ratio if law else None

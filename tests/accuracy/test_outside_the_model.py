@@ -25,7 +25,7 @@ PERTURBED: dict[str, Callable[[float], World]] = {
     "thickness": lambda size: replace(ROUND, thickness=2e-3 + size),
 }
 EITHER_SIGN = ("thickness", "shear_sensitivity")
-MOST = {"thickness": 0.1e-3}
+MOST = {"thickness": 0.03e-3}
 
 
 def unstated(world: World, noise: float) -> memscal.Scan:

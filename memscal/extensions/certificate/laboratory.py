@@ -15,7 +15,7 @@ from memscal.formats.files import FilePath, read_bytes
 from memscal.formats.units import to_si
 from memscal.model.apparatus import ApparatusData
 from memscal.model.quantities import ESTIMATED
-from memscal.model.scan import Scan
+from memscal.model.scan import STATED_ERRORS, Scan
 
 _LONGEST = 1 << 20
 _CELSIUS = ("degC", "°C")
@@ -38,6 +38,7 @@ _KEYS = {
     "decision": " ".join(
         ["rule:rule guard_band:number", *(f"{name}:limits" for name in ESTIMATED)]
     ),
+    "uncertainties": " ".join(f"{name}_uncertainty:number" for name in STATED_ERRORS),
     "limits": "lower:number upper:number unit",
     "quantity": "value:number unit uncertainty:number",
 }
@@ -96,6 +97,8 @@ class LaboratoryFile:
             parts[attribute] = {k: v for k, v in found[0].items() if k != "kind"} if found else {}
         times = {key: self.stated("conditions", key) for key in ("start_time", "end_time")}
         added = self._added(holder, times, "measurement")
+        if isinstance(holder, Scan):
+            added |= self._added(holder, self.sections.get("uncertainties", {}), "scan")
         for name, stated in parts.items():
             part = getattr(holder, name)
             added[name] = replace(part, **self._added(part, stated, name))
@@ -137,7 +140,8 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     for kind in KINDS:
         if sum(item.get("kind") == kind for item in listed) > 1:
             raise FormatError(f"{name} has more than one {kind}.", cure="Leave all but one out.")
-    known = [section for section in NEEDED if section != "equipment"] + ["decision"]
+    known = [section for section in NEEDED if section != "equipment"]
+    known += ["decision", "uncertainties"]
     for section in content:
         _require_known(name, section, known)
     sections = {key: _section(f"{name}: [{key}]", key, item) for key, item in content.items()}

@@ -1,0 +1,120 @@
+"""What a calibration takes for granted: listed with sizes, counted where it is stated."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.console import Run
+from helpers.outside import ROUND, A, World
+from helpers.outside import scan as outside_scan
+
+import memscal
+from memscal.model.scan import STATED_ERRORS
+
+SIZES = {
+    "position_scale": 0.005,
+    "gain": 0.01,
+    "gain_curvature": 0.02,
+    "roundness": 0.03,
+    "line_offset": 0.1e-3,
+    "base_slip": 0.05,
+    "baseline_curvature": 0.002,
+}
+
+
+def stated(**sizes: float) -> memscal.Scan:
+    uncertainties = {f"{name}_uncertainty": size for name, size in sizes.items()}
+    return replace(outside_scan(ROUND, 1), **uncertainties)
+
+
+def test_every_statement_has_a_size_here() -> None:
+    assert set(SIZES) == set(STATED_ERRORS)
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name: str) -> None:
+    free = memscal.calibrate(stated()).apparatus
+    counted = memscal.calibrate(stated(**{name: SIZES[name]})).apparatus
+    line = counted.budget["conversion_constant"][name]
+    listed = {assumption.name: assumption for assumption in free.assumptions}
+    u = free.parameters.uncertainty("conversion_constant")
+    if name == "gain":
+        assert line == pytest.approx(SIZES[name] * counted.conversion_constant, rel=1e-6)
+        return
+    assumption = listed["stage_scale" if name == "position_scale" else name]
+    assert assumption.state == "assumed"
+    share = SIZES[name] / assumption.sizes["conversion_constant"]
+    expected = 2**0.5 * share**2 if name == "line_offset" else share
+    assert line == pytest.approx(expected * u, rel=0.05)
+    states = {assumption.name: assumption.state for assumption in counted.assumptions}
+    assert states[assumption.name] == "stated"
+
+
+def test_the_mean_of_an_offset_is_corrected() -> None:
+    u = 0.3e-3
+    # By Gauss-Hermite quadrature over offsets, from whose sign nothing depends.
+    nodes, weights = np.polynomial.hermite_e.hermegauss(7)
+    errors = []
+    for node in nodes[nodes >= 0]:
+        made = outside_scan(replace(ROUND, line_offset=float(node) * u), 3, noise=0.001)
+        offset = replace(made, line_offset_uncertainty=u)
+        errors.append(memscal.calibrate(offset, other=False).apparatus.conversion_constant / A - 1)
+    mirrored = np.concatenate([errors[:0:-1], errors])
+    mean = float(weights @ mirrored / weights.sum())
+    spread = float(np.sqrt(weights @ (mirrored - mean) ** 2 / weights.sum()))
+    # Without the correction the mean error is -4 %.
+    assert abs(mean) < 0.005
+    centred = replace(outside_scan(ROUND, 3, noise=0.001), line_offset_uncertainty=u)
+    counted = memscal.calibrate(centred, other=False).apparatus.budget["conversion_constant"]
+    assert counted["line_offset"] / A == pytest.approx(spread, rel=0.3)
+
+
+def test_a_raster_measures_what_a_line_assumes() -> None:
+    line = memscal.calibrate(stated()).apparatus
+    raster = memscal.calibrate(memscal.simulate(raster=True, points=17, seed=1)).apparatus
+    names = {assumption.name for assumption in line.assumptions}
+    assert {"roundness", "line_offset"} <= names
+    states = {assumption.name: assumption.state for assumption in raster.assumptions}
+    assert states["roundness"] == states["line_offset"] == "measured"
+
+
+def test_assumptions_are_in_file_json_and_text(tmp_path: Path) -> None:
+    calibration = memscal.calibrate(stated())
+    path = tmp_path / "a.apparatus.h5"
+    calibration.apparatus.save(path)
+    assert memscal.load_apparatus(path).assumptions == calibration.apparatus.assumptions
+    listed = json.loads(json.dumps(calibration.to_dict()))["assumptions"]
+    assert [entry["name"] for entry in listed] == [a.name for a in calibration.assumptions]
+    roundness = listed[0]
+    assert roundness["size_for_one_u"]["unit"] == "1"
+    offset = listed[1]["size_for_one_u"]
+    assert offset["unit"] == "mm"
+    assert 0.1 < offset["value"] < 0.3
+    text = " ".join(message.text for message in calibration.apparatus.process.messages)
+    assert "the sensor is round" in text
+    assert f"{roundness['size_for_one_u']['value']:.2g}" in text
+
+
+def test_options_of_import_state_them(run: Run, tmp_path: Path) -> None:
+    made = outside_scan(World(), 1)
+    rows = "\n".join(f"{x * 1e3:.6g},{u * 1e3:.8g}" for x, u in zip(made.x, made.u_zz, strict=True))
+    (tmp_path / "t.csv").write_text(f"x [mm],U [mV]\n{rows}\n", encoding="utf-8")
+    given = ["--position-scale-uncertainty", "0.2", "--line-offset-uncertainty", "0.1"]
+    given += ["--roundness-uncertainty", "0.05", "--gain-uncertainty", "0.5"]
+    given += ["--base-slip-uncertainty", "0.1", "--baseline-curvature-uncertainty", "0"]
+    given += ["--gain-curvature-uncertainty", "0.01"]
+    columns = ["--x", "x", "--u", "U"]
+    run("import", tmp_path / "t.csv", "-o", tmp_path / "s.h5", *columns, *given)
+    read = memscal.read_scan(tmp_path / "s.h5")
+    values = {name: getattr(read, f"{name}_uncertainty") for name in STATED_ERRORS}
+    assert values == {
+        "position_scale": 0.002,
+        "gain": 0.005,
+        "gain_curvature": 0.01,
+        "roundness": 0.05,
+        "line_offset": 1e-4,
+        "base_slip": 0.1,
+        "baseline_curvature": 0.0,
+    }
