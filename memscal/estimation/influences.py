@@ -68,7 +68,7 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
 
 
 def measured_by(points: ScanPoints) -> tuple[str, ...]:
-    """Return what points show by themselves: lines that cross an ellipse, a plane its centre too."""
+    """Return what points show by themselves: crossed lines an ellipse, a plane its centre too."""
     if points.planar:
         return "roundness", "line_offset"
     return ("roundness",) if points.ellipse else ()

@@ -32,7 +32,7 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
-from memscal.summaries.calibration import apparatus_of, sensor_title
+from memscal.summaries.calibration import apparatus_of, assumptions_table, sensor_title
 from memscal.summaries.declared import total_of
 from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
 from memscal.version import __version__
@@ -65,6 +65,7 @@ class Report:
     checks: Sequence[QualityCheck] = ()
     messages: Sequence[Message] = ()
     budget: Table | None = None
+    assumptions: Table | None = None
     settings: Sequence[Table] = ()
     files: Mapping[str, SourceFile | None] = field(default_factory=dict)
     process: Process | None = None
@@ -82,6 +83,7 @@ def html_report(result: Result) -> str:
         "Quality checks": _html([_checks(report.checks)]),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
         "Uncertainty budget": _html([report.budget] if report.budget else []),
+        "What the answer assumes": _html([report.assumptions] if report.assumptions else []),
         "What was measured on": _html(report.settings),
         "Provenance": _html(_provenance(report)),
     }
@@ -187,6 +189,7 @@ def _calibration_report(result: Calibration | ApparatusFunction) -> Report:
         checks=data.checks,
         messages=process.messages,
         budget=_budget(*budgets, down=True),
+        assumptions=assumptions_table(data),
         settings=[_setting(data, data.load, data.reference)],
         files={"scan": process.input_scan, "reference": process.input_reference},
         process=process,

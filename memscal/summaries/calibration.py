@@ -11,6 +11,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.assumptions import MOVED
 from memscal.model.checks import REPEAT_CENTRES, Message
 from memscal.model.quantities import (
     ESTIMATED,
@@ -169,6 +170,20 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     values["checks"] = checks_json(apparatus.checks)
     values["warnings"] = texts_of(apparatus.process.messages)
     return values
+
+
+def assumptions_table(apparatus: ApparatusData) -> Table:
+    """Return what is taken for granted, and the sizes that move A, its widths by their u."""
+    rows = []
+    for assumption in apparatus.assumptions:
+        sizes = []
+        for parameter in MOVED:
+            size = assumption.size(parameter)
+            sizes.append(f"{size:.2g}" if math.isfinite(size) else "-")
+        measure = f"{assumption.measure} ({assumption.unit})"
+        rows.append((assumption.sentence, assumption.state, measure, *sizes))
+    heads = ("taken for granted", "state", "size", "for u(A)", "for u(σ)", "for u(FWHM)")
+    return Table("Sizes that move a result by one standard uncertainty", heads, rows)
 
 
 def dataset(result: Calibrated) -> Dataset:
