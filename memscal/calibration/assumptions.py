@@ -33,7 +33,9 @@ _STATEMENTS = {
 def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ...]:
     """Return what a calibration takes for granted, each with its sizes for one uncertainty."""
     effects = influences(solution.scans, solution.estimate)
-    sizes = {name: _sizes(effect, results) for name, effect in effects.items()}
+    sizes: dict[str, Mapping[str, float]] = {}
+    for name, effect in effects.items():
+        sizes[name] = _sizes(effect, results)
     if solution.estimate.points.u.size <= DENSE:
         sizes["noise_correlation"] = _correlations(solution, results)
     assumptions = []
@@ -109,12 +111,12 @@ def _correlations(solution: Solution, results: Results) -> Mapping[str, float]:
     sizes = {}
     for parameter in MOVED:
         row = by_noise[names.index(parameter), order]
-        added = 0.0
+        added = np.zeros_like(_CORRELATIONS)
         for number in np.unique(passes):
             alike = row[passes == number]
             lags = np.arange(1, alike.size)
             products = np.correlate(alike, alike, "full")[alike.size :]
-            added = added + 2 * (_CORRELATIONS[:, None] ** lags) @ products
+            added += 2 * (_CORRELATIONS[:, None] ** lags) @ products
         beyond = np.flatnonzero(added >= results.parameters.uncertainty(parameter) ** 2)
         sizes[parameter] = float(_CORRELATIONS[beyond[0]]) if beyond.size else math.inf
     return sizes

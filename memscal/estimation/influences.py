@@ -21,7 +21,6 @@ from memscal.estimation.reference_spectra import (
     RECTANGLE,
     difference,
     law_sensitivities,
-    relative,
 )
 from memscal.mechanics.film_response import base_normal_from_pressure, base_shear_from_pressure
 from memscal.mechanics.press_rod import is_tabulated
@@ -61,7 +60,7 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
         "gain_curvature": Influence(-signal * np.abs(signal) / largest),
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
-    if not model.order:
+    if not estimate.points.order:
         found |= _of_lines(estimate)
         found |= _of_film(scans, estimate)
     return found
@@ -107,8 +106,8 @@ def _of_film(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Infl
     by_scan = [_film_changes(scan, estimate, i) for i, scan in enumerate(scans)]
     found = {}
     for name in set.intersection(*map(set, by_scan)):
-        orders = zip(*(each[name] for each in by_scan), strict=True)
-        found[name] = Influence(*(_by_spectra(estimate, changes) for changes in orders))
+        first, second = zip(*(each[name] for each in by_scan), strict=True)
+        found[name] = Influence(_by_spectra(estimate, first), _by_spectra(estimate, second))
     return found
 
 
@@ -137,8 +136,8 @@ def _film_changes(
     sliding = 2 * (np.sinh(x) + x * np.cosh(x)) / (np.sinh(2 * x) + 2 * x)
     shear = base_shear_from_pressure(x, film.poisson_ratio)
     changes = {
-        "base_slip": (reference.values * (relative(sliding, bonded) - 1), nothing),
-        "shear_sensitivity": (-reference.values * k * relative(shear, bonded), nothing),
+        "base_slip": (reference.values * (sliding / bonded - 1), nothing),
+        "shear_sensitivity": (-reference.values * k * shear / bonded, nothing),
     }
     for name, step in (("poisson_ratio", _STEP_OF_RATIO), ("thickness", _STEP * film.thickness)):
         if getattr(scan.film, f"{name}_uncertainty") is None:
