@@ -244,12 +244,12 @@ def calibrate(
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
-    checks = quality_checks(solution, results, by_other_route)
+    assumptions = assumptions_of(solution, results)
+    checks = quality_checks(solution, results, by_other_route, assumptions)
     done_with("checks")
     laws = None if relative or solution.stress.form else weigh_laws(solution)
     if not other:
         by_other_route = None
-    assumptions = assumptions_of(solution, results)
     apparatus = assemble(prepared, solution, results, by_other_route, checks, laws, assumptions)
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 

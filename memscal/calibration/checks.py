@@ -1,6 +1,7 @@
 """Quality checks of a calibration: value, limit, and what a failure means."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import chdtrc
@@ -20,8 +21,9 @@ from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import IndexArray
+from memscal.model.assumptions import Assumption
 from memscal.model.checks import QualityCheck, check, chi_square_limit
-from memscal.model.film import LINEAR, law_in_words
+from memscal.model.film import LINEAR
 from memscal.model.notation import format_measured
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
@@ -40,15 +42,18 @@ _KINDS = {
 _ROUTES_LIMIT = 3.2
 #: Full width of a Gaussian at half of its maximum, over its standard deviation.
 _HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
-#: The base stress of a neo-Hookean film differs there from a linear one's by a tenth.
-INDENTATION_LIMIT = 0.1
+#: At this share of the thickness the base stress of a neo-Hookean film differs by a tenth.
+_DEEP = 0.1
 _BEYOND = 1.5
 _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
 
 
 def quality_checks(
-    solution: Solution, results: Results, other: Results | None
+    solution: Solution,
+    results: Results,
+    other: Results | None,
+    assumed: Sequence[Assumption],
 ) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan; ``other``: results by the other route."""
     division = results.division or (other.division if other else None)
@@ -59,7 +64,7 @@ def quality_checks(
         *_agreement(solution, results, division),
         *_shape(solution, results.parameters),
         *_set_up(solution),
-        _indentation(solution, results),
+        _indentation(solution, results, assumed),
     ]
     if estimate.points.u_errors is not None:
         checks.append(quality.noise_check(estimate.weighed.noise, estimate.points.channel))
@@ -247,30 +252,30 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     return checks
 
 
-def _indentation(solution: Solution, results: Results) -> QualityCheck | None:
-    """Compare the depth with the thickness: beyond the limit a linear film is formal."""
-    if solution.scan.film is None:
-        return None
+def _indentation(
+    solution: Solution, results: Results, assumed: Sequence[Assumption]
+) -> QualityCheck | None:
+    """Compare what a film's law would change, where nothing is counted for it, with u."""
     film = solution.scan.film
-    depths = []
-    for scan, stress in zip(solution.scans, solution.stresses, strict=True):
-        if scan.film is not None:
+    if film is None or film.law not in ("", LINEAR) or "model_form" in results.changes:
+        return None
+    laws = [assumption.sizes for assumption in assumed if assumption.name == "film_law"]
+    if laws:
+        change = max(1 / laws[0][name] for name in ("conversion_constant", "gaussian_sigma"))
+        words = "Change of A or sigma by a neo-Hookean film in place of the linear one, over its u."
+    else:
+        depths = []
+        for scan, stress in zip(solution.scans, solution.stresses, strict=True):
             depth = stress.depth or press_rod(*scan.set_up.under(LINEAR)).depth
-            depths.append(depth / scan.film.thickness)
-    meaning = "Largest depth of the rod over the film's thickness. "
-    formal = film.law == LINEAR or not (film.law or "model_form" in results.changes)
-    if formal:
-        meaning += (
-            "A failure means that a film that is taken as linear elastic, of which nothing is "
-            "counted, is strained too far for that: give its law (film/law, --film-law), or leave "
-            "it out to have the law's form counted, or calibrate at a lighter load."
-        )
-        return check("indentation", max(depths), INDENTATION_LIMIT, meaning)
-    why = "the form of the film's law, which is not stated, is counted (model_form)"
-    if film.law:
-        why = f"the reference is that of a {law_in_words(film.law)} film"
-    meaning += f"It has no limit, for {why}. A failure means that the film was stated linear."
-    return check("indentation", max(depths), math.inf, meaning)
+            depths.append(depth / scan.set_up.film.thickness)
+        change = max(depths) / _DEEP
+        words = f"Depth of the rod over {_DEEP:.0%} of the film's thickness."
+    meaning = (
+        f"{words} A failure means that a film that is taken as linear elastic, of which nothing is "
+        "counted, is strained too far for that: give its law (film/law, --film-law), or leave it "
+        "out to have the law's form counted, or calibrate at a lighter load."
+    )
+    return check("indentation", change, 1.0, meaning)
 
 
 def _unexplained(estimate: ProfileEstimate) -> list[QualityCheck]:
