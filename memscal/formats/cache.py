@@ -49,11 +49,9 @@ def table_key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, FloatArray]) -> bool:
+def keep_contact_table(folder: FilePath, key: str, arrays: Mapping[str, FloatArray]) -> bool:
     """Write arrays under their key, remove the oldest; return whether the disk took them."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
-    if folder is None:
-        return False
     children: dict[str, Node] = {
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
     }
@@ -70,10 +68,8 @@ def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, Float
     return True
 
 
-def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] | None:
+def find_contact_table(folder: FilePath, key: str) -> dict[str, FloatArray] | None:
     """Return the arrays that were kept under a key; ``None`` where none of them are sound."""
-    if folder is None:
-        return None
     path = _path(folder, key)
     try:
         with open_hdf5(path) as file:

@@ -17,7 +17,7 @@ def test_frictionless_rod_solves_the_fredholm_equation(ratio: float, nu: float) 
     t, t_weights = gauss_panels(1.0, 0.25)
     k, k_weights = gauss_panels(25.0 * ratio, 0.5)
     cosines = np.cos(np.outer(t, k))
-    layer = k_weights * film_response.normal_correction(k / ratio, nu)
+    layer = k_weights * film_response.corrections(k / ratio, nu)[0]
     kernel = 2 / np.pi * (cosines * layer) @ cosines.T
     phi = np.linalg.solve(np.eye(t.size) + kernel * t_weights, np.ones(t.size))
     solution = solve_rod(ratio, nu, sticking=False)
