@@ -13,9 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from memscal.errors import FormatError, MemscalError, OutputError
+from memscal.errors import MemscalError, OutputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_bytes
@@ -78,7 +76,7 @@ def find_contact_table(folder: FilePath, key: str) -> dict[str, FloatArray] | No
             if file.text("/entry/key") != key:
                 return None
             arrays = {
-                name: np.asarray(file.array(f"/entry/contacts/{name}"), dtype=np.float64)
+                name: file.array(f"/entry/contacts/{name}")
                 for name in file.text("/entry/arrays").split()
             }
     except MemscalError:
@@ -89,10 +87,7 @@ def find_contact_table(folder: FilePath, key: str) -> dict[str, FloatArray] | No
 
 
 def _path(folder: FilePath, key: str) -> Path:
-    name = f"{key}.h5"
-    if not _ENTRY.fullmatch(name):
-        raise FormatError(f"{key!r} is not the key of a contact table.")
-    return Path(folder) / name
+    return Path(folder) / f"{key}.h5"
 
 
 def _entries(folder: FilePath) -> list[tuple[Path, os.stat_result]]:
@@ -113,13 +108,6 @@ def _prune(folder: FilePath) -> None:
     for number, (path, status) in enumerate(entries[:-1]):
         if size <= _MOST_BYTES and len(entries) - number <= _MOST_ENTRIES:
             return
-        _removed(path)
+        with contextlib.suppress(OSError):
+            path.unlink()
         size -= status.st_size
-
-
-def _removed(path: Path) -> bool:
-    try:
-        path.unlink()
-    except OSError:
-        return False
-    return True

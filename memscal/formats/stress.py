@@ -193,7 +193,7 @@ def _entry(measured: MeasuredStress) -> Group:
         **_parts_of_profiles(measured.profiles),
         "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **digests),
         "quality": groups.quality_group(measured.checks),
-        "overridden": to_json("overridden", list(measured.overridden)),
+        "overridden": to_json("overridden", measured.overridden),
         # Those of the first scan; each scan states its own beside them.
         "sample": groups.sample_group(first.film),
         "instrument": groups.instrument_group(first.sensor, first.load_cell),
@@ -248,8 +248,10 @@ def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
 
 
 def _roots_group(profile: MeasuredProfile) -> Group:
-    children: dict[str, Node] = {"sources": to_json("sources", list(profile.roots))}
-    children["r"] = si(profile.r, "length", ("r",))
+    children: dict[str, Node] = {
+        "sources": to_json("sources", list(profile.roots)),
+        "r": si(profile.r, "length", ("r",)),
+    }
     for source, root in profile.roots.items():
         axes = ("r", f"column_{source}")[: root.ndim]
         children[f"root_{source}"] = si(root, "stress", axes)

@@ -65,13 +65,12 @@ def _in_rubber(contact: Contact) -> str:
     if not isinstance(rod, Rod) or not is_tabulated(film, rod, load, math.inf):
         return ""
     rubber = press_rod(film, rod, load, math.inf)
-    stress = rubber.max_base_stress / KPA
-    depth = rubber.depth / MM
-    changes = (rubber.max_base_stress / contact.max_base_stress, rubber.depth / contact.depth)
-    shares = [f"{change - 1:+.0%}" for change in changes]
+    stress = rubber.max_base_stress
+    depth = rubber.depth
     return (
-        f" In a neo-Hookean film that sticks to the rod the largest base stress is {stress:.3g} "
-        f"kPa ({shares[0]}) and the depth {depth:.3g} mm ({shares[1]})."
+        " In a neo-Hookean film that sticks to the rod the largest base stress is "
+        f"{stress / KPA:.3g} kPa ({stress / contact.max_base_stress - 1:+.0%}) and the depth "
+        f"{depth / MM:.3g} mm ({depth / contact.depth - 1:+.0%})."
     )
 
 
@@ -94,7 +93,7 @@ def contacts_table(contacts: Sequence[Contact]) -> Table:
         columns |= _numbers("max_interface_stress", contacts, ".5g")
     columns |= _numbers("max_base_stress", contacts, ".5g")
     columns |= _numbers("steps", contacts, "g") | _numbers("convergence", contacts, ".1g")
-    rows = [list(row) for row in zip(*columns.values(), strict=True)]
+    rows = list(zip(*columns.values(), strict=True))
     return Table(_title(contacts[0]), list(columns), rows)
 
 
@@ -109,10 +108,9 @@ def _numbers(name: str, contacts: Sequence[Contact], form: str = ".4g") -> dict[
 
 def _title(contact: Contact) -> str:
     film = contact.film
-    friction = "frictionless"
-    if contact.friction:
-        sticks = math.isinf(contact.friction)
-        friction = "sticking" if sticks else f"friction {contact.friction:.4g}"
+    friction = f"friction {contact.friction:.4g}" if contact.friction else "frictionless"
+    if math.isinf(contact.friction):
+        friction = "sticking"
     loading = f", {contact.loading} loading" if contact.loading and contact.friction else ""
     rough = contact.interface.description
     interface = f"; interface: {rough}" if rough else ""
