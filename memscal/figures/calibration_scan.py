@@ -78,7 +78,18 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         if load and len(named) < MOST_PANELS:
             named.append(points)
         if np.any(np.isfinite(limit)):
-            limits.append(_draw_limits(axes, part, limit))
+            x = part.reconvolution.x
+            limits += axes.plot(
+                x / MM,
+                limit / part.reading.scale,
+                "v",
+                mfc="none",
+                mew=0.7,
+                color=COLOURS["muted"],
+                ms=0.8 * style.marker_size(x.size),
+                label="less than 2u: upper limit, U + 2u",
+                rasterized=x.size > style.SCATTER_THRESHOLD,
+            )
         _draw_predictions(axes, part, net=True)
         heights.append(_draw_reference(axes, part, net=True))
     shown = np.concatenate(heights)
@@ -111,23 +122,6 @@ def _signal_and_limit(data: ApparatusData) -> tuple[FloatArray, FloatArray]:
     clear = (signal > errors) & (signal > 0)
     limited = ~clear & (limit > 0)
     return np.where(clear, signal, np.nan), np.where(limited, limit, np.nan)
-
-
-def _draw_limits(axes: Axes, data: ApparatusData, limit: FloatArray) -> Any:
-    """Draw the upper limits of voltages that are less than 2u; return what is drawn."""
-    x = data.reconvolution.x
-    (limits,) = axes.plot(
-        x / MM,
-        limit / data.reading.scale,
-        "v",
-        mfc="none",
-        mew=0.7,
-        color=COLOURS["muted"],
-        ms=0.8 * style.marker_size(x.size),
-        label="less than 2u: upper limit, U + 2u",
-        rasterized=x.size > style.SCATTER_THRESHOLD,
-    )
-    return limits
 
 
 def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, label: str) -> Any:

@@ -79,16 +79,6 @@ def _read_scans(
     return tuple(scans)
 
 
-def _scan_group(scan: MeasuredScan) -> Group:
-    children: dict[str, Node] = {
-        "sample": groups.sample_group(scan.film, scan.lubrication),
-        "indenter": groups.indenter_group(scan.indenter),
-        "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
-        **write_record(records.MEASURED_SCAN, scan).children,
-    }
-    return Group("NXcollection", children)
-
-
 #: Correlations below this are rounding.
 _ROUNDING = 1e-9
 _BUDGET = {"force": "force", "maximum": "stress"}
@@ -179,7 +169,13 @@ def _entry(measured: MeasuredStress) -> Group:
     scans: dict[str, Node] = {}
     sources = {"artifact": measured.artifact}
     for i, scan in enumerate(measured.scans, 1):
-        scans[f"scan_{i}"] = _scan_group(scan)
+        parts: dict[str, Node] = {
+            "sample": groups.sample_group(scan.film, scan.lubrication),
+            "indenter": groups.indenter_group(scan.indenter),
+            "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
+            **write_record(records.MEASURED_SCAN, scan).children,
+        }
+        scans[f"scan_{i}"] = Group("NXcollection", parts)
         sources[f"scan_{i}"] = scan.source
     inputs: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     first = measured.scans[0]

@@ -41,21 +41,18 @@ def mapping(contact: Contact) -> dict[str, Any]:
 
 def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str]]:
     """Return notes on depths beyond linear elasticity, and all warnings of the JSON object."""
-    texts = [_deep(contact) for contact in contacts]
-    notes = [Message("deep", text) for text in texts if text]
+    notes = []
+    for contact in contacts:
+        share = contact.depth / contact.film.thickness
+        if share > _SHALLOW and contact.strain != "finite":
+            text = (
+                f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the "
+                "film's thickness: linear elasticity is formal there, and its error is not part "
+                f"of the convergence.{_in_rubber(contact)}"
+            )
+            notes.append(Message("deep", text))
     singular = [_SINGULAR] if contacts[0].indenter.shape == "rod" else []
     return notes, [*singular, *(note.text for note in notes)]
-
-
-def _deep(contact: Contact) -> str:
-    share = contact.depth / contact.film.thickness
-    if share <= _SHALLOW or contact.strain == "finite":
-        return ""
-    return (
-        f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
-        "thickness: linear elasticity is formal there, and its error is not part of the "
-        f"convergence.{_in_rubber(contact)}"
-    )
 
 
 def _in_rubber(contact: Contact) -> str:

@@ -30,6 +30,8 @@ _PAGE = Path(__file__).with_name("certificate.html")
 #: Sources of a smaller share of every value, in percent, are left out of the budget.
 _LEAST_SHARE = 0.005
 _TOTAL = "root sum of squares"
+#: Kinds of messages of a calibration that say what its uncertainties do not count.
+_NOT_COUNTED = ("film_law", "uncertainty_unstated")
 _FONTS = "'Liberation Sans', Arial, Helvetica, 'DejaVu Sans', sans-serif"
 
 
@@ -58,7 +60,9 @@ def certificate_page(certificate: Certificate) -> str:
         "celsius": _expanded(celsius, temperature.uncertainty, 1.0, "°C"),
         "humidity": _expanded(humidity.value, humidity.uncertainty, 0.01, "%"),
         "sources": _sources(apparatus),
-        "not_counted": _not_counted(apparatus),
+        "not_counted": " ".join(
+            m.text for m in apparatus.process.messages if m.kind in _NOT_COUNTED
+        ),
         "resolved": f"{apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
     }
     blocks = {
@@ -156,12 +160,6 @@ def _sources(apparatus: ApparatusFunction) -> str:
     for budget in apparatus.budget.values():
         sources |= dict.fromkeys(source for source, u in budget.items() if u)
     return ", ".join(source.replace("_", " ") for source in sources) or "no source that is named"
-
-
-def _not_counted(apparatus: ApparatusFunction) -> str:
-    """Say what the uncertainties do not count, as the calibration said it."""
-    kinds = ("film_law", "uncertainty_unstated")
-    return " ".join(m.text for m in apparatus.process.messages if m.kind in kinds)
 
 
 def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> str:

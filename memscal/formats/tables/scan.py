@@ -147,8 +147,16 @@ def import_table(
         conditions=conditions or ScanConditions(),
         uncertainties=uncertainties or ScanUncertainties(),
     )
-    named = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz, "u_zz_errors": u_errors}
-    named |= {"normal_load": load_column, "x": x, "y": y, "branch": branch}
+    named = {
+        "u_zz": u,
+        "u_xz": u_xz,
+        "u_yz": u_yz,
+        "u_zz_errors": u_errors,
+        "normal_load": load_column,
+        "x": x,
+        "y": y,
+        "branch": branch,
+    }
     numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
     named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
     require_sign("sign of the voltage", layout.u_sign)
