@@ -14,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from helpers.console import Outcome, Run
+from helpers.console import Outcome
 from helpers.scans import simulated
 from scipy.stats import binom
 
@@ -84,7 +84,7 @@ def tables(results: Path) -> pd.DataFrame:
     return pd.read_parquet(results / "shards").drop(columns="calibrated_at")
 
 
-def test_a_row_says_what_a_calibration_says(results: Path, fleet: Path) -> None:
+def test_a_row_says_what_a_calibration_says(results, fleet):
     rows = pd.read_parquet(results / "shards")
     assert list(rows["place"]) == list(range(COUNT))
     path = fleet / "scans" / "s01.h5"
@@ -119,7 +119,7 @@ def test_a_row_says_what_a_calibration_says(results: Path, fleet: Path) -> None:
         assert stored["value"] == pytest.approx(check.value, rel=1e-6)
 
 
-def test_units_and_versions_stand_in_the_schema(results: Path) -> None:
+def test_units_and_versions_stand_in_the_schema(results):
     schema = pq.read_schema(results / "shards" / "shard-000000.parquet")
     units = {f.name: (f.metadata or {}).get(b"units", b"").decode() for f in schema}
     assert (units["conversion_constant"], units["gaussian_sigma_errors"]) == ("mV/Pa", "mm")
@@ -128,7 +128,7 @@ def test_units_and_versions_stand_in_the_schema(results: Path) -> None:
     assert len(list((results / "shards").iterdir())) == COUNT / SHARD
 
 
-def test_what_fails_is_a_row_and_failed_checks_have_an_artifact(results: Path) -> None:
+def test_what_fails_is_a_row_and_failed_checks_have_an_artifact(results):
     rows = pd.read_parquet(results / "shards")
     errors = rows[rows["error"].notna()]
     assert list(errors["place"]) == [FLAT, NONSENSE, MISSING]
@@ -145,9 +145,7 @@ def test_what_fails_is_a_row_and_failed_checks_have_an_artifact(results: Path) -
     )
 
 
-def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
-    fleet: Path, results: Path, run: Run, folder: Path
-) -> None:
+def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(fleet, results, run, folder):
     halfway = folder / "results"
     process = batch(fleet / "wafer.csv", halfway)
     while not (done := list(halfway.glob("shards/*.parquet"))):
@@ -161,9 +159,7 @@ def test_a_batch_that_is_killed_loses_what_is_under_way_and_resumes(
     pd.testing.assert_frame_equal(tables(halfway), tables(results), rtol=1e-9)
 
 
-def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
-    copy: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(copy, run, monkeypatch):
     monkeypatch.setattr("memscal.cli.output._IN_LINES", (0.001, 0.02))
     shards = sorted((copy / "results" / "shards").iterdir())
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--json")
@@ -183,7 +179,7 @@ def test_a_shard_is_done_anew_unless_it_opens_and_its_digest_agrees(
     assert shards_of(anew) == (6, 0)
 
 
-def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run: Run) -> None:
+def test_results_are_not_replaced_and_wrong_batches_are_refused(copy, run):
     manifest = copy / "wafer.csv"
     old = copy / "results"
     run(*arguments(manifest, old)).exits(4, "results exists", "--resume")
@@ -199,7 +195,7 @@ def test_results_are_not_replaced_and_wrong_batches_are_refused(copy: Path, run:
     assert not (copy / "new").exists()
 
 
-def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet: Path, folder: Path) -> None:
+def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet, folder):
     from memscal.extensions.fleet.shards import manifest_scans
 
     for name in ("b/1.h5", "b/1.apparatus.h5", "b/notes.txt", "a.h5", "c,d.nxs"):
@@ -219,19 +215,19 @@ def test_a_folder_is_listed_by_name_and_a_list_may_have_commas(fleet: Path, fold
         ("distributed", "batch {scans} -o new --scheduler tcp://127.0.0.1:9"),
     ],
 )
-def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, folder, run: Run):
+def test_a_missing_extra_is_named(module, line, monkeypatch, fleet, results, folder, run):
     monkeypatch.setitem(sys.modules, module, None)
     words = line.format(scans=fleet / "scans", results=results).split()
     run(*words).exits(3, "is not installed", 'pip install "memscal[fleet]"')
 
 
-def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch, fleet, folder, run: Run) -> None:
+def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch, fleet, folder, run):
     monkeypatch.setattr("memscal.parallel._CONNECTING", 0.5)
     line = ["batch", fleet / "scans", "-o", folder / "results", "--scheduler"]
     run(*line, "tcp://127.0.0.1:9").exits(3, "No scheduler answers at tcp://127.0.0.1:9")
 
 
-def test_ctrl_c_ends_a_batch_at_once(fleet: Path, folder: Path) -> None:
+def test_ctrl_c_ends_a_batch_at_once(fleet, folder):
     process = batch(fleet / "wafer.csv", folder / "results")
     while not (folder / "results" / "shards").exists():
         time.sleep(0.01)
@@ -239,7 +235,7 @@ def test_ctrl_c_ends_a_batch_at_once(fleet: Path, folder: Path) -> None:
     assert process.wait(timeout=30) == 130
 
 
-def test_the_report_of_a_batch_is_its_summary(copy: Path, folder: Path, run: Run) -> None:
+def test_the_report_of_a_batch_is_its_summary(copy, folder, run):
     line = arguments(copy / "wafer.csv", copy / "results", "--resume", "--report")
     page = copy / "results" / "page.html"
     run(*line, str(page)).exits(1, "Written")
@@ -255,7 +251,7 @@ def test_the_report_of_a_batch_is_its_summary(copy: Path, folder: Path, run: Run
     assert not new.exists()
 
 
-def test_a_summary_as_json_is_that_of_the_tables(results: Path, folder: Path, run: Run) -> None:
+def test_a_summary_as_json_is_that_of_the_tables(results, folder, run):
     told = run("summary", results, "-o", folder / "page.html", "--json").exits(0).json
     rows = pd.read_parquet(results / "shards")
     a = rows["conversion_constant"]
@@ -272,7 +268,7 @@ def test_a_summary_as_json_is_that_of_the_tables(results: Path, folder: Path, ru
     assert json.dumps(told)
 
 
-def test_a_summary_of_no_batch_or_of_several_units_is_refused(copy: Path, run: Run) -> None:
+def test_a_summary_of_no_batch_or_of_several_units_is_refused(copy, run):
     run("summary", copy / "scans").exits(3, "holds no results of a batch")
     path = copy / "results" / "shards" / "shard-000001.parquet"
     table = pq.read_table(path)
@@ -303,7 +299,7 @@ def fleet_of(a: np.ndarray, sigma: np.ndarray, error: float | np.ndarray) -> Fle
 
 
 @pytest.mark.parametrize("count", [4, 8, 20, 100])
-def test_sensors_that_scatter_by_chance_are_no_outliers(count: int) -> None:
+def test_sensors_that_scatter_by_chance_are_no_outliers(count: int):
     rng = np.random.default_rng(count)
     batches = 400
     drawn = [rng.normal(1.0, 0.02, (2, count)) for _ in range(batches)]
@@ -313,9 +309,7 @@ def test_sensors_that_scatter_by_chance_are_no_outliers(count: int) -> None:
     assert outliers(fleet_of(np.append(a[1:], 9.0), sigma, 0.02))
 
 
-def test_a_summary_says_what_is_missing_mixed_repeated_and_overridden(
-    copy: Path, run: Run, folder: Path
-) -> None:
+def test_a_summary_says_what_is_missing_mixed_repeated_and_overridden(copy, run, folder):
     shard = copy / "results" / "shards" / "shard-000000.parquet"
     table = pq.read_table(shard)
     rows = table.to_pylist()
@@ -335,7 +329,7 @@ def test_a_summary_says_what_is_missing_mixed_repeated_and_overridden(
     assert "synthetic" in {message["kind"] for message in arrays["messages"][0]}
 
 
-def test_artifacts_are_those_of_the_rows(copy: Path, folder: Path) -> None:
+def test_artifacts_are_those_of_the_rows(copy, folder):
     results = copy / "results"
     source = copy / "wafer.csv"
     written = sorted((results / "artifacts").rglob("*.h5"))
@@ -348,12 +342,12 @@ def test_artifacts_are_those_of_the_rows(copy: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["[" * 9000, '{"scans": 12, "shard_size": 1e9}', "{}", '{"a": 9'])
-def test_what_a_batch_states_of_itself_may_be_damaged(copy: Path, run: Run, text: str) -> None:
+def test_what_a_batch_states_of_itself_may_be_damaged(copy, run, text: str):
     (copy / "results" / "batch.json").write_text(text)
     run("summary", copy / "results").exits(0)
 
 
-def test_a_list_of_which_no_scan_is_there_is_refused(folder: Path, run: Run) -> None:
+def test_a_list_of_which_no_scan_is_there_is_refused(folder, run):
     (folder / "list.csv").write_text("path;wafer_x\na.h5;0\n")
     outcome = run("batch", folder / "list.csv", "-o", folder / "results")
     outcome.exits(3, "None of the 2 scans", "separated by commas")

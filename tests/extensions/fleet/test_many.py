@@ -8,7 +8,6 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor | None]]] = {
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
-def test_every_scan_says_what_it_says_by_itself(kind: str) -> None:
+def test_every_scan_says_what_it_says_by_itself(kind: str):
     given = scans(5)
     with EXECUTORS[kind]() as executor:
         results = list(memscal.calibrate_many(given, executor, method="bayesian"))
@@ -56,7 +55,7 @@ def test_every_scan_says_what_it_says_by_itself(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["default", "threads"])
-def test_a_bad_scan_has_its_error_in_place(kind: str, tmp_path: Path) -> None:
+def test_a_bad_scan_has_its_error_in_place(kind: str, tmp_path):
     good = scans(3)
     flat = replace(good[0], u_zz=np.zeros_like(good[0].u_zz))
     given = [good[0], flat, good[1], tmp_path / "missing.h5", good[2]]
@@ -82,7 +81,7 @@ class Counting(ThreadPoolExecutor):
         return super().submit(*arguments, **options)
 
 
-def test_scans_are_taken_as_workers_become_free_and_several_are_a_task(monkeypatch) -> None:
+def test_scans_are_taken_as_workers_become_free_and_several_are_a_task(monkeypatch):
     monkeypatch.setattr(fleet, "attempted", lambda *_: memscal.MemscalError("not needed"))
     taken = 0
 
@@ -120,7 +119,7 @@ if {condition}:
 @pytest.mark.parametrize(
     ("condition", "options"), [("True", "{}"), ("__name__ == '__main__'", "{'method': Half()}")]
 )
-def test_a_script_needs_no_guard(condition: str, options: str, tmp_path: Path) -> None:
+def test_a_script_needs_no_guard(condition: str, options: str, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(SCRIPT.format(condition=condition, options=options))
     run = subprocess.run(
@@ -130,7 +129,7 @@ def test_a_script_needs_no_guard(condition: str, options: str, tmp_path: Path) -
     assert run.stdout == "The script runs.\n[None, None, None]\n"
 
 
-def test_what_is_no_error_of_ours_is_reported_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_no_error_of_ours_is_reported_as_such(monkeypatch):
     def broken(scan: Scan, **_: object) -> object:
         raise ZeroDivisionError("float division by zero")
 
@@ -140,7 +139,7 @@ def test_what_is_no_error_of_ours_is_reported_as_such(monkeypatch: pytest.Monkey
     assert all(one.error is not None and "ZeroDivisionError" in str(one.error) for one in found)
 
 
-def test_files_and_joint_scans_are_calibrated(tmp_path: Path) -> None:
+def test_files_and_joint_scans_are_calibrated(tmp_path):
     first, second = scans(2)
     path = tmp_path / "scan.h5"
     memscal.write_scan(first, path)
@@ -156,16 +155,16 @@ def test_files_and_joint_scans_are_calibrated(tmp_path: Path) -> None:
     ({"executor": 2}, "executor is a int"), ({"film_law": "linear", "bogus": 1}, "bogus"),
     ({"method": "nonsense"}, "nonsense"), ({"method": "bayesian", "film_laws": "a"}, "film_laws"),
 ])  # fmt: skip
-def test_a_wrong_executor_method_or_option_is_refused_at_once(options, words) -> None:
+def test_a_wrong_executor_method_or_option_is_refused_at_once(options, words):
     with pytest.raises(memscal.MemscalError, match=words):
         memscal.calibrate_many(scans(2), **options)
 
 
-def test_one_scan_is_no_list_and_no_scans_are_no_results() -> None:
+def test_one_scan_is_no_list_and_no_scans_are_no_results():
     assert list(memscal.calibrate_many([])) == []
 
 
-def test_what_a_generator_gave_before_it_failed_is_calibrated() -> None:
+def test_what_a_generator_gave_before_it_failed_is_calibrated():
     def failing() -> Iterator[memscal.Scan]:
         yield from scans(3)
         raise OSError("the detector died")
@@ -176,7 +175,7 @@ def test_what_a_generator_gave_before_it_failed_is_calibrated() -> None:
         next(results)
 
 
-def test_a_scan_survives_pickling() -> None:
+def test_a_scan_survives_pickling():
     scan = replace(scans(1)[0], channels={"u_xz": np.zeros(33)})
     again = pickle.loads(pickle.dumps(scan))
     np.testing.assert_array_equal(again.u_zz, scan.u_zz)
@@ -186,7 +185,7 @@ def test_a_scan_survives_pickling() -> None:
     assert not again.u_zz.flags.writeable
 
 
-def test_workers_end_when_their_parent_is_killed() -> None:
+def test_workers_end_when_their_parent_is_killed():
     program = """
 import os, signal, time
 from memscal.parallel import worker_pool
@@ -203,12 +202,12 @@ with worker_pool(2) as pool:
     assert int(run.stdout)
 
 
-def test_a_worker_that_is_killed_is_an_error_of_ours() -> None:
+def test_a_worker_that_is_killed_is_an_error_of_ours():
     with pytest.raises(memscal.MemscalError, match="A worker process ended"):
         list(shared(os._exit, range(8), workers=2))
 
 
-def test_processes_are_told_one_thread_and_the_environment_is_put_back() -> None:
+def test_processes_are_told_one_thread_and_the_environment_is_put_back():
     before = dict(os.environ)
     with worker_pool(1) as pool:
         told = pool.submit(os.getenv, "OMP_NUM_THREADS").result()

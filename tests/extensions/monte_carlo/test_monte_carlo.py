@@ -73,7 +73,7 @@ CASES: dict[str, tuple[Sequence[Scan], dict[str, object]]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_draw_is_what_calibrate_says_of_the_drawn_scan(case: str) -> None:
+def test_a_draw_is_what_calibrate_says_of_the_drawn_scan(case: str):
     scans, options = CASES[case]
     calibration = memscal.calibrate(list(scans), **options)
     found = memscal.monte_carlo(calibration, draws=2, seed=5)
@@ -96,7 +96,7 @@ TRUTHS = {
 
 
 @pytest.mark.parametrize("source", TRUTHS)
-def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
+def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str):
     uncertainties = {"thickness_uncertainty": 1e-5, "poisson_ratio_uncertainty": 0.005}
     film = replace(EXACT_FILM, poisson_ratio=0.45, **uncertainties)
     quiet = {"noise": 1e-6, "baseline": 0.0, "drift": 0.0}
@@ -117,7 +117,7 @@ def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
         pytest.param("white-noise", "gaussian_sigma_deconvolved", marks=pytest.mark.full_study),
     ],
 )
-def test_a_budget_of_noise_is_that_of_draws_where_the_estimate_is_linear(method, number) -> None:
+def test_a_budget_of_noise_is_that_of_draws_where_the_estimate_is_linear(method, number):
     calibration = memscal.calibrate(simulated(noise=0.001, seed=3), method=method)
     found = memscal.monte_carlo(calibration, draws=100)
     for name in ("conversion_constant", "gaussian_sigma", number):
@@ -128,7 +128,7 @@ def test_a_budget_of_noise_is_that_of_draws_where_the_estimate_is_linear(method,
     assert np.median(ratio) == pytest.approx(1.0, abs=spread_limit(100))
 
 
-def test_a_budget_counts_that_poissons_ratio_never_exceeds_one_half() -> None:
+def test_a_budget_counts_that_poissons_ratio_never_exceeds_one_half():
     film = replace(EXACT_FILM, poisson_ratio_uncertainty=0.02)
     calibration = uncertain(film=film, rod=EXACT_ROD, load_uncertainty=None, noise=1e-4)
     found = memscal.monte_carlo(calibration, draws=40)
@@ -139,7 +139,7 @@ def test_a_budget_counts_that_poissons_ratio_never_exceeds_one_half() -> None:
     assert width.agrees
 
 
-def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
+def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred):
     told: list[memscal.Progress] = []
     options = {"seed": 8, "workers": 2, "progress": told.append}
     two = memscal.monte_carlo(paper, draws=34, **options)
@@ -152,7 +152,7 @@ def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
     assert (told[-1].task, told[-1].done, told[-1].total) == ("draws", 34, 34)
 
 
-def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo) -> None:
+def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo):
     for i, comparison in enumerate(hundred.comparisons):
         for low, high in (comparison.symmetric, comparison.shortest):
             held = np.mean((hundred.samples[:, i] >= low) & (hundred.samples[:, i] <= high))
@@ -164,12 +164,12 @@ def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo) ->
     assert ((hundred.g_mean >= low) & (hundred.g_mean <= high))[hundred.r < 3e-3].all()
 
 
-def test_the_shortest_interval_of_a_skewed_distribution_is_to_one_side() -> None:
+def test_the_shortest_interval_of_a_skewed_distribution_is_to_one_side():
     draws = -np.log(1 - (np.arange(10_000) + 0.5) / 10_000)
     np.testing.assert_allclose(shortest_interval(draws), [0.0, -np.log(0.05)], atol=0.01)
 
 
-def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle() -> None:
+def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle():
     scan = simulated(film=LINEAR_FILM, rod=PAPER_ROD, load_uncertainty=0.01, noise=0.003)
     film = replace(LINEAR_FILM, poisson_ratio=0.45)
     other = replace(memscal.indent(film, PAPER_ROD, load=1.0).profile(), film=None)
@@ -184,7 +184,7 @@ def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle()
     assert drawn["model_form"].std() == pytest.approx(1.0, abs=0.04)
 
 
-def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be() -> None:
+def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be():
     found = memscal.monte_carlo(replace(uncertain(noise=0.004), effects={}), draws=3)
     assert found.sources == ("noise",)
     assert [m.kind for m in found.messages][:1] == ["uncertainty_unstated"]
@@ -213,7 +213,7 @@ class Failing:
         return self.method.divide(problem)
 
 
-def test_draws_that_fail_are_left_out_and_told() -> None:
+def test_draws_that_fail_are_left_out_and_told():
     method = Failing()
     calibration = memscal.calibrate(simulated(), method=method)
     method.refused = range(method.divisions + 4, method.divisions + 6)
@@ -235,11 +235,11 @@ def test_draws_that_fail_are_left_out_and_told() -> None:
         ({"workers": 0}, "workers is 0"),
     ],
 )
-def test_numbers_that_make_no_sense_are_refused(paper, options, named) -> None:
+def test_numbers_that_make_no_sense_are_refused(paper, options, named):
     with pytest.raises(memscal.MemscalError, match=named):
         memscal.monte_carlo(paper, **options)
 
 
-def test_a_parameter_that_is_not_drawn_is_named(hundred: memscal.MonteCarlo) -> None:
+def test_a_parameter_that_is_not_drawn_is_named(hundred: memscal.MonteCarlo):
     with pytest.raises(memscal.MemscalError, match="centre is not drawn"):
         hundred["centre"]
