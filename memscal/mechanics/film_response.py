@@ -75,32 +75,28 @@ def corrections(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatA
     return normal, coupling, radial
 
 
-def base_normal_from_pressure(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Base stress under a pressure, :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D`; 1 at x = 0."""
+def base_normal(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
+    r"""Base stress by a pressure, and tension by an outward traction: T (1 at x = 0) and N.
+
+    :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D` and :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`.
+    """
     x, decay, denominator, _ = _prepare(x, nu)
-    numerator = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
+    scale = 4 * (1 - nu) * np.exp(-x)
+    by_pressure = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
+    by_shear = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
+    return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
-def base_shear_from_pressure(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Shear stress at the base under a pressure, :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D`."""
+def base_shear(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
+    r"""Shear stress at the base by a pressure, and by a radial traction: S and R.
+
+    :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D` and :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`.
+    """
     x, decay, denominator, _ = _prepare(x, nu)
-    numerator = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
-
-
-def base_normal_from_shear(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Base tension under an outward traction, :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`."""
-    x, decay, denominator, _ = _prepare(x, nu)
-    numerator = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
-
-
-def base_shear_from_shear(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Base shear under a radial traction, :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`."""
-    x, decay, denominator, _ = _prepare(x, nu)
-    numerator = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
+    scale = 4 * (1 - nu) * np.exp(-x)
+    by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
+    by_shear = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
+    return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
 def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
@@ -176,9 +172,8 @@ def base_spectrum(
     nu = film.poisson_ratio
     p = traction.pressure_transform(k)
     q = traction.shear_transform(k)
-    if order:
-        return -(base_shear_from_pressure(x, nu) * p + base_shear_from_shear(x, nu) * q)
-    return base_normal_from_pressure(x, nu) * p - base_normal_from_shear(x, nu) * q
+    by_pressure, by_shear = base_shear(x, nu) if order else base_normal(x, nu)
+    return -(by_pressure * p + by_shear * q) if order else by_pressure * p - by_shear * q
 
 
 def base_stress(
