@@ -34,7 +34,7 @@ def march_through_film(x: float, nu: float) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("nu", RATIOS)
 @pytest.mark.parametrize("x", [0.05, 0.3, 0.499, 0.501, 1.0, 2.5, 6.0])
-def test_responses_solve_the_boundary_value_problem(x: float, nu: float) -> None:
+def test_responses_solve_the_boundary_value_problem(x, nu) -> None:
     surface, base = march_through_film(x, nu)
     normal, added_coupling, radial = film.corrections(x, nu)
     coupling = film.half_space_coupling(nu) + added_coupling
@@ -46,7 +46,7 @@ def test_responses_solve_the_boundary_value_problem(x: float, nu: float) -> None
 
 
 @pytest.mark.parametrize("nu", RATIOS)
-def test_short_waves_see_a_half_space_and_reach_no_base(nu: float) -> None:
+def test_short_waves_see_a_half_space_and_reach_no_base(nu) -> None:
     x = np.array([30.0, 1e3, 1e9, np.inf])
     for response in (film.corrections, film.base_normal, film.base_shear):
         assert np.all(np.abs(response(x, nu)) < 1e-11)
@@ -58,7 +58,7 @@ def test_a_long_wave_of_pressure_shears_the_base_without_cancellation() -> None:
 
 
 @pytest.mark.parametrize("nu", RATIOS)
-def test_the_base_carries_all_of_a_uniform_traction(nu: float) -> None:
+def test_the_base_carries_all_of_a_uniform_traction(nu) -> None:
     # Zero is exact.
     assert film.base_normal(0.0, nu) == pytest.approx((1, 0), rel=1e-15, abs=0)
     assert film.base_shear(0.0, nu) == pytest.approx((0, 1), rel=1e-15, abs=0)
