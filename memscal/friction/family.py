@@ -271,7 +271,8 @@ class FamilySetup:
             raise InputError(problem, why=why, cure="Give the sphere of the contact scan.")
         self.film = film
         self.indenter = indenter
-        self.wavenumbers = base_wavenumbers(film.thickness, reach)
+        require_positive("reach", reach, "m")
+        self.wavenumbers = Wavenumbers.covering(_LARGEST_KH / film.thickness, reach)
         self.loads = require_loads(loads)
         self.cache = cache
         self.workers = workers
@@ -390,12 +391,6 @@ class FamilySetup:
             members = [solved[path] for path in group]
             stacks.append({name: np.stack([own[name] for own in members]) for name in arrays[0]})
         return stacks
-
-
-def base_wavenumbers(thickness: float, reach: float) -> Wavenumbers:
-    """Return nodes for all that reaches the base of a film, seen out to ``reach`` (m)."""
-    require_positive("reach", reach, "m")
-    return Wavenumbers.covering(_LARGEST_KH / thickness, reach)
 
 
 def require_loads(loads: ArrayLike) -> FloatArray:
