@@ -171,7 +171,7 @@ def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     thickness, _, refinement = size
     side = min(_SHARE_OF_CONTACT * contact, _WIDEST_NEAR * thickness) / refinement
-    even = np.linspace(0.0, contact, np.ceil(contact / side) + 1)
+    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
     return _tensor(even, side, _NEAR_A_SPHERE, size)
 
 
