@@ -194,7 +194,7 @@ def test_a_frictionless_film_comes_back_the_way_it_went():
 def test_a_load_that_cannot_be_reached_gives_the_last_state_that_was():
     depths = (Depth(0.02e-3), Depth(1.98e-3))
     with pytest.raises(ConvergenceError, match="No equilibrium") as caught:
-        solve_finite_strain(FILM, ROD, depths, sticking=True, refinement=0.2)
+        solve_finite_strain(FILM, ROD, depths, sticking=True, edge=0.2e-3, refinement=0.2)
     assert f"Under the rod of radius {ROD.radius * 1e3:.4g} mm" in str(caught.value)
     assert "friction inf" not in str(caught.value)  # it sticks
     last = caught.value.last

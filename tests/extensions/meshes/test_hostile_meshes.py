@@ -23,6 +23,7 @@ from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileErro
 from memscal.extensions.meshes import mesh_files
 from memscal.extensions.meshes.mesh_files import Mesh, read_mesh
 
+AT_ONCE = pytest.mark.usefixtures("at_once")
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
 BOMB = "".join(
     f'<!ENTITY e{i} "{"".join([f"&e{i - 1};"] * 10) if i else "ha" * 10}">' for i in range(12)
@@ -85,6 +86,7 @@ def test_entities_neither_grow_nor_open_a_file(tmp_path, name, document_type):
 
 
 @pytest.mark.parametrize("text", ["<a>" * 10**5, f"<VTKFile>{'<b/>' * 10**5}</VTKFile>"])
+@AT_ONCE
 def test_absurd_xml_is_refused(tmp_path, text):
     path = tmp_path / "film.vtu"
     path.write_text(text)
@@ -103,6 +105,7 @@ def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(tmp_pa
     assert list(tmp_path.iterdir()) == [path]
 
 
+@AT_ONCE
 def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path, monkeypatch):
     path = small(tmp_path / "film.vtu")
     monkeypatch.setattr(mesh_files, "_ANSWER", 0)
@@ -148,6 +151,7 @@ def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
         ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
     ],
 )
+@AT_ONCE
 def test_a_count_beyond_the_files_size_is_refused(tmp_path, section_name, options):
     path = small(tmp_path / "film.vtk", **options)
     head, name, rest = path.read_bytes().partition(section_name.encode() + b" ")
@@ -166,6 +170,7 @@ def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["polygon", "VTK_LAGRANGE_TRIANGLE"])
+@AT_ONCE
 def test_cells_that_state_their_own_size_are_read(tmp_path, kind):
     mesh = meshio.Mesh(SMALL.points, [(kind, SMALL.cells[0].data[:, :3])])
     meshio.vtk.write(tmp_path / "film.vtk", mesh)
@@ -176,6 +181,7 @@ def test_cells_that_state_their_own_size_are_read(tmp_path, kind):
 
 
 @pytest.mark.parametrize("offsets", ["3000000000 4", "-4 4", "0 4", "4 9", "4.0 8.0"])
+@AT_ONCE
 def test_a_cell_with_billions_of_nodes_is_refused(tmp_path, offsets):
     path = tmp_path / "film.vtu"
     mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
@@ -197,6 +203,7 @@ def test_a_cell_with_billions_of_nodes_is_refused(tmp_path, offsets):
         "<![CDATA[/other/film.h5:/data9]]>",
     ],
 )
+@AT_ONCE
 def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path, address):
     path = edited(small(tmp_path / "film.xdmf"), "film.h5:/data1", address)
     with h5py.File(tmp_path / "film.h5", "r") as file, h5py.File(tmp_path / "other.h5", "w") as to:
@@ -212,6 +219,7 @@ def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path):
     refused(path, "asks for the file /etc/passwd", UnsafeFileError)
 
 
+@AT_ONCE
 def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path):
     path = small(tmp_path / "film.xdmf")
     mesh = read_mesh(path)
@@ -236,10 +244,12 @@ def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path):
     ('Dimensions="10 9"', 'Dimensions="10 ten"', "cannot be read"),
     ('Dimensions="10 9"', 'Dimensions="9 10"', "cannot be read"),
 ])  # fmt: skip
+@AT_ONCE
 def test_xdmf_that_is_more_than_a_mesh_with_numbers_is_refused(tmp_path, old, new, words):
     refused(edited(small(tmp_path / "film.xdmf", data_format="XML"), old, new), words)
 
 
+@AT_ONCE
 def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_not(tmp_path):
     path = small(tmp_path / "film.xdmf")
     edited(path, "<Xdmf ", '<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []><Xdmf ')
@@ -251,6 +261,7 @@ def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_
     refused(path, "Unknown section 'Grid'")
 
 
+@AT_ONCE
 def test_entities_in_the_text_of_xml_do_not_grow(tmp_path):
     """meshio parses the text of an element again, as XML."""
     path = small(tmp_path / "film.xdmf")
@@ -266,6 +277,7 @@ def test_entities_in_the_text_of_xml_do_not_grow(tmp_path):
     ('NumberOfPoints="10"', 'NumberOfPoints="11"', "cannot be read as a mesh"),
     ('Name="connectivity"', 'Name="joints"', "connectivity"),
 ])  # fmt: skip
+@AT_ONCE
 def test_a_vtu_file_of_another_shape_is_refused(tmp_path, old, new, words):
     refused(edited(small(tmp_path / "film.vtu"), old, new), words)
 
@@ -278,11 +290,13 @@ TEXTS = '<DataArray type="String" Name="names" format="ascii">104 105 0</DataArr
     ("<PointData>", f"<PointData>{TEXTS}", "String"),
     ("<UnstructuredGrid>", f"<UnstructuredGrid><FieldData>{TEXTS}</FieldData>", "String"),
 ])  # fmt: skip
+@AT_ONCE
 def test_vtu_that_meshio_does_not_read_is_refused_with_the_form_it_reads(tmp_path, old, new, words):
     message = refused(edited(small(tmp_path / "film.vtu"), old, new), words)
     assert "data mode ASCII or Binary and without texts" in message
 
 
+@AT_ONCE
 def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path):
     path = small(tmp_path / "film.vtu", binary=False)
     text = path.read_text()
@@ -295,6 +309,7 @@ def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "before"), [("film.vtu", 'Name="S9"'), ("film.vtk", "POINTS")])
+@AT_ONCE
 def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path, name, before):
     path = small(tmp_path / name, binary=False)
     head, mark, rest = path.read_text().partition(before)
@@ -304,6 +319,7 @@ def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path, name, befor
     refused(path, "string or file could not be read")
 
 
+@AT_ONCE
 def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path):
     path = tmp_path / "film.vtu"
     meshio.vtu.write(path, meshio.Mesh(SMALL.points, [("quad", SMALL.cells[0].data + 100)]))
@@ -314,6 +330,7 @@ def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path):
     refused(path, "not finite")
 
 
+@AT_ONCE
 def test_text_from_a_mesh_cannot_steer_the_terminal(tmp_path):
     mesh = meshio.Mesh(SMALL.points, SMALL.cells, point_data={"S\x9b[2J": np.zeros(10)})
     meshio.vtu.write(tmp_path / "film.vtu", mesh)
@@ -321,6 +338,7 @@ def test_text_from_a_mesh_cannot_steer_the_terminal(tmp_path):
 
 
 @pytest.mark.parametrize("ending", [".vtu", ".vtk", ".xdmf"])
+@AT_ONCE
 def test_what_is_no_file_with_something_in_it_is_refused(tmp_path, ending):
     path = tmp_path / f"film{ending}"
     with pytest.raises(InputError, match="No such file"):
@@ -335,6 +353,7 @@ def test_what_is_no_file_with_something_in_it_is_refused(tmp_path, ending):
         refused(path, "not a regular file", UnsafeFileError)
 
 
+@AT_ONCE
 def test_meshio_does_not_print_to_the_terminal(tmp_path, capfd):
     """It warns on the terminal of a cell that it does not know; here this is a note."""
     path = small(tmp_path / "film.vtu", binary=False)
@@ -372,9 +391,7 @@ def hostile(tmp_path, monkeypatch) -> Callable[[str], Path]:
     return with_reader
 
 
-def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
-    tmp_path, hostile: Callable[[str], Path], monkeypatch
-):
+def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(tmp_path, hostile, monkeypatch):
     secret = tmp_path / "secret"
     secret.write_text("a secret")
     monkeypatch.setenv("A_SECRET", "a secret")
@@ -414,16 +431,17 @@ def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
     ("import meshio.other", "No module named"),
     ("return types.SimpleNamespace(cells=[], points=[[print]], **NONE)", "ended by an error"),
 ], ids=["memory", "exit", "silence", "crash", "no mesh", "no module", "objects"])  # fmt: skip
-def test_whatever_ends_the_reader_is_an_error_of_ours(hostile: Callable[[str], Path], code, words):
+def test_whatever_ends_the_reader_is_an_error_of_ours(hostile, code, words):
     refused(hostile(code), words)
 
 
-def test_an_endless_reader_ends(hostile: Callable[[str], Path], monkeypatch):
+def test_an_endless_reader_ends(hostile, monkeypatch):
     monkeypatch.setattr(mesh_files, "_SECONDS", 0.5)
     refused(hostile("while True:\n    pass"), "takes longer than 0.5", UnsafeFileError)
 
 
 @pytest.mark.parametrize("name", ["film.vtu", "film.vtk", "film.xdmf", "vtk_film.vtu"])
+@AT_ONCE
 def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path, name):
     path = tmp_path / name
     if name == "vtk_film.vtu":

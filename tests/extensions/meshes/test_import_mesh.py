@@ -22,8 +22,8 @@ def mesh(folder: Path) -> Path:
     return Path(shutil.copy(DATA / "vtk_film.vtu", folder / "film.vtu"))
 
 
-def test_a_mesh_becomes_a_reference_which_a_scan_of_another_rod_does_not_fit(run, scan):
-    table = Path(shutil.copy(DATA / "getfem_film.vtu", scan.parent / "film.vtu"))
+def test_a_mesh_becomes_a_reference(run, folder):
+    table = Path(shutil.copy(DATA / "getfem_film.vtu", folder / "film.vtu"))
     solver = ["--solver", "GetFEM", "--sigma", "stress"]
     film = ["--young-modulus", 2.2, "--poisson-ratio", 0.5, "--thickness", 2]
     done = run("import", table, "-o", "film.h5", *MESH, *solver, *film).exits(0)
@@ -33,8 +33,6 @@ def test_a_mesh_becomes_a_reference_which_a_scan_of_another_rod_does_not_fit(run
     assert found.solver == "GetFEM"
     assert found.film == memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     assert found.sigma_rz is not None
-    calibrated = run("calibrate", scan, "--reference", "film.h5", "-o", "a.h5").exits(3)
-    assert "narrower than its reference" in calibrated.err
 
 
 def test_lengths_on_the_command_line_are_in_mm(run, folder):

@@ -17,6 +17,8 @@ from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress
 from memscal.model.film import ElasticFilm
 
+pytestmark = pytest.mark.usefixtures("at_once")
+
 DATA = Path(__file__).parents[2] / "data"
 
 

@@ -91,7 +91,7 @@ def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads():
     [
         ({"load": []}, InputError, "list of loads is empty"),
         ({"load": [0.3, 0.3]}, InputError, "given twice"),
-        ({"load": 1e7}, DomainError, "load|film"),
+        ({"load": 1e12}, DomainError, "load|film"),
         ({"points": 1}, InputError, "two contacts"),
         ({"repeats": 0}, InputError, "one row"),
         ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
