@@ -164,12 +164,13 @@ def command(
         outputs = [*page_figures, folder, report]  # the folder is made at the end
     inputs = [artifact, *scans, *options["references"], options["shear"]]
     out.prove_writable(outputs, force=force, inputs=inputs)
+    friction = options["friction"]
     settings = {name: options[name] for name in _SETTINGS}
     with out.working("Comparing with calculated contacts"):
         comparison = compare(
             data,
             apparatus,
-            friction=_frictions(options),
+            friction=sorted({0.0, *friction, math.inf}) if friction else None,
             loading=options["loadings"] or ("incremental", "total"),
             references=references or None,
             shear=shear,
@@ -186,7 +187,7 @@ def command(
             read: dict[str, Any] = {"artifact": file_json(apparatus.source)}
             if channel == "zz":
                 read["references"] = [file_json(profile.source) for profile in references]
-                read["figures"] = [str(path) for path in (*page_figures, *named.values())]
+                read["figures"] = [*map(str, (*page_figures, *named.values()))]
             out.emit_json(comparison.to_dict() | read)
         else:
             out.emit_result(comparison, {}, as_json=False, brief=options["brief"])
@@ -227,15 +228,10 @@ def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> dict[Pa
     return files
 
 
-def _frictions(options: Mapping[str, Any]) -> list[float] | None:
-    """Return the coefficients that are asked for, between none and full stick."""
-    return sorted({0.0, *options["friction"], math.inf}) if options["friction"] else None
-
-
 #: Options that are those of :func:`memscal.compare`.
 _SETTINGS = ("lubricated", "macroscopic", "macroscopic_uncertainty", "interface", "override")
 #: Options that the comparison of a shear does not have, and how they are typed.
-_NOT_OF_SHEAR = {
+_NORMAL_STRESS_ONLY = {
     "references": "reference",
     "lubricated": "lubricated",
     "shear": "shear",
@@ -251,7 +247,7 @@ def _check_usage(options: Mapping[str, Any], scans: Sequence[Path]) -> None:
     if channel != "zz":
         if len(scans) > 1:
             raise click.UsageError(f"--channel {channel} takes one STRESS file.")
-        for name, typed in _NOT_OF_SHEAR.items():
+        for name, typed in _NORMAL_STRESS_ONLY.items():
             if options[name]:
                 raise click.UsageError(f"--{typed} has no effect with --channel {channel}.")
     friction = options["friction"]

@@ -101,7 +101,10 @@ _ONLY = {
         *_CONDITIONS,
         *_UNCERTAINTIES,
         *_TAKEN_FOR_GRANTED,
-        *("load_scatter", "position_error", "figures", "laboratory"),
+        "load_scatter",
+        "position_error",
+        "figures",
+        "laboratory",
         *_SENSOR_NAMES.values(),
         *_CELL_NAMES.values(),
     ],
@@ -261,7 +264,7 @@ def command(
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     figures = options["figures"] or ()
     laboratory = options["laboratory"]
-    inputs = [*hook("with_drawn_in")(table), *([laboratory] if laboratory else [])]
+    inputs = [*hook("with_drawn_in")(table), laboratory]
     out.prove_writable([output, *figures], force=force, inputs=inputs)
     with together():
         if kind == "scan":

@@ -54,7 +54,11 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     checks = contents["checks"]
     failed = {i: check for i, check in enumerate(checks) if not check["passed"]}
     head = ("check", "value", "limit", "result")
-    shown = [_check_row(check) for check in checks]
+    shown = []
+    for check in checks:
+        value = _number(check["value"], ".3g")
+        limit = _number(check["limit"], ".3g")
+        shown.append((_words(check), value, limit, "passed" if check["passed"] else "FAILED"))
     yield Table("Quality checks", head, shown, frozenset(failed))
     meanings = [(_words(check), check["meaning"]) for check in failed.values()]
     yield Table("What the failures mean", ("", ""), meanings)
@@ -76,12 +80,6 @@ def _arrays(arrays: Sequence[Mapping[str, Any]]) -> Table:
             row.append(str(item["missing"] or "-"))
         rows.append(row)
     return Table("Arrays", head, rows)
-
-
-def _check_row(check: Mapping[str, Any]) -> tuple[str, ...]:
-    value = _number(check["value"], ".3g")
-    limit = _number(check["limit"], ".3g")
-    return _words(check), value, limit, "passed" if check["passed"] else "FAILED"
 
 
 def _words(item: Mapping[str, Any]) -> str:

@@ -56,7 +56,7 @@ class Quantity(_Number):
         open_low: bool = True,
         infinite: bool = False,
     ) -> None:
-        self.name = self.unit = unit
+        self.name = unit
         self.low = low
         self.high = high
         self.open_low = open_low

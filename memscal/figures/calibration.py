@@ -329,9 +329,18 @@ def _write_lines(figure: Figure, lines: list[_Line]) -> None:
     for i, (line, colour, weight) in enumerate(lines):
         y = 1.0 - (0.08 + _LINE_HEIGHT * i) / height
         # A sensor's name may hold a dollar sign: it is text, not mathematics.
-        text = figure.text(_MARGIN, y, style.drawable(line), color=colour, weight=weight, va="top")
         size = 9.0 if i == 0 else 7.5
-        text.set(parse_math=False, fontsize=size, in_layout=False)
+        text = figure.text(
+            _MARGIN,
+            y,
+            style.drawable(line),
+            color=colour,
+            weight=weight,
+            va="top",
+            parse_math=False,
+            fontsize=size,
+            in_layout=False,
+        )
         # A line that is too wide, as one of wide letters, is set smaller.
         available = (1 - 3 * _MARGIN) * figure.bbox.width
         text.set_fontsize(size * min(1.0, available / max(text.get_window_extent().width, 1.0)))

@@ -48,8 +48,7 @@ def draw_scans(panels: Sequence[Axes], loads: Loads) -> None:
         drawn.append(_draw_scan(axes, part, look))
         if len(drawn) == MOST_PANELS < len(loads):
             load += f"\nand {len(loads) - MOST_PANELS} more loads"
-        words = axes.text(0.98, 0.92, load, ha="right", va="top", transform=axes.transAxes)
-        words.set_color(look[0])
+        axes.text(0.98, 0.92, load, ha="right", va="top", color=look[0], transform=axes.transAxes)
     if len(panels) > 1:
         _share_labels(panels)
     legend_above(panels[0], points=loads[0][1].reconvolution.x.size, first=drawn[0])
@@ -79,7 +78,18 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
         if load and len(named) < MOST_PANELS:
             named.append(points)
         if np.any(np.isfinite(limit)):
-            limits.append(_draw_limits(axes, part, limit))
+            x = part.reconvolution.x
+            limits += axes.plot(
+                x / MM,
+                limit / part.reading.scale,
+                "v",
+                mfc="none",
+                mew=0.7,
+                color=COLOURS["muted"],
+                ms=0.8 * style.marker_size(x.size),
+                label="less than 2u: upper limit, U + 2u",
+                rasterized=x.size > style.SCATTER_THRESHOLD,
+            )
         _draw_predictions(axes, part, net=True)
         heights.append(_draw_reference(axes, part, net=True))
     shown = np.concatenate(heights)
@@ -112,16 +122,6 @@ def _signal_and_limit(data: ApparatusData) -> tuple[FloatArray, FloatArray]:
     clear = (signal > errors) & (signal > 0)
     limited = ~clear & (limit > 0)
     return np.where(clear, signal, np.nan), np.where(limited, limit, np.nan)
-
-
-def _draw_limits(axes: Axes, data: ApparatusData, limit: FloatArray) -> Any:
-    """Draw the upper limits of voltages that are less than 2u; return what is drawn."""
-    x = data.reconvolution.x
-    (limits,) = axes.plot(x / MM, limit / data.reading.scale, "v", mfc="none", mew=0.7)
-    limits.set(color=COLOURS["muted"], markersize=0.8 * style.marker_size(x.size))
-    limits.set_label("less than 2u: upper limit, U + 2u")
-    limits.set_rasterized(x.size > style.SCATTER_THRESHOLD)
-    return limits
 
 
 def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, label: str) -> Any:
@@ -215,9 +215,15 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> Fl
     curve = np.concatenate([voltage[::-1], voltage])
     if not net:
         curve = _turned(data, x) * curve + _background(data, x)
-    (line,) = axes.plot(x / MM, curve / data.reading.scale, "-.", lw=1.0, zorder=1.5)
-    line.set_color(COLOURS["reference"])
-    line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
+    axes.plot(
+        x / MM,
+        curve / data.reading.scale,
+        "-.",
+        lw=1.0,
+        zorder=1.5,
+        color=COLOURS["reference"],
+        label=rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)",
+    )
     return np.asarray(peak)
 
 
@@ -251,8 +257,16 @@ def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
-    patch = Rectangle((left, 0.0), 2 * radius / MM, 0.035, transform=axes.get_xaxis_transform())
-    patch.set(facecolor="black", lw=0, zorder=4, label=f"{form}, diameter {2 * radius / MM:.3g} mm")
+    patch = Rectangle(
+        (left, 0.0),
+        2 * radius / MM,
+        0.035,
+        transform=axes.get_xaxis_transform(),
+        facecolor="black",
+        lw=0,
+        zorder=4,
+        label=f"{form}, diameter {2 * radius / MM:.3g} mm",
+    )
     axes.add_patch(patch)
 
 
@@ -328,8 +342,12 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     limit = max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9)))
     style.draw_residual_band(axes)
     many = scan.x.size > style.SCATTER_THRESHOLD
-    common = {"ls": "none", "ms": 1.2 if many else style.marker_size(scan.x.size)}
-    common |= {"mew": 0.3 if many else 0.7, "rasterized": many}
+    common = {
+        "ls": "none",
+        "ms": 1.2 if many else style.marker_size(scan.x.size),
+        "mew": 0.3 if many else 0.7,
+        "rasterized": many,
+    }
     gaussian = common | {"color": COLOURS["gaussian"], "marker": "s", "mfc": "none"}
     _draw_residual_points(axes, scan.x, with_gaussian, "Gaussian", limit, gaussian)
     looks = _looks(loads, COLOURS["deconvolved"])

@@ -77,9 +77,19 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         x = [at_load.load for at_load in measured]
         ratio = [at_load.ratio for at_load in measured]
         bars = [EXPANDED * at_load.ratio_uncertainty for at_load in measured]
-        look = mark(lubrication, COLOURS["measured"])
-        look |= {"ms": 4, "mew": 0.8, "ls": "none", "elinewidth": 0.8, "capsize": 2}
-        axes.errorbar(x, ratio, bars, zorder=3, label=lubricated_words(lubrication), **look)
+        axes.errorbar(
+            x,
+            ratio,
+            bars,
+            ms=4,
+            mew=0.8,
+            ls="none",
+            elinewidth=0.8,
+            capsize=2,
+            zorder=3,
+            label=lubricated_words(lubrication),
+            **mark(lubrication, COLOURS["measured"]),
+        )
     _name_curves(axes, loads, drawn)
     axes.set_xlabel("load (N)")
     axes.set_ylabel("largest blurred stress\nover frictionless, $S_{max}/p^0_{max}$ (1)")
@@ -265,8 +275,9 @@ def _panels(
     lubrications = list(comparison.joint)
     rows = len(lubrications)
     columns = len(comparison.loadings)
-    shared: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "note": note}
-    with panels_of(0.6 + height * rows, rows, columns, **shared) as (figure, panels):
+    with panels_of(
+        0.6 + height * rows, rows, columns, note, sharex=True, sharey=True, squeeze=False
+    ) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
                 draw(axes, comparison, profiles.chosen(comparison, loading, lubrication))
@@ -315,11 +326,18 @@ def _draw_rise(axes: Axes, reading: BoundedEstimate, **look: Any) -> None:
 
 def draw_levels(axes: Axes) -> None:
     """Draw the levels that bound 68.3 % and 95 %, and end the axis not far above."""
-    look: dict[str, Any] = {"ha": "right", "fontsize": 6, "color": "0.4"}
-    look |= {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
     for level, words in _LEVELS:
         axes.axhline(level, color="0.6", lw=0.6, ls=":")
-        axes.annotate(words, (0.995, level), (0, 1), **look)
+        axes.annotate(
+            words,
+            (0.995, level),
+            (0, 1),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right",
+            fontsize=6,
+            color="0.4",
+        )
     axes.set_ylim(0, _HIGHEST)
 
 

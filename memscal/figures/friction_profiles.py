@@ -1,7 +1,7 @@
 """Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -41,7 +41,7 @@ def friction_position(friction: ArrayLike) -> FloatArray:
 def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
     axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
+    axis.set_ticks(friction_position(_TICKS), [friction_name(mu) for mu in _TICKS])
     set_limits = axes.set_xlim if which == "x" else axes.set_ylim
     set_limits(-0.02, 1.02)
     axis.set_label_text(r"effective friction coefficient $\mu_e$")
@@ -259,8 +259,11 @@ def friction_set_figure(
     loads = chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
-    shared: dict[str, Any] = {"sharex": "col", "squeeze": False, "height_ratios": (1.5, 1.5, 1.0)}
-    with panels_of(5.0, 3, len(loads), **shared) as (figure, panels):
+    heights = (1.5, 1.5, 1.0)
+    with panels_of(5.0, 3, len(loads), sharex="col", squeeze=False, height_ratios=heights) as (
+        figure,
+        panels,
+    ):
         largest = 0.0
         for (stress, beyond, residual), at_load in zip(panels.T, loads, strict=True):
             frictionless = at_load.calculated[0]
@@ -328,5 +331,10 @@ def _legend_of_friction(
         line.set_label(rf"$\mu$ = {friction_name(mu)}")
         handles.append(line)
     title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
-    place: dict[str, Any] = {"loc": "outside upper center", "ncols": len(handles)}
-    figure.legend(handles=handles, title=title, title_fontsize=8, **place)
+    figure.legend(
+        handles=handles,
+        title=title,
+        title_fontsize=8,
+        loc="outside upper center",
+        ncols=len(handles),
+    )

@@ -1,7 +1,6 @@
 """Figure of a log: the holds that were found in it, and the readings that they give."""
 
 import math
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,8 +17,12 @@ def holds_figure(holds: Holds) -> Figure:
     """Draw position, load and reading over the lines of the file, and readings over position."""
     reading = holds.reading
     reading_label = f"reading ({reading.unit})"
-    names = {"x": ("x (mm)", MM), "y": ("y (mm)", MM), "normal_load": ("load (N)", 1.0)}
-    names["u_zz"] = (reading_label, reading.scale)
+    names = {
+        "x": ("x (mm)", MM),
+        "y": ("y (mm)", MM),
+        "normal_load": ("load (N)", 1.0),
+        "u_zz": (reading_label, reading.scale),
+    }
     shown = [name for name in names if name in holds.log and np.ptp(holds.log[name]) > 0]
     every = math.ceil(holds.line.size / _MOST_ROWS)
     first = holds.line[holds.first]
@@ -41,8 +44,16 @@ def holds_figure(holds: Holds) -> Figure:
         x = holds.mean[along] / MM
         u = holds.mean["u_zz"] / reading.scale
         bars = 2 * holds.u_errors / reading.scale
-        look: dict[str, Any] = {"fmt": "o", "ms": marker_size(first.size), "lw": 0.8, "zorder": 3}
-        axes.errorbar(x, u, bars, color=COLOURS["measured"], **look)
+        axes.errorbar(
+            x,
+            u,
+            bars,
+            color=COLOURS["measured"],
+            fmt="o",
+            ms=marker_size(first.size),
+            lw=0.8,
+            zorder=3,
+        )
         axes.set(xlabel=f"{along} (mm)", ylabel=reading_label)
         axes.set_title("mean of each hold ± 2 standard uncertainties (k = 2)", loc="left")
     return figure

@@ -40,7 +40,7 @@ from memscal.version import __version__
 #: By the policy in it a browser fetches nothing and runs nothing.
 _PAGE = Path(__file__).with_name("report.html")
 #: Bytes that the figures of a page may have, which leaves it below a megabyte.
-_MOST_OF_FIGURES = 800_000
+_MOST_IMAGE_BYTES = 800_000
 #: Dots per inch of figures that are too large as drawings.
 _COARSE = 90.0
 
@@ -75,12 +75,15 @@ def html_report(result: Result) -> str:
     """Return a result as a self-contained HTML page; what came from files is escaped."""
     report = report_of(result)
     tables = [table for table in result.tables() if table.title != CHECKS]
+    explained = checks_table(worst_checks(report.checks), meanings=True)
+    title = "Each passes up to its limit; of one made several times, what failed and the worst"
+    checks = replace(explained, title=title)
     items = "\n".join(f"<li>{escape(text)}</li>" for text in marked_texts(report.messages))
     sections = {
         "Results": _html(tables[: report.leading]),
         "Figures": html_figures(report.pictures),
         "Further results": _html(tables[report.leading :]),
-        "Quality checks": _html([_checks(report.checks)]),
+        "Quality checks": _html([checks]),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
         "Uncertainty budget": _html([report.budget] if report.budget else []),
         "What the answer assumes": _html([report.assumptions] if report.assumptions else []),
@@ -119,17 +122,12 @@ def _html(tables: Sequence[Table]) -> str:
     return "\n".join(boxes)
 
 
-def _checks(checks: Sequence[QualityCheck]) -> Table:
-    title = "Each passes up to its limit; of one made several times, what failed and the worst"
-    return replace(checks_table(worst_checks(checks), meanings=True), title=title)
-
-
 def html_figures(pictures: Sequence[Picture]) -> str:
     """Return figures with their captions, as images that the page holds."""
     figures = [picture.draw() for picture in pictures]
     images = [_image(figure, "svg", 72.0) for figure in figures]
     for i in sorted(range(len(images)), key=lambda i: -len(images[i])):
-        if sum(map(len, images)) > _MOST_OF_FIGURES:
+        if sum(map(len, images)) > _MOST_IMAGE_BYTES:
             images[i] = _image(figures[i], "png", _COARSE)
     return "\n".join(
         f'<figure>\n<img alt="{escape(picture.alt)}" src="{image}">\n'

@@ -50,18 +50,22 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
 def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: BoolArray) -> None:
     """Draw a profile; points that are not clear of zero are pale, without bars."""
     dashes = "--" if profile.lubrication == "lubricated" else "-"
-    (line,) = axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, color=colour, lw=0.8)
-    line.set(ls=dashes, alpha=0.7)
-    look = style.mark(profile.lubrication, colour) | {"ls": "none", "mew": 0.7, "ms": 2.6}
-    look |= {"many": profile.r.size > style.SCATTER_THRESHOLD, "elinewidth": 0.6}
+    curve = profile.curve_s_zz / KPA
+    axes.plot(profile.curve_r / MM, curve, color=colour, lw=0.8, ls=dashes, alpha=0.7)
+    look = style.mark(profile.lubrication, colour) | {
+        "ls": "none",
+        "mew": 0.7,
+        "ms": 2.6,
+        "many": profile.r.size > style.SCATTER_THRESHOLD,
+        "elinewidth": 0.6,
+    }
     r = profile.r / MM
     stress = profile.s_zz / KPA
     bars = EXPANDED * profile.s_zz_errors / KPA
     style.draw_measured(axes, r[clear], stress[clear], bars[clear], **look)
     if not clear.all():
         style.draw_measured(axes, r[~clear], stress[~clear], None, alpha=0.3, **look)
-    radius = profile.contact_radius / MM
-    axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=dashes)
+    axes.axvline(profile.contact_radius / MM, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
 
 def _legend(
@@ -76,11 +80,11 @@ def _legend(
             look["marker"] = "."
         else:
             words += ", ±2u"
-        handle = Line2D([], [], lw=0.8, ms=3.2, label=words, **look)
-        handle.set_linestyle("--" if state == "lubricated" else "-")
-        handles.append(handle)
-    radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
-    handles.append(radius)
+        dashes = "--" if state == "lubricated" else "-"
+        handles.append(Line2D([], [], lw=0.8, ms=3.2, ls=dashes, label=words, **look))
+    handles.append(
+        Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
+    )
     figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 7))
 
 
@@ -114,10 +118,17 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
     count = restored.points.u.size
     many = count > style.SCATTER_THRESHOLD
-    (points,) = axes.plot(restored.distance / MM, restored.measured_stress / KPA, "o")
-    points.set(color=COLOURS["measured"], mfc="none", mew=0.6)
-    points.set(label="scan, blurred stress $S_{zz} = U/A$", rasterized=many)
-    points.set_markersize(1.2 if many else 0.8 * style.marker_size(count))
+    (points,) = axes.plot(
+        restored.distance / MM,
+        restored.measured_stress / KPA,
+        "o",
+        color=COLOURS["measured"],
+        mfc="none",
+        mew=0.6,
+        ms=1.2 if many else 0.8 * style.marker_size(count),
+        label="scan, blurred stress $S_{zz} = U/A$",
+        rasterized=many,
+    )
     style.draw_zero(axes)
     axes.set_xlim(0, max(r[-1], restored.distance.max() / MM))
     axes.set_xlabel(ALONG_RADIUS)
@@ -169,7 +180,7 @@ def _draw_loads(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str])
     depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
     load = [contact.load for contact in contacts]
     axes.plot(depth, load, color=COLOURS["muted"], lw=0.8)
-    axes.scatter(depth, load, c=list(colours), s=14, zorder=3)
+    axes.scatter(depth, load, c=colours, s=14, zorder=3)
     axes.set_ylim(bottom=0)
     axes.set_xlim(left=min(0.0, 1.05 * depth.min()))
     axes.set(xlabel="depth (µm)", ylabel="load (N)")

@@ -115,10 +115,17 @@ def panels_of(
 
 def panel_letters(panels: Iterable[Axes]) -> None:
     """Put each panel's letter at the upper left, outside the frame and clear of all data."""
-    place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
     for axes, letter in zip(panels, ascii_lowercase, strict=False):
-        label = axes.annotate(letter, (0.0, 1.0), (-5, 6), **place)
-        label.set(fontweight="bold", fontsize=10, horizontalalignment="right")
+        axes.annotate(
+            letter,
+            (0.0, 1.0),
+            (-5, 6),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            fontweight="bold",
+            fontsize=10,
+            horizontalalignment="right",
+        )
 
 
 def legend_above(

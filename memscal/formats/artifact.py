@@ -40,12 +40,13 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     u_zz = "/entry/reconvolution/u_zz"
     reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
     reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
+    plane = None
+    if file.has(_PLANE):
+        plane = ApparatusField(**read_record(records.FIELD, file, _PLANE))
     transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
     reconvolution = records.RECONVOLUTION.read_in(reading)
     return ApparatusData(
-        plane=ApparatusField(**read_record(records.FIELD, file, _PLANE))
-        if file.has(_PLANE)
-        else None,
+        plane=plane,
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
         transfer=apparatus.TransferFunction(**transfer),
         reconvolution=apparatus.Reconvolution(

@@ -13,9 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from memscal.errors import FormatError, MemscalError, OutputError
+from memscal.errors import MemscalError, OutputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_bytes
@@ -49,11 +47,9 @@ def table_key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, FloatArray]) -> bool:
+def keep_contact_table(folder: FilePath, key: str, arrays: Mapping[str, FloatArray]) -> bool:
     """Write arrays under their key, remove the oldest; return whether the disk took them."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
-    if folder is None:
-        return False
     children: dict[str, Node] = {
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
     }
@@ -70,10 +66,8 @@ def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, Float
     return True
 
 
-def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] | None:
+def find_contact_table(folder: FilePath, key: str) -> dict[str, FloatArray] | None:
     """Return the arrays that were kept under a key; ``None`` where none of them are sound."""
-    if folder is None:
-        return None
     path = _path(folder, key)
     try:
         with open_hdf5(path) as file:
@@ -82,7 +76,7 @@ def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] |
             if file.text("/entry/key") != key:
                 return None
             arrays = {
-                name: np.asarray(file.array(f"/entry/contacts/{name}"), dtype=np.float64)
+                name: file.array(f"/entry/contacts/{name}")
                 for name in file.text("/entry/arrays").split()
             }
     except MemscalError:
@@ -93,10 +87,7 @@ def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] |
 
 
 def _path(folder: FilePath, key: str) -> Path:
-    name = f"{key}.h5"
-    if not _ENTRY.fullmatch(name):
-        raise FormatError(f"{key!r} is not the key of a contact table.")
-    return Path(folder) / name
+    return Path(folder) / f"{key}.h5"
 
 
 def _entries(folder: FilePath) -> list[tuple[Path, os.stat_result]]:
@@ -117,13 +108,6 @@ def _prune(folder: FilePath) -> None:
     for number, (path, status) in enumerate(entries[:-1]):
         if size <= _MOST_BYTES and len(entries) - number <= _MOST_ENTRIES:
             return
-        _removed(path)
+        with contextlib.suppress(OSError):
+            path.unlink()
         size -= status.st_size
-
-
-def _removed(path: Path) -> bool:
-    try:
-        path.unlink()
-    except OSError:
-        return False
-    return True

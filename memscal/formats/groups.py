@@ -189,9 +189,8 @@ def parameter_dimension(name: str, unit: str = "", reading: Reading = VOLTS) -> 
     raise InputError(
         f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",
-        cure="Begin its name with one of "
-        + ", ".join(TRUTH)
-        + ", or give the SI unit of a parameter in ParameterSet(units=...).",
+        cure=f"Begin its name with one of {', '.join(TRUTH)}, or give the SI unit of a parameter "
+        "in ParameterSet(units=...).",
     )
 
 
@@ -207,7 +206,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
         why = "The group of the parameters holds something else of that name."
         cure = "Give it another name."
         raise InputError(f"A parameter cannot be called {min(reserved)}.", why=why, cure=cure)
-    children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
+    children: dict[str, Node] = {"names": to_json("parameter names", parameters.names)}
     for name, dimension in dimensions.items():
         children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)

@@ -233,5 +233,5 @@ def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> float | int | None:
-    number = np.asarray(value).reshape(-1)[0].item()
+    number = np.asarray(value).item()
     return number if np.isfinite(number) else None

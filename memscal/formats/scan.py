@@ -33,7 +33,7 @@ _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
-_OF_ONE_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
+_OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _POINTS = ("point",)
 _PAIRS = ("point", "point_prime")
 _BRANCHES = ", ".join(["0 not stated", *(f"{i} {name}" for name, i in BRANCHES.items())])
@@ -142,7 +142,7 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
-            ndim = len(quantity.axes) if name in _OF_ONE_SHAPE else None
+            ndim = len(quantity.axes) if name in _OWN_SHAPE else None
             dimension = quantity.read_in(reading).dimension
             arrays[name] = values.require_array(file, path, dimension, ndim=ndim)
     return arrays
@@ -185,11 +185,11 @@ def _entry(scan: Scan) -> Group:
     children: dict[str, Node] = {"title": scan.title} if scan.title else {}
     children |= groups.circumstances(scan)
     children["data"] = _data_group(scan)
-    loading = scan.load, scan.load_uncertainty, scan.rod_friction
-    children["indenter"] = groups.indenter_group(scan.indenter, *loading)
+    children["indenter"] = groups.indenter_group(
+        scan.indenter, scan.load, scan.load_uncertainty, scan.rod_friction
+    )
     children["sample"] = groups.sample_group(scan.film, scan.lubrication, scan.lubricant)
-    instruments = scan.sensor, scan.load_cell, scan.stage
-    children["instrument"] = groups.instrument_group(*instruments)
+    children["instrument"] = groups.instrument_group(scan.sensor, scan.load_cell, scan.stage)
     if scan.notes:
         children["notes"] = writer.note(scan.notes)
     if scan.reference is not None:

@@ -79,16 +79,6 @@ def _read_scans(
     return tuple(scans)
 
 
-def _scan_group(scan: MeasuredScan) -> Group:
-    children: dict[str, Node] = {
-        "sample": groups.sample_group(scan.film, scan.lubrication),
-        "indenter": groups.indenter_group(scan.indenter),
-        "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
-        **write_record(records.MEASURED_SCAN, scan).children,
-    }
-    return Group("NXcollection", children)
-
-
 #: Correlations below this are rounding.
 _ROUNDING = 1e-9
 _BUDGET = {"force": "force", "maximum": "stress"}
@@ -179,7 +169,13 @@ def _entry(measured: MeasuredStress) -> Group:
     scans: dict[str, Node] = {}
     sources = {"artifact": measured.artifact}
     for i, scan in enumerate(measured.scans, 1):
-        scans[f"scan_{i}"] = _scan_group(scan)
+        parts: dict[str, Node] = {
+            "sample": groups.sample_group(scan.film, scan.lubrication),
+            "indenter": groups.indenter_group(scan.indenter),
+            "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
+            **write_record(records.MEASURED_SCAN, scan).children,
+        }
+        scans[f"scan_{i}"] = Group("NXcollection", parts)
         sources[f"scan_{i}"] = scan.source
     inputs: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
     first = measured.scans[0]
@@ -193,7 +189,7 @@ def _entry(measured: MeasuredStress) -> Group:
         **_parts_of_profiles(measured.profiles),
         "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **digests),
         "quality": groups.quality_group(measured.checks),
-        "overridden": to_json("overridden", list(measured.overridden)),
+        "overridden": to_json("overridden", measured.overridden),
         # Those of the first scan; each scan states its own beside them.
         "sample": groups.sample_group(first.film),
         "instrument": groups.instrument_group(first.sensor, first.load_cell),
@@ -248,8 +244,10 @@ def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
 
 
 def _roots_group(profile: MeasuredProfile) -> Group:
-    children: dict[str, Node] = {"sources": to_json("sources", list(profile.roots))}
-    children["r"] = si(profile.r, "length", ("r",))
+    children: dict[str, Node] = {
+        "sources": to_json("sources", list(profile.roots)),
+        "r": si(profile.r, "length", ("r",)),
+    }
     for source, root in profile.roots.items():
         axes = ("r", f"column_{source}")[: root.ndim]
         children[f"root_{source}"] = si(root, "stress", axes)

@@ -202,12 +202,12 @@ def _registry() -> Any:
 
 
 def _wrong_dimension(where: str, unit: str, dimension: str) -> UnitError:
-    of_mass = ' (of weights in grams, "gf")' if dimension == "force" else ""
+    grams = ' (of weights in grams, "gf")' if dimension == "force" else ""
     stored = DIMENSIONS[dimension].stored
     return UnitError(
         f'{where} has the unit "{_shown(unit)}", but it must be a {dimension}.',
         why="A number in a unit of another kind cannot be converted.",
-        cure=f'Give it in "{stored}" or another unit of {dimension}{of_mass}.',
+        cure=f'Give it in "{stored}" or another unit of {dimension}{grams}.',
     )
 
 

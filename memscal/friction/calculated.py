@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,8 @@ from numpy.typing import ArrayLike
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.friction.family import (
-    FRICTION_SCALE,
     FamilySetup,
     ProfileFamily,
-    base_wavenumbers,
     parameter_values,
     require_loads,
 )
@@ -77,12 +76,6 @@ def external_family(
     loading = "".join(loadings)
     frictions = np.array(sorted({mu for mu, _ in tables}))
     grid = _grid(tables, frictions, nominal)
-    nodes = base_wavenumbers(film.thickness, reach)
-    spectra = []
-    for row in grid:
-        transforms = [hankel_transform(cell.r, cell.sigma_zz, nodes.k) for cell in row]
-        scales = [load / cell.load for load, cell in zip(nominal, row, strict=True)]
-        spectra.append(np.multiply(transforms, np.reshape(scales, (-1, 1))))
     solved = amontons_family(
         film,
         indenter,
@@ -92,21 +85,23 @@ def external_family(
         reach=reach,
         **options,
     )
+    k = solved.wavenumbers.k
+    spectra = []
+    for row in grid:
+        transforms = [hankel_transform(cell.r, cell.sigma_zz, k) for cell in row]
+        scales = [load / cell.load for load, cell in zip(nominal, row, strict=True)]
+        spectra.append(np.multiply(transforms, np.reshape(scales, (-1, 1))))
     numbers: dict[str, Any] = {}
     for name in ("depth", "contact_radius", "convergence"):
         rows = [[getattr(cell, name) for cell in row] for row in grid]
         numbers[name] = np.array(rows, dtype=np.float64)
-    return ProfileFamily(
+    return replace(
+        solved,
         name="external",
         loading=loading,
-        wavenumbers=nodes,
-        loads=nominal,
-        values=frictions,
-        scale=FRICTION_SCALE,
         spectra=np.array(spectra),
         # What the tables have beside the contacts solved here counts as proportional to the load.
         by_load=solved.by_load + (spectra - solved.spectra),
-        changes=solved.changes,
         depths=numbers["depth"],
         contact_radii=numbers["contact_radius"],
         convergence=numbers["convergence"],

@@ -102,9 +102,27 @@ def comparison_messages(
         *synthetic_messages(measured),
         *_loadings(joint),
         *_against_macroscopic(joint, macroscopic),
-        *_calculated(families),
-        *_unstated(measured),
     ]
+    for loading, family in families.items():
+        worst = float(np.nanmax(family.convergence, initial=0.0))
+        if worst > _COARSE:
+            words = f" ({loading} loading)" if loading else ""
+            text = f"contacts{words} have converged to {worst:.1%} of their stress only."
+            messages.append(Message("convergence", f"The calculated {text}"))
+        messages += [Message("calculated", text) for text in family.notes]
+    unstated: dict[str, float | None] = {}
+    for profile in measured.profiles:
+        film = profile.scan.film
+        indenter = profile.scan.indenter
+        stated = {
+            "Young's modulus": film.young_modulus_uncertainty,
+            "Poisson's ratio": film.poisson_ratio_uncertainty,
+            "film thickness": film.thickness_uncertainty,
+            f"{indenter.shape} radius": indenter.radius_uncertainty,
+            "load": profile.load_uncertainty,
+        }
+        unstated |= {name: value for name, value in stated.items() if value is None}
+    messages += quality.uncertainty_unstated_messages(unstated)
     return tuple(dict.fromkeys([*messages, *measured.messages]))
 
 
@@ -167,31 +185,3 @@ def _against_macroscopic(
             words = f" ({loading} loading)" if loading else ""
             text = f"The effective friction coefficient{words} {verdict}, {value:.3g}."
             yield Message("macroscopic", text)
-
-
-def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
-    """Say where contacts have not converged, and what was assumed."""
-    for loading, family in families.items():
-        worst = float(np.nanmax(family.convergence, initial=0.0))
-        if worst > _COARSE:
-            words = f" ({loading} loading)" if loading else ""
-            text = f"contacts{words} have converged to {worst:.1%} of their stress only."
-            yield Message("convergence", f"The calculated {text}")
-        yield from (Message("calculated", text) for text in family.notes)
-
-
-def _unstated(measured: MeasuredStress) -> list[Message]:
-    """Name the uncertainties that are not stated."""
-    unstated: dict[str, float | None] = {}
-    for profile in measured.profiles:
-        film = profile.scan.film
-        indenter = profile.scan.indenter
-        stated = {
-            "Young's modulus": film.young_modulus_uncertainty,
-            "Poisson's ratio": film.poisson_ratio_uncertainty,
-            "film thickness": film.thickness_uncertainty,
-            f"{indenter.shape} radius": indenter.radius_uncertainty,
-            "load": profile.load_uncertainty,
-        }
-        unstated |= {name: value for name, value in stated.items() if value is None}
-    return quality.uncertainty_unstated_messages(unstated)

@@ -160,7 +160,7 @@ def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> L
         p_max=maxima,
         chi_square=chi_square,
         deviance=deviance[nodes] - deviance.min(),
-        p_values=np.asarray(chdtrc(points.degrees, chi_square)),
+        p_values=chdtrc(points.degrees, chi_square),
         degrees=points.degrees,
         bracketed=bracketed_share(measured, profile.s_zz_errors, calculated, calculated_errors),
         by_maximum=fit.coefficient_of_maximum(profile, index),

@@ -174,20 +174,6 @@ class LoadingPath:
     order: int = 0  # one for the shear at the base
 
 
-def solve_paths(
-    paths: Sequence[LoadingPath], k: FloatArray, *, workers: int
-) -> list[dict[str, FloatArray]]:
-    """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes."""
-    processes = min(workers, len(paths))
-    total = sum(len(path.loads) for path in paths)
-    with ExitStack() as stack:
-        solve: Any = map
-        if processes > 1:
-            solve = stack.enter_context(worker_pool(processes)).map
-        solved = solve(_solve, paths, [k] * len(paths))
-        return list(Task("contacts", total).counted(solved, lambda arrays: arrays["depths"].size))
-
-
 def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
     """Return spectra (L, K) in N, derivatives by logarithms (zero where not needed), numbers."""
     loads = np.array(path.loads)
@@ -285,7 +271,8 @@ class FamilySetup:
             raise InputError(problem, why=why, cure="Give the sphere of the contact scan.")
         self.film = film
         self.indenter = indenter
-        self.wavenumbers = base_wavenumbers(film.thickness, reach)
+        require_positive("reach", reach, "m")
+        self.wavenumbers = Wavenumbers.covering(_LARGEST_KH / film.thickness, reach)
         self.loads = require_loads(loads)
         self.cache = cache
         self.workers = workers
@@ -312,18 +299,23 @@ class FamilySetup:
         if a_length:
             # Lengths scale as the film's displacements: twice the sphere's rise over its thickness.
             scale = self.film.thickness**2 / self.indenter.radius
-        # All that a family's numbers depend on: not the film's name.
-        requests = [asdict(path) | {"law": type(path.interface.normal).__name__} for path in paths]
-        for request in requests:
-            request["film"].pop("name")
-        numbers = {"values": values.tolist(), "scale": scale, "paths": requests}
-        digest = hashlib.sha256(k.tobytes()).hexdigest()
-        key = table_key({"version": __version__, "revision": _REVISION, "k": digest, **numbers})
-        arrays = find_contact_table(self.cache, key)
+        arrays = None
+        if self.cache is not None:
+            # All that a family's numbers depend on: not the film's name.
+            requests = []
+            for path in paths:
+                request = asdict(path) | {"law": type(path.interface.normal).__name__}
+                request["film"].pop("name")
+                requests.append(request)
+            numbers = {"values": values.tolist(), "scale": scale, "paths": requests}
+            digest = hashlib.sha256(k.tobytes()).hexdigest()
+            key = table_key({"version": __version__, "revision": _REVISION, "k": digest, **numbers})
+            arrays = find_contact_table(self.cache, key)
         if arrays is None:
             arrays = self._calculated(paths, (values, scale) if a_length else None)
-            axes = {"value": values, "load": self.loads, "k": k}
-            keep_contact_table(self.cache, key, axes | arrays)
+            if self.cache is not None:
+                axes = {"value": values, "load": self.loads, "k": k}
+                keep_contact_table(self.cache, key, axes | arrays)
         changes = [name for name in arrays if name.startswith(_CHANGE)]
         return ProfileFamily(
             name=name,
@@ -373,7 +365,7 @@ class FamilySetup:
         changes = {}
         for source, (derivative, value, uncertainty) in stated.items():
             if uncertainty is not None:
-                changes[source] = np.asarray(derivative * (uncertainty / value))
+                changes[source] = derivative * (uncertainty / value)
         if sides:
             upper, lower = (side["spectra"] for side in sides)
             slope = (upper - lower) / (ratios[0] - ratios[1])
@@ -383,21 +375,22 @@ class FamilySetup:
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 
     def _solved(self, groups: Sequence[Sequence[LoadingPath]]) -> list[dict[str, FloatArray]]:
-        """Solve groups of paths, each path once; stack the arrays of each group."""
+        """Solve groups of paths, each path once, in one or more processes; stack each group."""
         distinct = list(dict.fromkeys(chain.from_iterable(groups)))
-        arrays = solve_paths(distinct, self.wavenumbers.k, workers=self.workers)
+        processes = min(self.workers, len(distinct))
+        task = Task("contacts", sum(len(path.loads) for path in distinct))
+        with ExitStack() as stack:
+            solve: Any = map
+            if processes > 1:
+                solve = stack.enter_context(worker_pool(processes)).map
+            found = solve(_solve, distinct, [self.wavenumbers.k] * len(distinct))
+            arrays = list(task.counted(found, lambda numbers: numbers["depths"].size))
         solved = dict(zip(distinct, arrays, strict=True))
         stacks = []
         for group in groups:
             members = [solved[path] for path in group]
             stacks.append({name: np.stack([own[name] for own in members]) for name in arrays[0]})
         return stacks
-
-
-def base_wavenumbers(thickness: float, reach: float) -> Wavenumbers:
-    """Return nodes for all that reaches the base of a film, seen out to ``reach`` (m)."""
-    require_positive("reach", reach, "m")
-    return Wavenumbers.covering(_LARGEST_KH / thickness, reach)
 
 
 def require_loads(loads: ArrayLike) -> FloatArray:

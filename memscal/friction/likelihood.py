@@ -108,7 +108,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         offset=position - float(profile.centre[profile.axis]),
         log_load=np.log(points.load / profile.load),
         # A stated noise is not raised by a misfit: chi-square would not show it then.
-        noise=np.asarray(points.noise / np.sqrt(points.weight)),
+        noise=points.noise / np.sqrt(points.weight),
         load_errors=points.load_errors / profile.load,
         x_errors=points.x_errors,
         flat=np.stack([np.ones_like(position), drift], axis=1),
@@ -119,15 +119,18 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
 
 
 def points_at(
-    offset: FloatArray, like: LoadPoints, u: ArrayLike = 0.0, noise: ArrayLike = 0.0
+    offset: FloatArray,
+    like: LoadPoints,
+    u: FloatArray | float = 0.0,
+    noise: FloatArray | float = 0.0,
 ) -> LoadPoints:
     """Return points of the nominal load at places (n,), with the load's uncertainties of others."""
     nothing = np.zeros(offset.size)
     return LoadPoints(
-        u=nothing + np.asarray(u),
+        u=nothing + u,
         offset=offset,
         log_load=nothing,
-        noise=nothing + np.asarray(noise),
+        noise=nothing + noise,
         load_errors=nothing,
         x_errors=nothing,
         flat=np.zeros((offset.size, 0)),
@@ -324,7 +327,7 @@ class Noise:
             elif self.contacts is not None:
                 shared = self.contacts @ self.contacts.T
             covariance = covariance + kind[:, :, None] * kind[:, None, :] * shared
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))[:, None]
+        return np.linalg.inv(np.linalg.cholesky(covariance))[:, None]
 
     def shares(self, gain: FloatArray) -> dict[str, float]:
         """Return the standard deviation by kind of a sum of whitened readings, at one value."""

@@ -82,7 +82,7 @@ def evidence_of_each(
         both = Statistics(*(known[:, None] + new for known, new in pairs))
         with np.errstate(divide="ignore"):
             joint = log_likelihood(both)[0] + np.log(weight)
-        expected = np.asarray(logsumexp(joint, axis=-1))
+        expected = logsumexp(joint, axis=-1)
         logs += expected - before
         if step == steps:
             break

@@ -50,7 +50,16 @@ def stress_checks(
     """Return each profile's checks (``restored``), numbered from one, then that of all."""
     checks = []
     for number, (profile, others) in enumerate(zip(profiles, restored, strict=True), start=1):
-        for own in (_force(profile), *others):
+        allowed = math.hypot(*_relative(profile).values(), restore.NEGLIGIBLE_FORCE)
+        off = abs(profile.force / profile.load - 1) / allowed
+        difference = (
+            f"Difference of the profile's total force, {profile.force:.4g} N, from the applied "
+            f"load of {profile.load:.4g} N, over its standard uncertainty of "
+            f"{allowed * profile.load:.2g} N. {_FORCE}"
+        )
+        p_value = math.erfc(off / math.sqrt(2))
+        force = check("applied_force", off, restore.FORCE_LIMIT, difference, p_value)
+        for own in (force, *others):
             meaning = f"{profile.label}: {own.meaning}"
             checks.append(replace(own, name=f"{own.name}_{number}", meaning=meaning))
     if len(profiles) > 1:
@@ -76,17 +85,6 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
     """Standard uncertainties of force over load, by source."""
     budget = restore.force_less_load(profile.force_budget, profile.load_uncertainty)
     return {source: u / profile.load for source, u in budget.items()}
-
-
-def _force(profile: MeasuredProfile) -> QualityCheck:
-    allowed = math.hypot(*_relative(profile).values(), restore.NEGLIGIBLE_FORCE)
-    off = abs(profile.force / profile.load - 1) / allowed
-    meaning = (
-        f"Difference of the profile's total force, {profile.force:.4g} N, from the applied load of "
-        f"{profile.load:.4g} N, over its standard uncertainty of {allowed * profile.load:.2g} N. "
-        f"{_FORCE}"
-    )
-    return check("applied_force", off, restore.FORCE_LIMIT, meaning, math.erfc(off / math.sqrt(2)))
 
 
 def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
@@ -262,35 +260,29 @@ def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
 def _measured_loads(
     origins: Sequence[MeasuredScan], singles: Sequence[Sequence[Scan]], sensor: ApparatusFunction
 ) -> Iterator[tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]]:
+    """Yield the profile of each load of each scan, with checks and messages of its restoration."""
     for origin, loads in zip(origins, singles, strict=True):
         signals = one_load.contact_signals(loads, sensor)
-        for single, signal in zip(loads, signals, strict=True):
-            yield _measure(origin, single, sensor, signal)
-
-
-def _measure(
-    origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
-) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
-    """Return the profile of a scan of one load, with checks and messages of its restoration."""
-    one_load.require_points(scan, signal)
-    try:
-        prepared = one_load.prepared_scan(scan, sensor, signal)
-        restored = restore.restore_known(prepared.scan, sensor, start=prepared.estimate)
-    except (FitError, InputError) as failure:
-        # A scan that is too short fails here already, and in less plain words.
-        if scan.y is None:
-            top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-            one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
-        problem = f"{restore.load_of(scan)}: {failure.problem}"
-        raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
-    one_load.require_ends(scan, signal, restored.centre)
-    profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
-    checks = [check for check in restored.checks if check.name != _REPLACED]
-    noise = None
-    if scan.u_zz_errors is None:
-        checks = [check for check in checks if check.name not in _NOISE_CHECKS]
-        noise = profile.points["zz"].noise
-    return profile, checks, list(_profile_messages(scan, restored, noise))
+        for scan, signal in zip(loads, signals, strict=True):
+            one_load.require_points(scan, signal)
+            try:
+                prepared = one_load.prepared_scan(scan, sensor, signal)
+                restored = restore.restore_known(prepared.scan, sensor, start=prepared.estimate)
+            except (FitError, InputError) as failure:
+                # A scan that is too short fails here already, and in less plain words.
+                if scan.y is None:
+                    top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
+                    one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
+                problem = f"{restore.load_of(scan)}: {failure.problem}"
+                raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
+            one_load.require_ends(scan, signal, restored.centre)
+            profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
+            checks = [check for check in restored.checks if check.name != _REPLACED]
+            noise = None
+            if scan.u_zz_errors is None:
+                checks = [check for check in checks if check.name not in _NOISE_CHECKS]
+                noise = profile.points["zz"].noise
+            yield profile, checks, list(_profile_messages(scan, restored, noise))
 
 
 def _messages(

@@ -322,10 +322,17 @@ def measured_profile(
     signal: ContactSignal,
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
+    from scipy.sparse import csr_array
+
     a = restored.apparatus.conversion_constant
     posterior = restored.posterior
     noise = restored.noise / np.sqrt(posterior.estimate.outlier_weight)
-    average, x, y = _averaging(restored, noise)
+    # The sparse matrix (n, points) averages repeats at the n positions, by their weight.
+    places = np.stack([restored.points.x, restored.points.y])
+    (x, y), place = np.unique(places, axis=1, return_inverse=True)
+    place = place.ravel()
+    share = noise**-2 / np.bincount(place, noise**-2)[place]
+    average: Any = csr_array((share, (place, np.arange(noise.size))))
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     background = posterior.estimate.model.drift_columns @ posterior.drift
@@ -339,8 +346,8 @@ def measured_profile(
         # Of repeats there are more columns than positions.
         correlated = noise[:, None] * decorrelation.correlate(np.eye(noise.size))
         noise_root = np.linalg.qr((average @ correlated).T)[1].T
-    share = restored.apparatus.parameters.uncertainty("conversion_constant") / a
-    roots = {"noise": noise_root / a, "conversion_constant": share * s_zz[:, None]}
+    u_a = restored.apparatus.parameters.uncertainty("conversion_constant")
+    roots = {"noise": noise_root / a, "conversion_constant": u_a / a * s_zz[:, None]}
     roots |= _place_roots(restored, average)
     maximum, budget = _on_axis(restored)
     curve_r = np.linspace(0.0, float(r[order][-1]), 301)
@@ -406,18 +413,6 @@ def _channel_points(
         x_errors=points.x_errors,
         correlation=correlation,
     )
-
-
-def _averaging(restored: Restoration, noise: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
-    """Sparse matrix (n, points) that averages repeats by their weight, and the n positions."""
-    from scipy.sparse import csr_array
-
-    places = np.stack([restored.points.x, restored.points.y])
-    (x, y), place = np.unique(places, axis=1, return_inverse=True)
-    place = place.ravel()
-    share = noise**-2 / np.bincount(place, noise**-2)[place]
-    average = csr_array((share, (place, np.arange(noise.size))))
-    return average, x, y
 
 
 def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray]:

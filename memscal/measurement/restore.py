@@ -210,10 +210,20 @@ def _checks(restored: Restoration) -> list[QualityCheck]:
         "Share of points whose weight was more than halved. A failure means that the noise is not "
         "what the uncertainties take it for: look at the residuals."
     )
+    load = restored.scan.stated_load
+    budget = force_less_load(restored.force_budget, restored.scan.load_uncertainty)
+    allowed = math.hypot(*budget.values(), NEGLIGIBLE_FORCE * load)
+    carried = (
+        f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
+        f"of {load:.4g} N, in their standard uncertainty. A failure means that gain, load or unit "
+        "differ between the calibration and this scan, or that the film's Poisson's ratio, which "
+        "decides how much lies beyond the scan, is wrong. It does not test A: a factor that is "
+        "wrong in both, such as of one balance, changes nothing."
+    )
     limit = chi_square_limit(degrees) / degrees
     checks = [
         check("reconvolution", restored.chi_square / degrees, limit, blurred),
-        _force(restored),
+        check("restored_force", abs(restored.force - load) / allowed, FORCE_LIMIT, carried),
         *_noise(restored),
         _symmetry(restored),
         check("outliers", float(outliers), quality.OUTLIER_LIMIT, doubtful),
@@ -231,20 +241,6 @@ def force_less_load(
     # the force larger: both rise together.
     of_load = force_budget.get("load", 0.0) - (load_uncertainty or 0.0)
     return {**force_budget, "load": of_load}
-
-
-def _force(restored: Restoration) -> QualityCheck:
-    load = restored.scan.stated_load
-    budget = force_less_load(restored.force_budget, restored.scan.load_uncertainty)
-    allowed = math.hypot(*budget.values(), NEGLIGIBLE_FORCE * load)
-    meaning = (
-        f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
-        f"of {load:.4g} N, in their standard uncertainty. A failure means that gain, load or unit "
-        "differ between the calibration and this scan, or that the film's Poisson's ratio, which "
-        "decides how much lies beyond the scan, is wrong. It does not test A: a factor that is "
-        "wrong in both, such as of one balance, changes nothing."
-    )
-    return check("restored_force", abs(restored.force - load) / allowed, FORCE_LIMIT, meaning)
 
 
 def _noise(restored: Restoration) -> list[QualityCheck]:

@@ -65,50 +65,38 @@ def half_space_coupling(nu: float) -> float:
     return -(1 - 2 * nu) / (2 * (1 - nu))
 
 
-def normal_correction(x: ArrayLike, nu: float) -> FloatArray:
-    """What the base takes from the half-space, :math:`W - 1`; decays as :math:`x^2 e^{-2x}`."""
+def corrections(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    r"""What the base adds to the half-space, :math:`W - 1, X + (1-2\nu)/2(1-\nu), Y - 1`."""
+    # They decay as x^2 exp(-2x).
     x, decay, denominator, kappa = _prepare(x, nu)
-    return -decay * (2 * kappa * decay + 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
+    normal = -decay * (2 * kappa * decay + 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
+    coupling = 2 * decay * (2 * x**2 + 4 * (1 - 2 * nu) * (1 - nu)) / denominator
+    radial = -decay * (2 * kappa * decay - 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
+    return normal, coupling, radial
 
 
-def radial_correction(x: ArrayLike, nu: float) -> FloatArray:
-    r"""What the base takes from the half-space's compliance, :math:`Y - 1`."""
-    x, decay, denominator, kappa = _prepare(x, nu)
-    return -decay * (2 * kappa * decay - 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
+def base_normal(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
+    r"""Base stress by a pressure, and tension by an outward traction: T (1 at x = 0) and N.
 
-
-def coupling_correction(x: ArrayLike, nu: float) -> FloatArray:
-    r"""What the base adds to the half-space's coupling, :math:`X + (1-2\nu)/2(1-\nu)`."""
+    :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D` and :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`.
+    """
     x, decay, denominator, _ = _prepare(x, nu)
-    return 2 * decay * (2 * x**2 + 4 * (1 - 2 * nu) * (1 - nu)) / denominator
+    scale = 4 * (1 - nu) * np.exp(-x)
+    by_pressure = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
+    by_shear = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
+    return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
-def base_normal_from_pressure(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Base stress under a pressure, :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D`; 1 at x = 0."""
+def base_shear(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
+    r"""Shear stress at the base by a pressure, and by a radial traction: S and R.
+
+    :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D` and :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`.
+    """
     x, decay, denominator, _ = _prepare(x, nu)
-    numerator = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
-
-
-def base_shear_from_pressure(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Shear stress at the base under a pressure, :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D`."""
-    x, decay, denominator, _ = _prepare(x, nu)
-    numerator = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
-
-
-def base_normal_from_shear(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Base tension under an outward traction, :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`."""
-    x, decay, denominator, _ = _prepare(x, nu)
-    numerator = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
-
-
-def base_shear_from_shear(x: ArrayLike, nu: float) -> FloatArray:
-    r"""Base shear under a radial traction, :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`."""
-    x, decay, denominator, _ = _prepare(x, nu)
-    numerator = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
-    return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
+    scale = 4 * (1 - nu) * np.exp(-x)
+    by_pressure = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
+    by_shear = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
+    return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
 def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
@@ -184,9 +172,8 @@ def base_spectrum(
     nu = film.poisson_ratio
     p = traction.pressure_transform(k)
     q = traction.shear_transform(k)
-    if order:
-        return -(base_shear_from_pressure(x, nu) * p + base_shear_from_shear(x, nu) * q)
-    return base_normal_from_pressure(x, nu) * p - base_normal_from_shear(x, nu) * q
+    by_pressure, by_shear = base_shear(x, nu) if order else base_normal(x, nu)
+    return -(by_pressure * p + by_shear * q) if order else by_pressure * p - by_shear * q
 
 
 def base_stress(
@@ -293,8 +280,8 @@ class HankelFilm:
         across = surface.coupling_integrals(r, r)
         k, weights = _wavenumbers(film, 2 * r[-1])
         normal, radial = (hat_transform(r.tobytes(), k.tobytes(), order) for order in (0, 1))
-        layer = _layer_integrals(film, r, (k, weights), (normal, radial))
-        matrices = _displacements(film, (direct[0], *across, direct[1]), layer)
+        half_space = (direct[0], *across, direct[1])
+        matrices = _displacements(film, r, (k, weights), (normal, radial), half_space)
         return surface.SurfaceCompliance(r, *matrices)
 
     discretisation = "Hankel transforms, Gauss-Legendre in k"
@@ -325,8 +312,8 @@ class HankelField:
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
         transforms = traction.pressure_transform(k), traction.shear_transform(k)
-        layer = _layer_integrals(self.film, x, (k, weights), transforms)
-        displaced = _displacements(self.film, traction.half_space_integrals(x), layer)
+        half_space = traction.half_space_integrals(x)
+        displaced = _displacements(self.film, x, (k, weights), transforms, half_space)
         by_pressure, by_shear = displaced[2 * order : 2 * order + 2]
         return (by_pressure + by_shear).reshape(np.shape(r))
 
@@ -341,32 +328,25 @@ def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
     return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
 
 
-def _layer_integrals(
-    film: ElasticFilm, x: FloatArray, wavenumbers: _Pair, transforms: _Pair
+def _displacements(
+    film: ElasticFilm,
+    x: FloatArray,
+    wavenumbers: _Pair,
+    transforms: _Pair,  # of pressure and shear, at the wavenumbers
+    half_space: HalfSpaceIntegrals,
 ) -> HalfSpaceIntegrals:
-    """Return what the base takes from the surface's displacements at ``x``, times G/(1 - nu)."""
+    """Return the depression at ``x`` by p and by q, and the outward displacement by p and by q."""
     (k, weights) = wavenumbers
     (p, q) = transforms
-    kh = k * film.thickness
-    nu = film.poisson_ratio
-    normal = j0(np.multiply.outer(x, k)) * weights
-    radial = j1(np.multiply.outer(x, k)) * weights
-    coupling = coupling_correction(kh, nu)
-    w_by_p = (normal * normal_correction(kh, nu)) @ p
-    u_by_q = (radial * radial_correction(kh, nu)) @ q
-    return w_by_p, (normal * coupling) @ q, (radial * coupling) @ p, u_by_q
-
-
-def _displacements(
-    film: ElasticFilm, half_space: HalfSpaceIntegrals, layer: HalfSpaceIntegrals
-) -> HalfSpaceIntegrals:
-    """Add both shares up to the depression by p and q, and the outward displacement by p and q."""
     nu = film.poisson_ratio
     scale = (1 - nu) / film.shear_modulus
     beta = half_space_coupling(nu)
+    by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
+    normal = j0(np.multiply.outer(x, k)) * weights
+    radial = j1(np.multiply.outer(x, k)) * weights
     return (
-        scale * (half_space[0] + layer[0]),
-        scale * (beta * half_space[1] + layer[1]),
-        scale * (beta * half_space[2] + layer[2]),
-        scale * (half_space[3] + layer[3]),
+        scale * (half_space[0] + (normal * by_normal) @ p),
+        scale * (beta * half_space[1] + (normal * coupling) @ q),
+        scale * (beta * half_space[2] + (radial * coupling) @ p),
+        scale * (half_space[3] + (radial * by_radial) @ q),
     )

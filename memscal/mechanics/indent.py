@@ -230,7 +230,7 @@ def _targets(
 def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -> Contact:
     """Return the solution in spherical Bessel functions."""
     sticking = math.isinf(friction)
-    solution = solve_rod(rod.radius / film.thickness, float(film.poisson_ratio), sticking=sticking)
+    solution = solve_rod(rod.radius / film.thickness, film.poisson_ratio, sticking=sticking)
     stiffness = 2 * film.contact_modulus * rod.radius * solution.stiffness_factor
     load = target.value if isinstance(target, Load) else target.value * stiffness
     depth = target.value if isinstance(target, Depth) else target.value / stiffness
@@ -245,7 +245,7 @@ def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -
         depth=depth,
         contact_radius=rod.radius,
         stick_radius=rod.radius if sticking else 0.0,
-        friction=float(friction),
+        friction=friction,
         loading="",
         backend="hankel",
         convergence=solution.convergence,

@@ -101,7 +101,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
             current = current * scale
             norm = norm * scale**2
             rows[order:] *= scale
-    return np.asarray(rows / np.sqrt(norm), dtype=np.float64)
+    return rows / np.sqrt(norm)
 
 
 _FEWEST_TERMS = 8
@@ -242,17 +242,18 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     # Of the half-space: the integral of j_l^2 is pi/2(2l + 1).
     even_orders = 2 * np.arange(terms)
     matrix = np.diag(np.pi / (4 * even_orders + 2))
-    matrix += (even * (weights * film_response.normal_correction(x, nu))) @ even.T
+    by_normal, by_coupling, by_radial = film_response.corrections(x, nu)
+    matrix += (even * (weights * by_normal)) @ even.T
     if not sticking:
         return matrix
     radial = np.diag(np.pi / (4 * even_orders + 6))
-    radial += (odd * (weights * film_response.radial_correction(x, nu))) @ odd.T
+    radial += (odd * (weights * by_radial)) @ odd.T
     # Of the half-space: the integral of j_l j_m is sin((l - m) pi/2)/((l - m)(l + m + 1)).
     apart = even_orders[:, None] - even_orders - 1
     both = even_orders[:, None] + even_orders + 1
     products = np.where(apart % 4 == 1, 1.0, -1.0) / (apart * (both + 1))
     coupling = film_response.half_space_coupling(nu) * products
-    coupling += (even * (weights * film_response.coupling_correction(x, nu))) @ odd.T
+    coupling += (even * (weights * by_coupling)) @ odd.T
     return np.block([[matrix, coupling], [coupling.T, radial]])
 
 

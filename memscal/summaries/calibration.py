@@ -153,8 +153,8 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     }
     choice = configuration.get("centre")
     if isinstance(choice, Mapping):
-        centres = [name for name in parameters.names if name.startswith("centre")]
-        shown = list(parameters_json(parameters, centres).values())
+        names = parameters.names
+        shown = [parameter_json(parameters, n) for n in names if n.startswith("centre")]
         values["centres"] = {**choice, "values": shown}
     values |= {name: configuration[name] for name in _FILM if name in configuration}
     if isinstance(result, Calibration):
@@ -255,8 +255,13 @@ def rehearsal_json(
     stress: StressProfile | Contact, method: str, outputs: Sequence[Path]
 ) -> dict[str, Any]:
     """Return the object that ``calibrate --dry-run --json`` prints."""
-    plan = {"method": method, "reference": _origin(stress), "outputs": list(map(str, outputs))}
-    return {"schema_version": "1", "dry_run": True, **plan}
+    return {
+        "schema_version": "1",
+        "dry_run": True,
+        "method": method,
+        "reference": _origin(stress),
+        "outputs": [*map(str, outputs)],
+    }
 
 
 def rehearsal_table(

@@ -47,8 +47,7 @@ def mapping(comparison: FrictionComparison) -> dict[str, Any]:
         file_json(scan.source) | {"lubrication": scan.lubrication}
         for scan in comparison.measured.scans
     ]
-    loads = range(len(comparison.measured.profiles))
-    whole["loads"] = [_load(comparison, i) for i in loads]
+    whole["loads"] = [_load(comparison, i) for i in range(len(comparison.measured.profiles))]
     whole["joint"] = [
         {"lubrication": lubrication, "loading": loading, **_estimate(estimate, tested)}
         for lubrication, loading, estimate in _joint(comparison)
@@ -253,7 +252,7 @@ def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
             "No frictionless profile was calculated: p0_max is that of friction "
             f"{friction[0]:.3g}.",
         )
-    for low, high in pairwise(float(mu) for mu in friction):
+    for low, high in pairwise(friction):
         apart = bounded(high, FRICTION_SCALE) - bounded(low, FRICTION_SCALE)
         if low < FRICTION_SCALE and apart > _FAR:
             yield Message(
@@ -298,8 +297,8 @@ def answer(comparison: FrictionComparison) -> str:
         taken = ", taken as 0" if held and lubrication == "lubricated" else ""
         name = (lubrication or "all contacts").capitalize()
         lines.append(f"{name}: μ{_EQUALS[estimates[0].kind]} {stated}{level}{taken}.")
-    lines_of_all = "\n".join(lines)
-    return f"{lines_of_all} {verdict(comparison.checks)}".strip()
+    friction = "\n".join(lines)
+    return f"{friction} {verdict(comparison.checks)}".strip()
 
 
 _LABELS = ("", "state", "load (N)")

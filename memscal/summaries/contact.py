@@ -41,21 +41,18 @@ def mapping(contact: Contact) -> dict[str, Any]:
 
 def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str]]:
     """Return notes on depths beyond linear elasticity, and all warnings of the JSON object."""
-    texts = [_deep(contact) for contact in contacts]
-    notes = [Message("deep", text) for text in texts if text]
+    notes = []
+    for contact in contacts:
+        share = contact.depth / contact.film.thickness
+        if share > _SHALLOW and contact.strain != "finite":
+            text = (
+                f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the "
+                "film's thickness: linear elasticity is formal there, and its error is not part "
+                f"of the convergence.{_in_rubber(contact)}"
+            )
+            notes.append(Message("deep", text))
     singular = [_SINGULAR] if contacts[0].indenter.shape == "rod" else []
     return notes, [*singular, *(note.text for note in notes)]
-
-
-def _deep(contact: Contact) -> str:
-    share = contact.depth / contact.film.thickness
-    if share <= _SHALLOW or contact.strain == "finite":
-        return ""
-    return (
-        f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
-        "thickness: linear elasticity is formal there, and its error is not part of the "
-        f"convergence.{_in_rubber(contact)}"
-    )
 
 
 def _in_rubber(contact: Contact) -> str:
@@ -65,13 +62,12 @@ def _in_rubber(contact: Contact) -> str:
     if not isinstance(rod, Rod) or not is_tabulated(film, rod, load, math.inf):
         return ""
     rubber = press_rod(film, rod, load, math.inf)
-    stress = rubber.max_base_stress / KPA
-    depth = rubber.depth / MM
-    changes = (rubber.max_base_stress / contact.max_base_stress, rubber.depth / contact.depth)
-    shares = [f"{change - 1:+.0%}" for change in changes]
+    stress = rubber.max_base_stress
+    depth = rubber.depth
     return (
-        f" In a neo-Hookean film that sticks to the rod the largest base stress is {stress:.3g} "
-        f"kPa ({shares[0]}) and the depth {depth:.3g} mm ({shares[1]})."
+        " In a neo-Hookean film that sticks to the rod the largest base stress is "
+        f"{stress / KPA:.3g} kPa ({stress / contact.max_base_stress - 1:+.0%}) and the depth "
+        f"{depth / MM:.3g} mm ({depth / contact.depth - 1:+.0%})."
     )
 
 
@@ -94,7 +90,7 @@ def contacts_table(contacts: Sequence[Contact]) -> Table:
         columns |= _numbers("max_interface_stress", contacts, ".5g")
     columns |= _numbers("max_base_stress", contacts, ".5g")
     columns |= _numbers("steps", contacts, "g") | _numbers("convergence", contacts, ".1g")
-    rows = [list(row) for row in zip(*columns.values(), strict=True)]
+    rows = list(zip(*columns.values(), strict=True))
     return Table(_title(contacts[0]), list(columns), rows)
 
 
@@ -109,10 +105,9 @@ def _numbers(name: str, contacts: Sequence[Contact], form: str = ".4g") -> dict[
 
 def _title(contact: Contact) -> str:
     film = contact.film
-    friction = "frictionless"
-    if contact.friction:
-        sticks = math.isinf(contact.friction)
-        friction = "sticking" if sticks else f"friction {contact.friction:.4g}"
+    friction = f"friction {contact.friction:.4g}" if contact.friction else "frictionless"
+    if math.isinf(contact.friction):
+        friction = "sticking"
     loading = f", {contact.loading} loading" if contact.loading and contact.friction else ""
     rough = contact.interface.description
     interface = f"; interface: {rough}" if rough else ""

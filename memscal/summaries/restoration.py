@@ -78,19 +78,17 @@ def mapping(restored: Restoration) -> dict[str, Any]:
 def answer(restored: Restoration) -> str:
     """Return stress on the axis and total force."""
     cells = _cells(restored)
-    axis = cells["stress_on_axis"]
     return (
-        f"Stress on the axis {axis}; force {cells['force']} at {restored.scan.load:.4g} N.\n"
-        f"{verdict(restored.checks)}"
+        f"Stress on the axis {cells['stress_on_axis']}; force {cells['force']} at "
+        f"{restored.scan.load:.4g} N.\n{verdict(restored.checks)}"
     )
 
 
 def _cells(restored: Restoration) -> dict[str, str]:
     """Return the numbers that the scan determines, with their uncertainties, by their names."""
     values = _values(restored)
-    shown = _determined(restored)
-    names = [name for name in shown if name in _NUMBERS]
-    return {name: declared.cell(shown[name], restored, **values) for name in names}
+    shown = _determined(restored).items()
+    return {name: declared.cell(q, restored, **values) for name, q in shown if name in _NUMBERS}
 
 
 def tables(restored: Restoration) -> list[Table]:

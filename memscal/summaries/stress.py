@@ -23,22 +23,23 @@ _POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors
 def mapping(stress: MeasuredStress) -> dict[str, Any]:
     """Return the object of ``apply --json`` without its files; the contract fixes its form."""
     applied = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED]
+    profiles = []
+    for profile in stress.profiles:
+        source = profile.scan.source
+        numbers = [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON]
+        profiles.append(
+            {
+                "scan": None if source is None else source.file_name,
+                **declared.members(numbers, profile, **_centre(profile)),
+                "stress": declared.members(_POINTS_IN_JSON, profile),
+            }
+        )
     return {
         **declared.members(applied, stress, **_force_over_load(stress)),
-        "profiles": [_profile_json(profile) for profile in stress.profiles],
+        "profiles": profiles,
         "overridden": list(stress.overridden),
         "checks": checks_json(stress.checks),
         "warnings": texts_of(stress.messages),
-    }
-
-
-def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
-    source = profile.scan.source
-    numbers = [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON]
-    return {
-        "scan": None if source is None else source.file_name,
-        **declared.members(numbers, profile, **_centre(profile)),
-        "stress": declared.members(_POINTS_IN_JSON, profile),
     }
 
 

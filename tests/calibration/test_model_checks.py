@@ -23,13 +23,13 @@ def checks(scan, **options) -> dict[str, QualityCheck]:
     ({"load": [0.5, 1.0, 1.5]}, {"held_out_load"}, {"held_out_repeat"}),
     ({"load": [0.5, 1.0], "repeats": 2}, {"held_out_load", "held_out_repeat"}, set()),
 ])  # fmt: skip
-def test_a_check_is_run_where_the_scan_has_something_to_check(options, there, absent) -> None:
+def test_a_check_is_run_where_the_scan_has_something_to_check(options, there, absent):
     found = set(checks(simulated(points=33, **options)))
     assert there <= found
     assert not absent & found
 
 
-def test_a_check_passes_just_when_its_p_value_is_above_a_thousandth() -> None:
+def test_a_check_passes_just_when_its_p_value_is_above_a_thousandth():
     scan = simulated(load=[0.5, 1.0, 1.5], points=33)
     rng = np.random.default_rng()
     for size in (0.0, 0.3, 1.0, 3.0):
@@ -40,7 +40,7 @@ def test_a_check_passes_just_when_its_p_value_is_above_a_thousandth() -> None:
 
 
 @pytest.mark.parametrize("words", ["tails", "a core of its own|an edge"])
-def test_a_departure_from_a_gaussian_is_named(words: str) -> None:
+def test_a_departure_from_a_gaussian_is_named(words):
     found = checks(simulated(kernel=TAILS if words == "tails" else RING, noise=0.001))
     departure = found["gaussian_evidence"]
     assert not departure.passed
@@ -49,19 +49,19 @@ def test_a_departure_from_a_gaussian_is_named(words: str) -> None:
     assert not found["gaussian_misfit"].passed
 
 
-def test_the_bayes_factor_favours_a_gaussian_that_is_one() -> None:
-    values = [checks(simulated(seed=seed))["gaussian_evidence"].value for seed in range(20)]
+def test_the_bayes_factor_favours_a_gaussian_that_is_one():
+    values = [checks(simulated(seed=seed))["gaussian_evidence"].value for seed in range(12)]
     # A Bayes factor in favour of what is false exceeds ten at most once in ten.
     assert np.median(values) < 0
     assert np.mean(np.array(values) > np.log(10)) < 0.4
 
 
-def test_a_constraint_that_the_scan_contradicts_is_found_and_one_that_it_meets_is_not() -> None:
+def test_a_constraint_that_the_scan_contradicts_is_found_and_one_that_it_meets_is_not():
     ring = simulated(noise=2e-4, repeats=4, kernel=RING)
     assert not checks(ring, monotone=True)["constraint"].passed
     passed = [
         checks(simulated(noise=0.003, seed=seed, kernel=kernel), monotone=True)["constraint"].passed
         for kernel in (memscal.GaussianMixture(), TAILS)
-        for seed in range(10)
+        for seed in range(5)
     ]
     assert all(passed)

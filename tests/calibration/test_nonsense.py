@@ -60,7 +60,6 @@ ELSEWHERE = replace(
     ("scan", "options", "words", "truth", "within"),
     [
         pytest.param(altered(film=1.25), {}, r"thickness\) of NUMBER mm", 2.0, 0.1, marks=FULL),
-        (altered(film=2), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
         (altered(film=10), {}, r"thickness\) of NUMBER mm .*mm stated as cm", 2.0, 0.1),
         pytest.param(altered(x=0.8), {}, r"data/x\) NUMBER times", 1.25, 0.1, marks=FULL),
         pytest.param(altered(x=0.5), {}, r"data/x\) NUMBER times", 2.0, 0.1, marks=FULL),
@@ -74,8 +73,8 @@ ELSEWHERE = replace(
     ],
 )
 def test_a_narrow_scan_is_refused_with_the_value_at_which_it_fits(
-    scan: Scan, options: dict[str, Any], words: str, truth: float, within: float
-) -> None:
+    scan, options, words, truth, within
+):
     value = re.search(words.replace("NUMBER", r"([\d.]+)"), refused(scan, **options))
     assert float(value[1]) == pytest.approx(truth, rel=within)
 
@@ -83,11 +82,11 @@ def test_a_narrow_scan_is_refused_with_the_value_at_which_it_fits(
 @pytest.mark.parametrize(
     "method",
     [
-        pytest.param(name, marks=[] if name in ("bayesian", "white-noise") else FULL)
+        pytest.param(name, marks=[] if name == "white-noise" else FULL)
         for name in regulariser_names()
     ],
 )
-def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
+def test_no_method_writes_nonsense(method, tmp_path, capsys):
     path = Path(shutil.copy(SHIPPED, tmp_path / "scan.h5"))
     with h5py.File(path, "r+") as file:
         file["entry/sample/film/thickness"][...] = 2.5
@@ -115,7 +114,7 @@ def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_refused_with_its_reason(scan: Scan, words: str) -> None:
+def test_what_cannot_be_is_refused_with_its_reason(scan, words):
     assert re.search(words, refused(scan))
 
 
@@ -131,8 +130,8 @@ def test_what_cannot_be_is_refused_with_its_reason(scan: Scan, words: str) -> No
 )
 @pytest.mark.parametrize("measured", [memscal.measure_stress, memscal.restore])
 def test_no_stress_is_measured_over_lengths_that_no_film_is_scanned_over(
-    measured: Any, x: float, words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    measured, x, words, monkeypatch
+):
     """In m it took minutes and gigabytes: nothing may be built before it is refused."""
     apparatus = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01)
     monkeypatch.setattr(Wavenumbers, "covering", lambda *_: pytest.fail("it went on"))
@@ -157,7 +156,7 @@ def test_a_plan_of_such_lengths_is_refused_before_its_rod_is_solved(plan, words,
 
 
 @pytest.mark.parametrize("factor", [1e303, 1e-297, 1e-40])
-def test_readings_of_a_size_that_no_quantity_has_are_refused(factor: float) -> None:
+def test_readings_of_a_size_that_no_quantity_has_are_refused(factor):
     with pytest.raises(memscal.MemscalError, match="u_zz of the scan is"):
         replace(SCAN, u_zz=SCAN.u_zz * factor)
     errors = np.full(SCAN.u_zz.size, 1e-3 * factor)
@@ -165,9 +164,10 @@ def test_readings_of_a_size_that_no_quantity_has_are_refused(factor: float) -> N
         replace(SCAN, u_zz_errors=errors)
 
 
-@pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), RING, TAILS])
-@pytest.mark.parametrize("noise", [0.001, 0.005])
-def test_a_clipped_peak_fails_and_names_its_points(kernel, noise: float) -> None:
+@pytest.mark.parametrize(
+    ("kernel", "noise"), [(memscal.GaussianMixture(), 0.001), (RING, 0.005), (TAILS, 0.005)]
+)
+def test_a_clipped_peak_fails_and_names_its_points(kernel, noise):
     clean = simulated(kernel=kernel, noise=0.0, seed=1)
     u = clean.u_zz
     top = float(clean.u_zz.max())

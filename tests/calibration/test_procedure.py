@@ -1,8 +1,6 @@
 """The calibration end to end: exact without noise, independent of its grid, and honest."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +23,7 @@ def check(calibration: memscal.Calibration, name: str) -> QualityCheck:
 
 
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), TAILS, RING])
-def test_with_hardly_any_noise_the_truth_returns(kernel: memscal.GaussianMixture) -> None:
+def test_with_hardly_any_noise_the_truth_returns(kernel):
     apparatus = memscal.calibrate(simulated(kernel=kernel, noise=1e-6, points=129)).apparatus
     assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=1e-3)
     # A signal-to-noise ratio of a million resolves about 6 rad/mm; the ring's sharp centre
@@ -34,7 +32,7 @@ def test_with_hardly_any_noise_the_truth_returns(kernel: memscal.GaussianMixture
     assert plane_error(R, apparatus.radial(R), kernel.radial(R)) < limit
 
 
-def test_a_scan_without_noise_is_known_to_the_error_of_the_model() -> None:
+def test_a_scan_without_noise_is_known_to_the_error_of_the_model():
     calibration = memscal.calibrate(simulated(noise=0.0))
     failed = [check.name for check in calibration.apparatus.checks if not check.passed]
     assert failed == ["indentation"]  # of a film that is stated to be linear
@@ -42,7 +40,7 @@ def test_a_scan_without_noise_is_known_to_the_error_of_the_model() -> None:
         assert calibration.apparatus.parameters[name] == pytest.approx(SIGMA, rel=1e-3)
 
 
-def test_g_integrates_to_one_on_its_support_and_a_times_g_predicts_the_scan() -> None:
+def test_g_integrates_to_one_on_its_support_and_a_times_g_predicts_the_scan():
     calibration = memscal.calibrate(simulated())
     stored = calibration.apparatus.field
     cell = (stored.x[1] - stored.x[0]) * (stored.y[1] - stored.y[0])
@@ -51,8 +49,8 @@ def test_g_integrates_to_one_on_its_support_and_a_times_g_predicts_the_scan() ->
     assert np.std(record.residual / record.u_zz_errors) < 1.5
 
 
-@pytest.mark.parametrize(("spacing", "extent"), [(0.5, 1.0), (0.7, 1.0), (1.0, 1.3), (1.0, 2.0)])
-def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent) -> None:
+@pytest.mark.parametrize(("spacing", "extent"), [(0.5, 1.0), (1.0, 2.0)])
+def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent):
     scan = simulated(kernel=TAILS, noise=0.002)
     usual = memscal.calibrate(scan).apparatus
     chosen = fields_room.choose_grid
@@ -69,7 +67,7 @@ def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent) ->
     np.testing.assert_allclose(changed.radial(R), usual.radial(R), atol=2e-4 * usual.radial(0.0))
 
 
-def test_the_reference_may_be_a_contact_a_table_or_a_file(tmp_path: Path) -> None:
+def test_the_reference_may_be_a_contact_a_table_or_a_file(tmp_path):
     scan = simulated(noise=0.001)
     contact = memscal.indent(scan.film, scan.indenter, load=1.0)
     path = tmp_path / "reference.h5"
@@ -83,7 +81,7 @@ def test_the_reference_may_be_a_contact_a_table_or_a_file(tmp_path: Path) -> Non
     assert carried.gaussian_sigma == pytest.approx(solved.gaussian_sigma, rel=1e-5)
 
 
-def test_a_reference_for_another_load_is_scaled_and_a_wrong_force_is_caught() -> None:
+def test_a_reference_for_another_load_is_scaled_and_a_wrong_force_is_caught():
     scan = simulated(noise=0.001)
     heavy = memscal.indent(scan.film, scan.indenter, load=2.0).profile()
     good = memscal.calibrate(scan, reference=heavy)
@@ -93,26 +91,29 @@ def test_a_reference_for_another_load_is_scaled_and_a_wrong_force_is_caught() ->
     assert check(wrong, "reference_force").value == pytest.approx(2 / 1.9 - 1, rel=1e-3)
 
 
-def test_several_loads_give_one_conversion_constant_per_newton() -> None:
+def test_several_loads_give_one_conversion_constant_per_newton():
     setting = {"load": (0.4, 1.0, 1.6), "points": 33, "noise": 0.002}
     calibration = memscal.calibrate(scan := simulated(**setting))
     assert_as_stated(calibration.apparatus.parameters, scan.synthetic, cramer_rao(**setting))
     assert check(calibration, "load_linearity").passed
 
 
-def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
-    setting = {"raster": True, "points": 33, "centre": (0.3e-3, -0.4e-3), "noise": 0.005}
+def test_a_raster_is_used_as_it_is_and_agrees_with_a_line():
+    setting = {"raster": True, "points": 25, "centre": (0.3e-3, -0.4e-3), "noise": 0.005}
     raster = memscal.calibrate(scan := simulated(**setting))
     assert_as_stated(raster.apparatus.parameters, scan.synthetic, cramer_rao(**setting))
     assert plane_error(R, raster.apparatus.radial(R), memscal.GaussianMixture().radial(R)) < 0.15
     assert {c.name for c in raster.apparatus.checks} >= {"axisymmetry", "reconvolution"}
+    for name, parts in raster.apparatus.budget.items():
+        total = np.linalg.norm(list(parts.values()))
+        assert total == pytest.approx(raster.apparatus.parameters.uncertainty(name), rel=1e-9)
     # Not lifted: the field keeps the noise of its own points, which no two directions share.
     g = raster.apparatus.field.g
     assert not np.allclose(g, g[:, ::-1], atol=1e-6 * g.max())
 
 
-def test_a_raster_off_its_lattice_is_refused() -> None:
-    scan = simulated(raster=True, points=17)
+def test_a_raster_off_its_lattice_is_refused():
+    scan = simulated(raster=True, points=13)
     x = scan.x.copy()
     x[4] += 0.3e-3
     with pytest.raises(InputError, match=r"not evenly spaced(.|\n)*--method bayesian"):
@@ -123,9 +124,9 @@ def test_a_raster_off_its_lattice_is_refused() -> None:
 
 @pytest.mark.parametrize("method", ["bayesian", "white-noise"])
 @pytest.mark.parametrize(
-    "options", [{"raster": True, "points": 17}, {"load": [0.5, 1.0], "points": 21}], ids=str
+    "options", [{"raster": True, "points": 13}, {"load": [0.5, 1.0], "points": 21}], ids=str
 )
-def test_single_points_give_what_rows_give(options: dict[str, Any], method: str) -> None:
+def test_single_points_give_what_rows_give(options, method):
     scan = simulated(noise=0.005, **options)
     rows, points = (memscal.calibrate(s, method=method).apparatus for s in (scan, as_points(scan)))
     assert points.conversion_constant == pytest.approx(rows.conversion_constant, rel=1e-9)
@@ -136,14 +137,14 @@ def test_single_points_give_what_rows_give(options: dict[str, Any], method: str)
 
 
 @pytest.mark.parametrize("name", regulariser_names()[:6])
-def test_every_method_gives_a_near_the_truth_and_says_what_it_is(name: str) -> None:
+def test_every_method_gives_a_near_the_truth_and_says_what_it_is(name):
     apparatus = memscal.calibrate(simulated(noise=0.002), method=name).apparatus
     assert apparatus.process.configuration["method"] == name
     assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=0.05)
     assert apparatus.gaussian_sigma == pytest.approx(SIGMA, rel=0.02)
 
 
-def test_a_method_may_be_an_object_and_options_reach_it() -> None:
+def test_a_method_may_be_an_object_and_options_reach_it():
     scan = simulated()
     named = memscal.calibrate(scan, method="tikhonov", amplitude=2.0).apparatus
     given = memscal.calibrate(scan, method=Tikhonov(amplitude=2.0)).apparatus
@@ -153,7 +154,7 @@ def test_a_method_may_be_an_object_and_options_reach_it() -> None:
         memscal.calibrate(scan, method=Tikhonov(), amplitude=2.0)
 
 
-def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
+def test_the_sweep_is_flat_about_the_rule_s_choice():
     calibration = memscal.calibrate(simulated(noise=0.002))
     sweep = calibration.sweep(amplitudes=9, draws=2, seed=11)
     assert sweep.amplitude[[0, 4, 8]] == pytest.approx([0.1, 1.0, 10.0])
@@ -178,15 +179,9 @@ def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
         ({"method": "white-noise-draw", "seed": -1}, "whole number"),
     ],
 )
-def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
+def test_what_cannot_be_used_is_refused_in_words(arguments, words):
     with pytest.raises(InputError, match=words):
         memscal.calibrate(simulated(), **arguments)
-
-
-def test_positions_ten_times_too_large_are_refused() -> None:
-    scan = simulated()
-    with pytest.raises(InputError, match="80 times the film's thickness"):
-        memscal.calibrate(replace(scan, x=10 * scan.x))
 
 
 def shapely(scan: memscal.Scan, method: str, seed: int = 0) -> bool:
@@ -196,25 +191,25 @@ def shapely(scan: memscal.Scan, method: str, seed: int = 0) -> bool:
     return all(passed)
 
 
-def test_ripples_are_no_sound_shape() -> None:
+def test_ripples_are_no_sound_shape():
     # All of 450 simulated scans failed, while A and the reconvolution were right.
     kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
     assert not shapely(simulated(kernel=kernel, seed=0), "white-noise-draw")
 
 
-def test_a_raster_may_miss_whole_rows_and_columns() -> None:
-    scan = simulated(raster=True, points=25, noise=0.002)
+def test_a_raster_may_miss_whole_rows_and_columns():
+    scan = simulated(raster=True, points=21, noise=0.002)
     u = scan.u_zz.copy()
     u[3] = np.nan
     u[:, 7] = np.nan
     u[10, 10] = np.nan
     apparatus = memscal.calibrate(replace(scan, u_zz=u)).apparatus
-    bounds = cramer_rao(0.002, raster=True, points=25)
+    bounds = cramer_rao(0.002, raster=True, points=21)
     assert_as_stated(apparatus.parameters, scan.synthetic, bounds)
-    assert "50 points of the scan are missing" in "\n".join(map(str, apparatus.process.messages))
+    assert "42 points of the scan are missing" in "\n".join(map(str, apparatus.process.messages))
 
 
-def test_lengths_and_voltages_of_any_size_give_the_same() -> None:
+def test_lengths_and_voltages_of_any_size_give_the_same():
     large = simulated(noise=0.005, seed=3)
     small = simulated(
         film=replace(large.film, thickness=large.film.thickness * 1e-2),

@@ -5,7 +5,6 @@ chi-square probability, of a slit a difference of normal ones, of a Gaussian a w
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ SHORT = 0.25e-3
 TURNED = 0.4
 LOBE = np.array([0.3e-3, 0.5e-3])
 SHARE = 0.3
-PIXEL = 25e-6
+PIXEL = 50e-6
 NAMES = {"disc": "disc:0.4mm", "slit": "slit:400um", "gaussian": "gaussian:0.4mm", "point": "point"}
 
 
@@ -73,13 +72,13 @@ def scanned(kind: str, *, raster: bool = False, noise: float = 0.005, seed: int 
 
 
 def field(long: float = LONG, short: float = SHORT) -> memscal.StressField:
-    x = np.arange(-80, 81) * PIXEL
+    x = np.arange(-40, 41) * PIXEL
     values = lobed(long, short).at(*np.meshgrid(x, x)) * 2 * np.pi * long * short
     return memscal.StressField(x=x, y=x + 1e-3, values=values, unit="uT")
 
 
 @pytest.mark.parametrize("kind", ["disc", "gaussian", "slit"])
-def test_transforms_are_those_of_the_source(kind: str) -> None:
+def test_transforms_are_those_of_the_source(kind):
     ideal = memscal.IdealReference(kind, SIZE)
     for k in (0.0, 3e3, 11e3):
         if kind == "slit":
@@ -96,7 +95,7 @@ def test_transforms_are_those_of_the_source(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", NAMES)
-def test_a_and_width_are_found_by_both_routes(kind: str) -> None:
+def test_a_and_width_are_found_by_both_routes(kind):
     exact = memscal.calibrate(scanned(kind, noise=0.0), reference=NAMES[kind]).apparatus
     assert exact.other.parameters["conversion_constant"] == pytest.approx(A, rel=2e-4)
     assert exact.conversion_constant == pytest.approx(A, rel=5e-3)
@@ -116,7 +115,7 @@ def test_a_and_width_are_found_by_both_routes(kind: str) -> None:
         assert np.square(values).sum() < chi2.isf(RARE, seeds), name
 
 
-def test_film_rod_and_load_change_nothing() -> None:
+def test_film_rod_and_load_change_nothing():
     scan = scanned("disc", seed=1)
     other = replace(scan, film=replace(EXACT_FILM, thickness=5e-6, law=""), load=7.0)
     first, second = (memscal.calibrate(s, reference="disc:0.4mm").apparatus for s in (scan, other))
@@ -124,7 +123,7 @@ def test_film_rod_and_load_change_nothing() -> None:
     np.testing.assert_allclose(second.parameters.covariance, first.parameters.covariance, 1e-6)
 
 
-def test_loads_are_strengths_relative_to_the_nominal_one() -> None:
+def test_loads_are_strengths_relative_to_the_nominal_one():
     scan = scanned("disc", noise=0.0)
     strength = np.linspace(0.8, 1.2, scan.x.size)
     weaker = replace(
@@ -134,8 +133,8 @@ def test_loads_are_strengths_relative_to_the_nominal_one() -> None:
     assert a.conversion_constant == pytest.approx(A, rel=2e-3)
 
 
-def test_a_round_field_is_its_radial_profile() -> None:
-    scan = scanned("gaussian", raster=True, n=15)
+def test_a_round_field_is_its_radial_profile():
+    scan = scanned("gaussian", raster=True, n=11)
     round_field = field(SIZE, SIZE)
     of_field = memscal.calibrate(scan, reference=round_field).apparatus
     ideal = memscal.calibrate(scan, reference="gaussian:0.4mm").apparatus
@@ -145,8 +144,8 @@ def test_a_round_field_is_its_radial_profile() -> None:
 
 
 @pytest.mark.parametrize(("raster", "method"), [(True, "white-noise"), (False, "bayesian")])
-def test_a_field_that_is_not_round_is_seen_by_a_round_sensor(raster: bool, method: str) -> None:
-    scan = scanned("ellipse", raster=raster, seed=3, n=19 if raster else 49)
+def test_a_field_that_is_not_round_is_seen_by_a_round_sensor(raster, method):
+    scan = scanned("ellipse", raster=raster, seed=3, n=15 if raster else 33)
     a = memscal.calibrate(scan, reference=field(), method=method).apparatus
     assert a.passed
     for p in (a.parameters, a.other.parameters if raster else a.parameters):
@@ -158,7 +157,7 @@ def test_a_field_that_is_not_round_is_seen_by_a_round_sensor(raster: bool, metho
 
 
 @pytest.mark.parametrize("form", [memscal.IdealReference("slit", SIZE), field()])
-def test_the_artifact_keeps_the_reference(tmp_path: Path, form) -> None:
+def test_the_artifact_keeps_the_reference(tmp_path, form):
     kind = "ellipse" if isinstance(form, memscal.StressField) else "slit"
     a = memscal.calibrate(scanned(kind, seed=2), reference=form, method="bayesian").apparatus
     a.save(tmp_path / "a.h5")
@@ -171,7 +170,7 @@ def test_the_artifact_keeps_the_reference(tmp_path: Path, form) -> None:
         assert kept.field.unit == "uT"
 
 
-def test_fields_are_read_from_arrays_and_images(tmp_path: Path) -> None:
+def test_fields_are_read_from_arrays_and_images(tmp_path):
     values = field().values / field().values.max()
     np.save(tmp_path / "f.npy", values)
     grey = (255 * values).astype(np.uint8)
@@ -181,7 +180,7 @@ def test_fields_are_read_from_arrays_and_images(tmp_path: Path) -> None:
     for name, scale in (("f.npy", 1), ("f.png", 65535), ("f.tif", 1), ("c.png", 255)):
         kept = memscal.read_reference(tmp_path / name, pixel_size=PIXEL).field
         np.testing.assert_allclose(kept.values / scale, values, atol=1 / 255)
-        assert np.ptp(kept.x) == pytest.approx(160 * PIXEL)
+        assert np.ptp(kept.x) == pytest.approx(80 * PIXEL)
         assert ("luminance" in kept.notes) == (name == "c.png")
 
 
@@ -198,7 +197,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", [*BAD, "cut.npy", "cut.png", "no.npy"])
-def test_what_is_no_field_is_refused(tmp_path: Path, name: str) -> None:
+def test_what_is_no_field_is_refused(tmp_path, name):
     if name in BAD:
         np.save(tmp_path / name, BAD[name], allow_pickle=True)
     elif name != "no.npy":
@@ -220,19 +219,19 @@ def test_what_is_no_field_is_refused(tmp_path: Path, name: str) -> None:
         (field(), "not round"),
     ],
 )
-def test_what_is_no_reference_is_refused(reference, said: str) -> None:
+def test_what_is_no_reference_is_refused(reference, said):
     with pytest.raises(InputError, match=said):
         memscal.calibrate(scanned("ellipse"), reference=reference)
 
 
-def test_a_slit_is_not_the_reference_of_a_raster_nor_beside_a_stress() -> None:
+def test_a_slit_is_not_the_reference_of_a_raster_nor_beside_a_stress():
     with pytest.raises(InputError, match="slit"):
         memscal.calibrate(scanned("disc", raster=True, n=9), reference="slit:1mm")
     with pytest.raises(InputError, match="mixed"):
         memscal.calibrate([scanned("disc"), scanned("slit")], reference=["disc:1mm", "slit:1mm"])
 
 
-def test_more_points_than_a_source_with_an_edge_allows_are_refused_at_once() -> None:
+def test_more_points_than_a_source_with_an_edge_allows_are_refused_at_once():
     scan = simulate(noise=0.005, points=401)
     with pytest.raises(InputError, match="401 points for such a reference, but at most 400"):
         memscal.calibrate(scan, reference="disc:0.5mm")

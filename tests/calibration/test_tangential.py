@@ -6,7 +6,6 @@ Set MEMSCAL_FULL_STUDY for 300 seeds in place of 21.
 import os
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -69,14 +68,14 @@ def study(noise: float) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.02])
-def test_a_and_the_width_are_found_without_bias(noise: float) -> None:
+def test_a_and_the_width_are_found_without_bias(noise):
     for errors in study(noise).values():
         # A third of a standard uncertainty, and what chance adds to the mean of so many.
         assert abs(errors.mean()) < 1 / 3 + norm.isf(CHANCE) * errors.std() / np.sqrt(SEEDS)
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.02])
-def test_95_percent_intervals_hold_the_truth_as_often_as_they_say(noise: float) -> None:
+def test_95_percent_intervals_hold_the_truth_as_often_as_they_say(noise):
     for name, errors in study(noise).items():
         held = int(np.sum(np.abs(errors) < 1.96))
         # A few percent less than stated is allowed for; a free G is cautious, and never too sure.
@@ -87,7 +86,7 @@ def test_95_percent_intervals_hold_the_truth_as_often_as_they_say(noise: float) 
         assert np.sqrt(np.mean(errors**2)) > least, name
 
 
-def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
+def test_a_g_that_is_no_gaussian_is_found_as_a_free_one():
     free = []
     gaussian = []
     a = []
@@ -106,7 +105,7 @@ def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name: str) -> None:
+def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name):
     r = np.linspace(0.0, 3e-3, 31)
     kernel = OTHERS[name]
     count = SEEDS // 3
@@ -125,7 +124,7 @@ def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name: str) -> None:
     assert np.sum(np.abs(z) < 1.96) >= binom.ppf(CHANCE, count, 0.95)
 
 
-def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
+def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side():
     found = calibrated(shear_scan(seed=3))
     apparatus = found.apparatus
     estimate = found.solution.estimate
@@ -144,7 +143,7 @@ def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
     assert 0 < apparatus.predict_uncertainty(r, contact.base_shear(r)).max() < 0.1 * largest
 
 
-def test_convolution_with_a_tangential_g_keeps_a_vector_field_s_zero_on_the_axis() -> None:
+def test_convolution_with_a_tangential_g_keeps_a_vector_field_s_zero_on_the_axis():
     apparatus = calibrated(shear_scan(seed=3)).apparatus
     r = np.linspace(0.0, 30e-3, 1501)
     spread = 1.2e-3
@@ -156,7 +155,7 @@ def test_convolution_with_a_tangential_g_keeps_a_vector_field_s_zero_on_the_axis
     np.testing.assert_allclose(blurred, expected, atol=0.03 * np.abs(expected).max())
 
 
-def test_the_artifact_says_its_channel_and_comes_back_from_its_file(tmp_path: Path) -> None:
+def test_the_artifact_says_its_channel_and_comes_back_from_its_file(tmp_path):
     scan = shear_scan(seed=4)
     apparatus = calibrated(scan).apparatus
     assert apparatus.sensor == replace(scan.sensor, channel="xz")
@@ -171,7 +170,7 @@ def test_the_artifact_says_its_channel_and_comes_back_from_its_file(tmp_path: Pa
     assert again.order == 1
 
 
-def test_a_film_that_is_off_by_its_uncertainty_moves_the_width_by_its_share() -> None:
+def test_a_film_that_is_off_by_its_uncertainty_moves_the_width_by_its_share():
     scan = shear_scan(seed=6, noise=0.002)
     found = calibrated(scan).apparatus
     thicker = replace(scan.film, thickness=scan.film.thickness + 20e-6)
@@ -180,7 +179,7 @@ def test_a_film_that_is_off_by_its_uncertainty_moves_the_width_by_its_share() ->
     assert change == pytest.approx(found.budget["gaussian_sigma"]["thickness"], rel=0.2)
 
 
-def test_a_line_along_y_calibrates_the_other_channel() -> None:
+def test_a_line_along_y_calibrates_the_other_channel():
     along_x, along_y = (
         calibrated(shear_scan(seed=7, channel=c), c).apparatus.parameters for c in ("xz", "yz")
     )
@@ -189,7 +188,7 @@ def test_a_line_along_y_calibrates_the_other_channel() -> None:
     assert {"centre_y", "drift_y"} <= set(along_y.names)
 
 
-def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part() -> None:
+def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part():
     failed = 0
     for seed in range(8):
         assert checks_of(shear_scan(seed=seed))["symmetry"].p_value is not None
@@ -199,7 +198,7 @@ def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part() -> None:
     assert "cross-talk" in check.meaning
 
 
-def test_the_wrong_sign_is_refused_and_the_cure_is_said() -> None:
+def test_the_wrong_sign_is_refused_and_the_cure_is_said():
     scan = shear_scan(seed=12)
     # Positions of the sensor instead of the indenter are the same mistake.
     for changes in ({"channels": {"u_xz": -scan.channels["u_xz"]}}, {"x": -scan.x}):
@@ -209,7 +208,7 @@ def test_the_wrong_sign_is_refused_and_the_cure_is_said() -> None:
 
 
 @pytest.mark.parametrize("method", ["white-noise", "wiener", "tikhonov"])
-def test_methods_that_divide_fields_are_refused_and_name_the_one_that_serves(method: str) -> None:
+def test_methods_that_divide_fields_are_refused_and_name_the_one_that_serves(method):
     with pytest.raises(InputError, match=method) as refusal:
         memscal.calibrate(shear_scan(seed=14), channel="xz", method=method)
     assert 'method="bayesian"' in refusal.value.cure
@@ -217,7 +216,7 @@ def test_methods_that_divide_fields_are_refused_and_name_the_one_that_serves(met
         calibrated(shear_scan(seed=14)).sweep(amplitudes=3, draws=1)
 
 
-def test_a_scan_without_the_channel_is_refused() -> None:
+def test_a_scan_without_the_channel_is_refused():
     scan = memscal.simulate()
     with pytest.raises(InputError, match="holds no u_xz") as refusal:
         calibrated(scan)
@@ -226,7 +225,7 @@ def test_a_scan_without_the_channel_is_refused() -> None:
         calibrated(scan, "xx")
 
 
-def test_a_normal_channel_a_line_across_the_component_and_a_raster_are_refused() -> None:
+def test_a_normal_channel_a_line_across_the_component_and_a_raster_are_refused():
     scan = shear_scan(seed=15)
     raster = memscal.simulate(raster=True, points=11)
     for refused, words in (
@@ -238,13 +237,13 @@ def test_a_normal_channel_a_line_across_the_component_and_a_raster_are_refused()
             calibrated(refused)
 
 
-def test_a_scan_of_a_tangential_channel_is_not_taken_for_a_normal_one() -> None:
+def test_a_scan_of_a_tangential_channel_is_not_taken_for_a_normal_one():
     scan = memscal.simulate()
     with pytest.raises(InputError, match="recorded by channel xz"):
         memscal.calibrate(replace(scan, sensor=replace(scan.sensor, channel="xz")))
 
 
-def test_a_reference_from_elsewhere_needs_its_shear() -> None:
+def test_a_reference_from_elsewhere_needs_its_shear():
     scan = shear_scan(seed=16)
     profile = memscal.indent(scan.film, scan.indenter, load=1.0).profile()
     options = {"channel": "xz", "method": "bayesian"}
@@ -255,7 +254,7 @@ def test_a_reference_from_elsewhere_needs_its_shear() -> None:
         memscal.calibrate(scan, reference=replace(profile, sigma_rz=None), **options)
 
 
-def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative() -> None:
+def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative():
     scan = shear_scan(seed=17, film=replace(LINEAR_FILM, poisson_ratio=0.4))
     sticking = memscal.indent(scan.film, scan.indenter, load=1.0, friction=np.inf)
     found = memscal.calibrate(scan, alternative=sticking, channel="xz", method="bayesian")

@@ -21,7 +21,7 @@ def _lattice(x: float = 0.0, y: float = 0.0) -> Lattice:
 
 
 GRIDS: dict[str, tuple[FieldGrid, FieldGrid]] = {
-    "quarter plane": (EvenGrid(129, 0.1e-3), EvenGrid(129, 0.1e-3)),
+    "quarter plane": (EvenGrid(97, 0.1e-3), EvenGrid(97, 0.1e-3)),
     "lattice": (_lattice(), _lattice()),
     "lattice off centre": (_lattice(0.63e-3, -0.41e-3), _lattice()),
 }

@@ -36,7 +36,7 @@ def random_problem(seed: int, grid: FieldGrid) -> tuple[DivisionProblem, FloatAr
 
 @pytest.mark.parametrize("grid", [EvenGrid(9, 0.5), small_lattice()], ids=["quarter", "lattice"])
 @given(seed=SEEDS)
-def test_a_window_scales_each_component_of_the_quotient(grid: FieldGrid, seed: int) -> None:
+def test_a_window_scales_each_component_of_the_quotient(grid, seed):
     problem, kernel = random_problem(seed, grid)
     window = np.exp(-grid.wavenumber / 5)
     division = filtered_division(problem, window)
@@ -47,7 +47,7 @@ def test_a_window_scales_each_component_of_the_quotient(grid: FieldGrid, seed: i
     np.testing.assert_allclose(opened.field, kernel, atol=1e-9)
 
 
-def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there() -> None:
+def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there():
     grid = EvenGrid(9, 0.5)
     reference = grid.inverse(np.where(grid.wavenumber < 4.0, 1.0, 0.0))
     window = np.where(grid.wavenumber < 3.0, 1.0, 1e-10)
@@ -57,7 +57,7 @@ def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there
 
 
 @given(seed=SEEDS, amplitude=st.floats(0.1, 10), weakest=st.floats(0.1, 10))
-def test_tikhonov_is_the_solution_of_its_normal_equations(seed, amplitude, weakest) -> None:
+def test_tikhonov_is_the_solution_of_its_normal_equations(seed, amplitude, weakest):
     rng = np.random.default_rng(seed)
     grid = small_lattice()
     voltage, reference = rng.normal(size=(2, 7, 9))
@@ -76,7 +76,7 @@ def test_tikhonov_is_the_solution_of_its_normal_equations(seed, amplitude, weake
 
 
 @given(amplitude=st.floats(1e-2, 1e2), weakest=st.floats(1e-4, 0.5))
-def test_both_windows_are_the_formulas_that_they_state(amplitude: float, weakest: float) -> None:
+def test_both_windows_are_the_formulas_that_they_state(amplitude, weakest):
     grid = EvenGrid(33, 0.25)
     reference = np.exp(-(grid.radius**2) / 2) / (2 * np.pi)
     problem = DivisionProblem(grid, reference, reference, 1.0, weakest)
@@ -90,7 +90,7 @@ def test_both_windows_are_the_formulas_that_they_state(amplitude: float, weakest
 
 
 @given(seed=SEEDS)
-def test_the_window_of_an_image_is_what_is_left_of_each_component(seed: int) -> None:
+def test_the_window_of_an_image_is_what_is_left_of_each_component(seed):
     grid = small_lattice()
     problem, kernel = random_problem(seed, grid)
     window = np.exp(-grid.wavenumber / 5)

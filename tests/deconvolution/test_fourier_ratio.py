@@ -27,7 +27,7 @@ def voltage_and_stress() -> tuple[memscal.Field, memscal.Field]:
     return memscal.Field(blurred.grid, CONVERSION * blurred.values), gaussian(STRESS_WIDTH)
 
 
-def test_lifting_keeps_the_integral_and_the_profile() -> None:
+def test_lifting_keeps_the_integral_and_the_profile():
     field = gaussian(WIDTH)
     # The spline through the profile errs by (25 um / 561 um)^4 = 4e-6 at the most.
     assert field.integral == pytest.approx(1.0, abs=4e-6)
@@ -36,12 +36,12 @@ def test_lifting_keeps_the_integral_and_the_profile() -> None:
     np.testing.assert_allclose(field.radial, exact, atol=1e-5 * exact[0])
 
 
-def test_the_transform_of_a_lifted_gaussian_is_a_gaussian() -> None:
+def test_the_transform_of_a_lifted_gaussian_is_a_gaussian():
     k, modulus = gaussian(WIDTH).spectrum()
     np.testing.assert_allclose(modulus, np.exp(-((k * WIDTH) ** 2) / 2), atol=1e-6)
 
 
-def test_the_steps_find_conversion_constant_and_width() -> None:
+def test_the_steps_find_conversion_constant_and_width():
     voltage, stress = voltage_and_stress()
     quotient = memscal.divide(voltage, stress, weakest=1e-5)
     a, g = memscal.normalise(quotient)
@@ -53,14 +53,14 @@ def test_the_steps_find_conversion_constant_and_width() -> None:
 
 
 @pytest.mark.parametrize("method", ["white-noise", "tikhonov"])
-def test_what_was_divided_convolves_back_to_the_voltage(method: str) -> None:
+def test_what_was_divided_convolves_back_to_the_voltage(method):
     voltage, stress = voltage_and_stress()
     a, g = memscal.normalise(memscal.divide(voltage, stress, weakest=1e-5, method=method))
     back = memscal.reconvolve(a, g, stress)
     np.testing.assert_allclose(back.values, voltage.values, atol=2e-4 * voltage.values.max())
 
 
-def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_is() -> None:
+def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_is():
     voltage, stress = voltage_and_stress()
     pair = (1e-2, float(voltage.spectrum()[1][int(np.argmax(stress.spectrum()[1] <= 1e-2))]))
     drawn = [
@@ -70,7 +70,7 @@ def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_i
     np.testing.assert_allclose(drawn[0].values, drawn[1].values)
 
 
-def test_a_profile_that_is_none_is_refused() -> None:
+def test_a_profile_that_is_none_is_refused():
     with pytest.raises(InputError, match="must increase"):
         memscal.lift(R[::-1], R, SPACING, EXTENT)
     with pytest.raises(InputError, match="values of the profile"):
@@ -80,7 +80,7 @@ def test_a_profile_that_is_none_is_refused() -> None:
             memscal.lift(R, R, SPACING, extent)
 
 
-def test_fields_on_different_grids_are_not_divided() -> None:
+def test_fields_on_different_grids_are_not_divided():
     stress = memscal.lift(R, np.exp(-R / 1e-3), SPACING, 2 * EXTENT)
     with pytest.raises(InputError, match="one spacing and one extent"):
         memscal.divide(gaussian(WIDTH), stress, weakest=1e-3)
@@ -96,12 +96,12 @@ def test_fields_on_different_grids_are_not_divided() -> None:
         ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
     ],
 )
-def test_a_division_without_a_noise_or_with_idle_options_is_refused(options, message) -> None:
+def test_a_division_without_a_noise_or_with_idle_options_is_refused(options, message):
     with pytest.raises(InputError, match=message):
         memscal.divide(*voltage_and_stress(), **options)
 
 
-def test_a_quotient_without_a_positive_integral_has_no_conversion_constant() -> None:
+def test_a_quotient_without_a_positive_integral_has_no_conversion_constant():
     field = gaussian(WIDTH)
     with pytest.raises(FitError, match="conversion constant is positive"):
         memscal.normalise(memscal.Field(field.grid, -field.values))

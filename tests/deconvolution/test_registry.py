@@ -53,21 +53,21 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("name", regulariser_names())
-def test_a_seed_reaches_only_those_that_draw(name: str) -> None:
+def test_a_seed_reaches_only_those_that_draw(name):
     regulariser = create_regulariser(name, seed=41)
     draws = name == "white-noise-draw"
     assert getattr(regulariser, "seed", None) == (41 if draws else None)
     assert create_regulariser(name, seed=np.int64(41)) == regulariser
 
 
-def test_the_former_name_of_the_bayesian_method_is_an_alias() -> None:
+def test_the_former_name_of_the_bayesian_method_is_an_alias():
     assert create_regulariser("evidence", monotone=True) == create_regulariser(
         "bayesian", monotone=True
     )
     assert "evidence" not in regulariser_names()
 
 
-def test_an_unknown_name_is_refused_with_the_names_there_are() -> None:
+def test_an_unknown_name_is_refused_with_the_names_there_are():
     with pytest.raises(InputError, match="no method named landweber") as caught:
         create_regulariser("landweber")
     for name in regulariser_names():
@@ -75,7 +75,7 @@ def test_an_unknown_name_is_refused_with_the_names_there_are() -> None:
 
 
 @pytest.mark.parametrize("name", ["unsupervised-wiener", "richardson-lucy"])
-def test_a_method_that_left_is_refused_with_the_page_that_has_it(name: str) -> None:
+def test_a_method_that_left_is_refused_with_the_page_that_has_it(name):
     with pytest.raises(InputError, match=f"no method named {name}") as caught:
         create_regulariser(name)
     page = DATA.with_name("docs") / "own_method.md"
@@ -84,8 +84,8 @@ def test_a_method_that_left_is_refused_with_the_page_that_has_it(name: str) -> N
 
 
 def test_an_artifact_of_a_method_that_left_is_read_inspected_and_applied(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     apparatus = memscal.load_apparatus(DATA / "rod_scan_65.apparatus.h5")
     configuration = {**apparatus.process.configuration, "method": "richardson-lucy"}
     configuration["options"] = {"iterations": 80}
@@ -102,14 +102,14 @@ def test_an_artifact_of_a_method_that_left_is_read_inspected_and_applied(
     assert memscal.read_stress("stress.h5").artifact.file_name == "old.h5"
 
 
-def test_an_unknown_option_is_refused_with_the_options_there_are() -> None:
+def test_an_unknown_option_is_refused_with_the_options_there_are():
     with pytest.raises(InputError, match="tikhonov has no option alpha, beta") as caught:
         create_regulariser("tikhonov", beta=1, alpha=1, amplitude=2)
     assert "amplitude" in caught.value.cure
 
 
 @pytest.mark.usefixtures("plug_in")
-def test_a_plug_in_is_listed_and_created_with_its_options_and_without_the_seed() -> None:
+def test_a_plug_in_is_listed_and_created_with_its_options_and_without_the_seed():
     assert regulariser_names().index("cutoff") == len(regulariser_names()) - 1
     regulariser = create_regulariser("cutoff", k_max=2e3, seed=3)
     assert type(regulariser).__module__ == "sharp_edges"
@@ -117,7 +117,7 @@ def test_a_plug_in_is_listed_and_created_with_its_options_and_without_the_seed()
 
 
 @pytest.mark.usefixtures("plug_in")
-def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
+def test_a_plug_in_cannot_take_a_name_of_ours():
     assert type(create_regulariser("tikhonov")).__module__ == "memscal.deconvolution.division"
 
 
@@ -127,6 +127,6 @@ def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
     ("white-noise-draw", {"seed": -1}),
     ("tikhonov", {"name": "x"}),
 ])  # fmt: skip
-def test_senseless_options_are_refused(name: str, options: dict[str, object]):
+def test_senseless_options_are_refused(name, options):
     with pytest.raises(InputError):
         create_regulariser(name, **options)

@@ -1,7 +1,5 @@
 """The paper's white noise: its expectation, its draws, and what holds for any seed."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from helpers.bounds import RARE
@@ -41,7 +39,7 @@ def truncated_mean_bound(count: int, cut: float) -> float:
 
 
 @pytest.mark.parametrize("ratio", [0.4, 0.8, 1.2, 2.0])
-def test_the_window_is_the_mean_reciprocal_over_circular_noise(ratio: float, seed: int) -> None:
+def test_the_window_is_the_mean_reciprocal_over_circular_noise(ratio, seed):
     grid = EvenGrid(9, 0.5)
     delta = np.zeros((9, 9))
     delta[0, 0] = ratio / grid.cell_area
@@ -59,7 +57,7 @@ def test_the_window_is_the_mean_reciprocal_over_circular_noise(ratio: float, see
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
-def test_a_draw_scatters_around_the_expectation(ratio: float, seed: int) -> None:
+def test_a_draw_scatters_around_the_expectation(ratio, seed):
     # Both fields are spikes: every component of the quotient is another draw of z/(z + n).
     grid = square_lattice(513)
     field = spike(grid, ratio)
@@ -77,7 +75,7 @@ def test_a_draw_scatters_around_the_expectation(ratio: float, seed: int) -> None
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 1.0, 4.0])
-def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude: float, seed: int) -> None:
+def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude, seed):
     # No voltage, and a stress of unit transform without noise: the quotient is the noise.
     # By Parseval the sum of its squares is that of the pixels' normal deviates.
     grid = square_lattice(101, 0.03)
@@ -99,8 +97,8 @@ def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude: float, s
 
 @pytest.mark.parametrize(("weakest", "error"), [(1e-3, 0.03), (1e-5, 5e-3), (1e-7, 1e-3)])
 def test_without_noise_the_quotient_is_the_kernel_up_to_what_the_window_takes(
-    on_each_grid: Callable, weakest: float, error: float
-) -> None:
+    on_each_grid, weakest, error
+):
     gaussians = on_each_grid(weakest)
     division = WhiteNoise().divide(gaussians.problem)
     # By Parseval the error is the kernel's power behind the window.
@@ -118,7 +116,7 @@ def test_without_noise_the_quotient_is_the_kernel_up_to_what_the_window_takes(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed: int):
+def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed):
     # One period for the quotient, another for the convolution: ripples that reach the edge, as all
     # of a draw's do, would leak into the band by half a percent.
     narrow = 0.9e-3
@@ -133,7 +131,7 @@ def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed: int
     assert np.abs(back - problem.voltage).max() < 5e-4 * problem.voltage.max()
 
 
-def test_a_seed_gives_the_same_draw_and_another_seed_another(gaussians, seed: int) -> None:
+def test_a_seed_gives_the_same_draw_and_another_seed_another(gaussians, seed):
     problem = gaussians().problem
     before = np.random.get_state()[1].copy()  # noqa: NPY002
     first = WhiteNoiseDraw(seed=seed).divide(problem).field

@@ -89,7 +89,7 @@ def test_a_calibration_without_checks_does_not_claim_that_they_passed(make_appar
 
 
 def test_figures_too_large_for_a_page_become_coarser_images(monkeypatch):
-    monkeypatch.setattr(report, "_MOST_OF_FIGURES", 150_000)
+    monkeypatch.setattr(report, "_MOST_IMAGE_BYTES", 150_000)
     places = np.random.default_rng(1).normal(size=(2, 5000))
 
     def draw(points):

@@ -8,9 +8,8 @@ from helpers.calculated_cases import REACH
 from helpers.paper import FILM, SPHERE
 from helpers.records import assert_same
 
-from memscal.friction import family as assembly
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import ProfileFamily
+from memscal.friction.family import FamilySetup, ProfileFamily
 from memscal.model.film import ElasticFilm
 
 
@@ -21,15 +20,15 @@ def calculated(cache: Path | None, film: ElasticFilm = FILM, **changed: object) 
 
 @pytest.fixture
 def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many paths each call solved."""
+    """How many groups of paths each call solved."""
     counts: list[int] = []
-    solve = assembly.solve_paths
+    solve = FamilySetup._solved
 
-    def counted(paths: list[object], k: object, *, workers: int) -> object:
-        counts.append(len(paths))
-        return solve(paths, k, workers=workers)
+    def counted(setup: FamilySetup, groups: list[object]) -> object:
+        counts.append(len(groups))
+        return solve(setup, groups)
 
-    monkeypatch.setattr(assembly, "solve_paths", counted)
+    monkeypatch.setattr(FamilySetup, "_solved", counted)
     return counts
 
 

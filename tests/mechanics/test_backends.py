@@ -49,7 +49,7 @@ def by_both(
         pytest.param(0.5, 0.3, "total", marks=FULL),
     ],
 )
-def test_both_find_the_same_sphere(nu: float, friction: float, loading: str) -> None:
+def test_both_find_the_same_sphere(nu, friction, loading) -> None:
     hankel, fem = by_both(nu, SPHERE, 1.37, friction, loading)
     assert fem.backend == "fem"
     assert "triangles" in fem.discretisation
@@ -72,7 +72,7 @@ def test_both_find_the_same_sphere(nu: float, friction: float, loading: str) -> 
     ("nu", "load"),
     [(0.47, 0.34), pytest.param(0.5, 2.75, marks=FULL), pytest.param(0.45, 2.75, marks=FULL)],
 )
-def test_both_find_the_same_sphere_that_sticks_at_once(nu: float, load: float) -> None:
+def test_both_find_the_same_sphere_that_sticks_at_once(nu, load) -> None:
     hankel, fem, slips = (
         indent(film(nu), SPHERE, load=load, friction=mu, loading="total", backend=way, rings=48)
         for way, mu in (("hankel", math.inf), ("fem", math.inf), ("hankel", 10.0))
@@ -86,7 +86,7 @@ def test_both_find_the_same_sphere_that_sticks_at_once(nu: float, load: float) -
 @pytest.mark.parametrize(
     "friction", [0.2, pytest.param(0.0, marks=FULL), pytest.param(math.inf, marks=FULL)]
 )
-def test_both_find_the_same_rod(friction: float) -> None:
+def test_both_find_the_same_rod(friction) -> None:
     hankel, fem = by_both(0.5, Rod(radius=0.25e-3), 1.0, friction)
     assert fem.depth == pytest.approx(hankel.depth, rel=AGREEMENT)
     difference = fem.base_stress(R) - hankel.base_stress(R)

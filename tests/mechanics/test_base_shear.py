@@ -11,7 +11,7 @@ from memscal import indent
 
 
 @pytest.mark.parametrize("nu", [0.2, 0.45, 0.5])
-def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu: float) -> None:
+def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu) -> None:
     # Equilibrium of the whole film: at small k every film is an oedometer under the mean
     # pressure, whose radial stress nu/(1 - nu) p on its thickness h is what the base holds.
     k = 1e-3 / film(nu).thickness

@@ -84,7 +84,7 @@ def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -
 @pytest.mark.parametrize(
     ("nu", "friction"), [(0.0, math.inf), (0.3, 0.0), (0.495, math.inf), (0.5, 0.0)]
 )
-def test_every_load_increment_is_a_flat_punch_s(nu: float, friction: float) -> None:
+def test_every_load_increment_is_a_flat_punch_s(nu, friction) -> None:
     # What is in contact goes down together, and sticks, if it does, where it touched: between two
     # loads a contact is stiff as a rod of its radius (Mossakovskii's argument, on any film).
     path = indent(film(nu), SPHERE, load=list(np.linspace(1.0, 1.6, 7)), friction=friction)
@@ -112,7 +112,7 @@ def test_hayes_table_of_the_flat_punch() -> None:
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 @pytest.mark.parametrize("loading", ["incremental", "total"])
-def test_the_base_carries_the_load(friction: float, loading: str) -> None:
+def test_the_base_carries_the_load(friction, loading) -> None:
     contact = indent(film(), SPHERE, load=1.37, friction=friction, loading=loading)
     r, weights = gauss_panels(contact.contact_radius + 80e-3, 4e-3)
     force = 2 * math.pi * np.sum(weights * r * contact.base_stress(r))
@@ -131,7 +131,7 @@ def test_the_base_carries_the_load(friction: float, loading: str) -> None:
         if nu > 0.4 or loading == "incremental" or friction < 10
     ],
 )
-def test_signorini_s_and_amontons_conditions_hold(nu: float, friction: float, loading: str) -> None:
+def test_signorini_s_and_amontons_conditions_hold(nu, friction, loading) -> None:
     setting = {"friction": friction, "loading": loading, "rings": 48}
     for contact in indent(film(nu), SPHERE, load=LOADS[1::2], **setting):
         a = contact.contact_radius
@@ -173,7 +173,7 @@ def test_a_hollow_tip_touches_on_a_ring_first() -> None:
 
 
 @pytest.mark.parametrize("friction", [0.2, 1.0])
-def test_a_rod_slips_in_a_ring_between_sliding_and_sticking(friction: float) -> None:
+def test_a_rod_slips_in_a_ring_between_sliding_and_sticking(friction) -> None:
     contacts = {
         mu: indent(film(0.3), Rod(radius=0.5e-3), load=0.2, friction=mu)
         for mu in (0.0, friction, math.inf)
@@ -184,7 +184,7 @@ def test_a_rod_slips_in_a_ring_between_sliding_and_sticking(friction: float) -> 
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
-def test_rings_and_spherical_bessel_functions_solve_the_same_rod(nu: float) -> None:
+def test_rings_and_spherical_bessel_functions_solve_the_same_rod(nu) -> None:
     # A friction so low that it does nothing takes the rings' way.
     rod = Rod(radius=0.25e-3)
     by_rings, by_series = (indent(film(nu), rod, load=1.0, friction=mu) for mu in (1e-9, 0.0))
@@ -224,7 +224,7 @@ def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(mo
 
 
 @pytest.mark.parametrize("way", ["hankel", "fem"])
-def test_a_film_that_sticks_at_once_is_refused_if_it_would_enter_the_indenter(way: str) -> None:
+def test_a_film_that_sticks_at_once_is_refused_if_it_would_enter_the_indenter(way) -> None:
     with pytest.raises(ConvergenceError, match="Load incrementally"):
         indent(
             *(film(0.1), SPHERE),

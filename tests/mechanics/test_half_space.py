@@ -16,7 +16,7 @@ CROWDED = 1 - np.linspace(1.0, 0.0, 60) ** 4
 
 
 @pytest.mark.parametrize("rings", [EVEN, CROWDED], ids=["even", "crowded"])
-def test_a_disc_of_pressure_presses_as_love_found(rings: FloatArray) -> None:
+def test_a_disc_of_pressure_presses_as_love_found(rings) -> None:
     x = np.array([0.0, 0.1, 0.5, 0.99, 0.999999, 1.0, 1.000001, 1.3, 7.0])
     found = singular_integrals(x, rings)[0] @ np.ones(rings.size)
     outside = np.maximum(x, 1.0)

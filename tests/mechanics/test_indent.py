@@ -1,7 +1,6 @@
 """Pressing a rod on a film: loads, depths, base stress, and requests that are refused."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
 
 @pytest.mark.parametrize("radius", [0.25e-3, 4e-3])
 @pytest.mark.parametrize(("nu", "friction"), CASES)
-def test_the_base_carries_the_load(nu: float, friction: float, radius: float) -> None:
+def test_the_base_carries_the_load(nu, friction, radius) -> None:
     contact = press(nu, friction, radius)
     r, weights = gauss_panels(radius + 40 * 2e-3, 4e-3)
     force = 2 * np.pi * np.sum(weights * r * contact.base_stress(r))
@@ -32,7 +31,7 @@ def test_the_base_carries_the_load(nu: float, friction: float, radius: float) ->
 
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
-def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction: float) -> None:
+def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction) -> None:
     contact = indent(FILM, ROD, load=0.5, friction=friction)
     k = np.array([[0.0, 300.0, 700.0], [1500.0, 3000.0, 1e6]])
     r, weights = gauss_panels(80e-3, 2e-3)
@@ -62,7 +61,7 @@ def test_friction_changes_the_stress_under_the_paper_s_rod_by_a_thousandth() -> 
 
 
 @pytest.mark.parametrize(("nu", "friction"), CASES)
-def test_the_base_holds_the_film_back_around_the_axis(nu: float, friction: float) -> None:
+def test_the_base_holds_the_film_back_around_the_axis(nu, friction) -> None:
     shear = press(nu, friction).base_shear([0.0, 0.5e-3, 1e-3, 2e-3])
     assert shear[0] == 0
     assert np.all(shear[1:] < 0)
@@ -76,7 +75,7 @@ def test_a_list_of_loads_gives_proportional_contacts() -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
-def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction: float) -> None:
+def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction) -> None:
     contact = indent(FILM, ROD, load=1.0, friction=friction)
     r = np.array([[0.0, 0.1e-3], [ROD.radius, 1.0]])
     at_interface = (contact.interface_pressure(r), contact.interface_shear(r))
@@ -88,7 +87,7 @@ def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction: floa
 
 
 @pytest.mark.parametrize("r", [[-1e-3], [np.nan], [np.inf]])
-def test_what_is_no_radius_is_refused(r: list[float]) -> None:
+def test_what_is_no_radius_is_refused(r) -> None:
     with pytest.raises(InputError, match="radius"):
         indent(FILM, ROD, load=1.0).base_stress(r)
 
@@ -108,7 +107,7 @@ def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> Non
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 @pytest.mark.parametrize("name", ["load", "depth"])
-def test_loads_and_depths_that_are_not_positive_are_refused(name: str, value: float) -> None:
+def test_loads_and_depths_that_are_not_positive_are_refused(name, value) -> None:
     asked = (value, None) if name == "load" else (None, value)
     with pytest.raises(InputError, match=f"{name} is .* above zero"):
         indent(FILM, ROD, load=asked[0], depth=asked[1])
@@ -139,6 +138,6 @@ def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> Non
         ({"rings": 3}, "at least 16"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_plain_words(wrong: dict[str, Any], message: str) -> None:
+def test_what_makes_no_sense_is_refused_in_plain_words(wrong, message) -> None:
     with pytest.raises(InputError, match=message):
         indent(FILM, Sphere(radius=0.1288), load=1.0, **wrong)

@@ -39,7 +39,7 @@ def test_greenwood_and_tripp_s_own_values(parameter, separation, pressure) -> No
 
 
 @pytest.mark.parametrize("separation", [-60.0, -25.0, -19.0, -3.0, 0.0, 2.5, 7.0])
-def test_the_pressure_is_the_sum_over_gaussian_asperities(separation: float) -> None:
+def test_the_pressure_is_the_sum_over_gaussian_asperities(separation) -> None:
     law = GreenwoodTripp(roughness=1.0, asperity_density=1.0, asperity_radius=1.0)
 
     def density(s: float) -> float:
@@ -162,6 +162,6 @@ def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle() -> Non
         ),
     ],
 )
-def test_laws_that_make_no_sense_are_refused(make: object, message: str) -> None:
+def test_laws_that_make_no_sense_are_refused(make, message) -> None:
     with pytest.raises(InputError, match=message):
         make()

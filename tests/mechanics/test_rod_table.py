@@ -20,7 +20,7 @@ RUBBER = replace(FILM, law="neo-hookean")
         pytest.param(0.46, 0.56, [0.02, 0.28], True, marks=pytest.mark.full_study),
     ],
 )
-def test_a_tabulated_rod_is_that_which_is_solved(nu: float, radius, depths, sticking) -> None:
+def test_a_tabulated_rod_is_that_which_is_solved(nu, radius, depths, sticking) -> None:
     compare_with_the_table(nu, radius, depths, sticking=sticking)
 
 

@@ -43,11 +43,11 @@ _SENSOR_PARAMETERS = (
     "ellipticity_diagonal",
 )
 SYNTHETIC = "SYNTHETIC DATA: NOTHING WAS MEASURED"
-_LEAST_OF_G = 0.01
+_SHOWN_SHARE = 0.01
 _MOST_RADII = 12
 #: A value that conforms with less probability rather does not.
 _EVEN = 0.5
-_DIGITS_OF_NUMBER = 10
+_NUMBER_DIGITS = 10
 _MOST_EMBEDDED = 4_000_000
 
 
@@ -186,7 +186,7 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
         quantity = parameter_quantity(parameters, name)
         values.append(CertifiedValue(quantity, parameters[name], parameters.uncertainty(name)))
     artifact = tree_to_bytes(artifact_tree(apparatus.compact()))
-    derived = apparatus.content_digest[:_DIGITS_OF_NUMBER].upper()
+    derived = apparatus.content_digest[:_NUMBER_DIGITS].upper()
     stated = sections["laboratory"]
     return Certificate(
         number=stated.get("number") or stated.get("prefix", "") + derived,
@@ -268,7 +268,7 @@ def _conformity(
 def _profile(apparatus: ApparatusFunction) -> CertifiedProfile:
     """Return G at even radii up to where its Gaussian has fallen to a hundredth."""
     profile = apparatus.radial_profile
-    shown = profile.g_gaussian > _LEAST_OF_G * profile.g_gaussian[0]
+    shown = profile.g_gaussian > _SHOWN_SHARE * profile.g_gaussian[0]
     reach = profile.r[shown][-1]
     sizes = (MM * np.multiply.outer(10.0 ** np.arange(-4, 3), [1, 2, 5])).ravel()
     step = sizes[np.searchsorted(sizes, reach / _MOST_RADII)]

@@ -30,6 +30,8 @@ _PAGE = Path(__file__).with_name("certificate.html")
 #: Sources of a smaller share of every value, in percent, are left out of the budget.
 _LEAST_SHARE = 0.005
 _TOTAL = "root sum of squares"
+#: Kinds of messages of a calibration that say what its uncertainties do not count.
+_NOT_COUNTED = ("film_law", "uncertainty_unstated")
 _FONTS = "'Liberation Sans', Arial, Helvetica, 'DejaVu Sans', sans-serif"
 
 
@@ -41,6 +43,9 @@ def certificate_page(certificate: Certificate) -> str:
     humidity = sections["conditions"]["humidity"]
     celsius = temperature.value - ZERO_CELSIUS
     warnings = (f'<p class="note failed">{escape(text)}</p>' for text in certificate.warnings)
+    apparatus = certificate.apparatus
+    alt = "G(r) with its expanded uncertainty as a band; the numbers are in the table beside it."
+    picture = Picture(partial(radial_figure, apparatus), alt, "G(r); band ± U (k = 2).")
     texts = {
         "number": certificate.number,
         "created": timestamp(),
@@ -50,13 +55,15 @@ def certificate_page(certificate: Certificate) -> str:
         "person_name": sections["person"]["name"],
         "person_role": sections["person"]["role"],
         "accreditation": certificate.accreditation,
-        "setting": _setting(certificate.apparatus),
-        "origin": _origin(certificate.apparatus),
+        "setting": _setting(apparatus),
+        "origin": _origin(apparatus),
         "celsius": _expanded(celsius, temperature.uncertainty, 1.0, "°C"),
         "humidity": _expanded(humidity.value, humidity.uncertainty, 0.01, "%"),
-        "sources": _sources(certificate.apparatus),
-        "not_counted": _not_counted(certificate.apparatus),
-        "resolved": f"{certificate.apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
+        "sources": _sources(apparatus),
+        "not_counted": " ".join(
+            m.text for m in apparatus.process.messages if m.kind in _NOT_COUNTED
+        ),
+        "resolved": f"{apparatus.resolved_wavenumber / PER_MM:.3g} rad/mm",
     }
     blocks = {
         "fonts": _FONTS,
@@ -66,7 +73,7 @@ def certificate_page(certificate: Certificate) -> str:
         "equipment": _equipment(certificate),
         "values": _values(certificate),
         "profile": _profile(certificate),
-        "figure": _figure(certificate),
+        "figure": html_figures([picture]),
         "budget": _budget(certificate),
         "conformity": _conformity(certificate),
     }
@@ -114,12 +121,6 @@ def _equipment(certificate: Certificate) -> str:
     return Table("", heads, rows).html()
 
 
-def _figure(certificate: Certificate) -> str:
-    alt = "G(r) with its expanded uncertainty as a band; the numbers are in the table beside it."
-    draw = partial(radial_figure, certificate.apparatus)
-    return html_figures([Picture(draw, alt, "G(r); band ± U (k = 2).")])
-
-
 def _setting(apparatus: ApparatusFunction) -> str:
     """Say by what method, from which readings, and with which film and indenter."""
     rod = apparatus.indenter
@@ -161,12 +162,6 @@ def _sources(apparatus: ApparatusFunction) -> str:
     return ", ".join(source.replace("_", " ") for source in sources) or "no source that is named"
 
 
-def _not_counted(apparatus: ApparatusFunction) -> str:
-    """Say what the uncertainties do not count, as the calibration said it."""
-    kinds = ("film_law", "uncertainty_unstated")
-    return " ".join(m.text for m in apparatus.process.messages if m.kind in kinds)
-
-
 def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> str:
     """Return a value with U = k u, both given in SI units, ``scale`` of which are the unit."""
     return format_measured(value / scale, u and COVERAGE_FACTOR * u / scale, unit)
@@ -186,10 +181,12 @@ def _values(certificate: Certificate) -> str:
         quantity = value.quantity
         symbol = f", {quantity.symbol}" if quantity.symbol else ""
         share = 100 * value.expanded / abs(value.value) if value.value else np.inf
-        row = [f"({i + 1}) {quantity.words}{symbol}"]
-        row.append(_expanded(value.value, value.uncertainty, quantity.scale, quantity.unit))
-        row.append(f"{share:.2g} %" if share < 99 else "–")
-        row += [f"{round(r, 2) + 0:.2f}" for r in certificate.correlation[i, :i]]
+        row = [
+            f"({i + 1}) {quantity.words}{symbol}",
+            _expanded(value.value, value.uncertainty, quantity.scale, quantity.unit),
+            f"{share:.2g} %" if share < 99 else "–",
+            *(f"{round(r, 2) + 0:.2f}" for r in certificate.correlation[i, :i]),
+        ]
         rows.append([*row, "1", *[""] * (count - i - 1)])
     numbers = [f"({i + 1})" for i in range(count)]
     head = ("Quantity y", "y ± U (k = 2)", "U / y", *numbers)

@@ -117,9 +117,14 @@ class Rubber:
     def cauchy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the Cauchy stress rr, zz, hoop and rz, tension positive, shape (..., 4)."""
         S = np.moveaxis(self.stress(F, p), -1, 0)
-        (rr, rz, zr, zz, hoop) = np.moveaxis(F, -1, 0)
-        pulled = [S[0] * rr + S[1] * rz, S[2] * zr + S[3] * zz, S[4] * hoop, S[0] * zr + S[1] * zz]
-        return np.stack(pulled, axis=-1) / determinant(F)[..., None]
+        rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
+        kirchhoff = [
+            S[0] * rr + S[1] * rz,
+            S[2] * zr + S[3] * zz,
+            S[4] * hoop,
+            S[0] * zr + S[1] * zz,
+        ]
+        return np.stack(kirchhoff, axis=-1) / determinant(F)[..., None]
 
 
 # Sides below the contact, as a share of the rod's radius or of the contact's ...
@@ -166,7 +171,7 @@ def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     thickness, _, refinement = size
     side = min(_SHARE_OF_CONTACT * contact, _WIDEST_NEAR * thickness) / refinement
-    even = np.linspace(0.0, contact, np.ceil(contact / side) + 1)
+    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
     return _tensor(even, side, _NEAR_A_SPHERE, size)
 
 

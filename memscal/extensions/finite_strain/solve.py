@@ -248,8 +248,8 @@ class _Request:
 
     def _start(self, pressing: Pressing) -> Pressed:
         """Return the untouched film, and the nodes that will touch first."""
-        nodes = pressing.elements.surface
         elements = pressing.elements
+        nodes = elements.surface
         r = elements.nodes[0][nodes]
         if isinstance(pressing.face, RodFace):
             reach = pressing.face.flat
@@ -331,10 +331,7 @@ class FiniteStrainField:
         elements = self.pressing.elements
         x = self.pressed.x
         nodes = elements.surface
-        r = elements.nodes[0][nodes]
-        w = -x[nodes + elements.n]
-        u = x[nodes]
-        return r / _MM, w / _MM, u / _MM
+        return elements.nodes[0][nodes] / _MM, -x[nodes + elements.n] / _MM, x[nodes] / _MM
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""

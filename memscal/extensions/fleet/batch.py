@@ -118,7 +118,9 @@ class Batch:
             if not resume and any(path.is_file() for path in self.results.rglob("*")):
                 cure = "Continue them with --resume, or give another folder."
                 raise OutputError(f"The folder {self.results} exists.", why=stays, cure=cure)
-        size = self.shard_size or self._size_of(count)
+        begun_with = read_batch(self.results).get("shard_size")
+        balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
+        size = self.shard_size or begun_with or balanced
         shards = -(-count // size)
         numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(self.results)]
         if max(numbers, default=0) >= shards:
@@ -134,18 +136,13 @@ class Batch:
         ensure_writable(self.results / "shards" / "proof")
         return replace(self, shard_size=size, count=count)
 
-    def _size_of(self, count: int) -> int:
-        """Return the size that the batch was begun with, or one that makes enough shards."""
-        stated = read_batch(self.results).get("shard_size")
-        return stated or min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
-
     def _counted(self) -> int:
         """Return how many scans there are; refuse a list of which none is there."""
         count = 0
         there = False
         first = ""
         for scan in manifest_scans(self.source):
-            count = count + 1
+            count += 1
             first = first or scan.path
             there = there or (self.folder / scan.path).exists()
         if not count:
@@ -244,21 +241,27 @@ def _sha256_of_file(path: Path) -> str | None:
 def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     """Calibrate a scan and return its row; an error is a row, too."""
     item = shard.scans[i]
-    path = batch.folder / shard.scans[i].path
-    row: dict[str, Any] = {"place": shard.first + i, **asdict(item), "passed": False}
-    row |= {"calibrated_at": timestamp(), "options_sha256": batch.options_sha256}
-    row |= {"version": batch.version, "error": None}
+    path = batch.folder / item.path
+    row: dict[str, Any] = {
+        "place": shard.first + i,
+        **asdict(item),
+        "passed": False,
+        "calibrated_at": timestamp(),
+        "options_sha256": batch.options_sha256,
+        "version": batch.version,
+        "error": None,
+    }
     accepted = batch.options.get("accept_altered", False)
     scan = attempted(item.path, lambda: read_scan(path, accept_altered=accepted))
     if isinstance(scan, MemscalError):
-        return row | _of_error(scan) | {"input_sha256": _sha256_of_file(path)}
+        return row | _error_columns(scan) | {"input_sha256": _sha256_of_file(path)}
     row |= asdict(scan.sensor) | {"sensor": scan.sensor.name, "start_time": scan.start_time}
     row["input_sha256"] = scan.source and scan.source.sha256
     apparatus = attempted(
         item.path, lambda: calibrate(scan, other=False, **batch.options).apparatus
     )
     if isinstance(apparatus, MemscalError):
-        return row | _of_error(apparatus)
+        return row | _error_columns(apparatus)
     if batch.artifacts == "all" or (batch.artifacts == "failed" and not apparatus.passed):
         name = f"{shard.first + i:07d}-{path.stem[:_LONGEST_STEM]}.apparatus.h5"
         artifact = Path("artifacts", shard.name, name)
@@ -268,5 +271,5 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     return row | fleet_row(apparatus)
 
 
-def _of_error(error: MemscalError) -> dict[str, str]:
+def _error_columns(error: MemscalError) -> dict[str, str]:
     return {"error_class": type(error).__name__, "error": str(error)}

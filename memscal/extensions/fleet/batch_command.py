@@ -106,11 +106,18 @@ def command(
         if shard_paths(results):
             out.note("The shards that are done stay: --resume does the rest.")
         raise
-    errors, failed = (sum(getattr(o, name) for o in outcomes) for name in ("errors", "failed"))
+    errors = sum(outcome.errors for outcome in outcomes)
+    failed = sum(outcome.failed for outcome in outcomes)
     kept = sum(outcome.kept for outcome in outcomes)
     seconds = round(monotonic() - start, 1)
-    counts = {"scans": total, "passed": total - errors - failed, "failed_checks": failed}
-    counts |= {"errors": errors, "shards_written": len(outcomes) - kept, "shards_kept": kept}
+    counts = {
+        "scans": total,
+        "passed": total - errors - failed,
+        "failed_checks": failed,
+        "errors": errors,
+        "shards_written": len(outcomes) - kept,
+        "shards_kept": kept,
+    }
     page = dict[Path, bytes]()
     problem = None
     try:

@@ -100,8 +100,16 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
     size = np.clip(4e3 / max(a.size, 1), 1, 40)
     if placed.any():
         some = placed & finite
-        colours: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, **shown}
-        points = axes.scatter(x[some], y[some], s=size, c=change[some], **colours)
+        points = axes.scatter(
+            x[some],
+            y[some],
+            s=size,
+            c=change[some],
+            cmap="RdBu_r",
+            vmin=-limit,
+            vmax=limit,
+            **shown,
+        )
         figure.colorbar(points, ax=axes, label=label, extend="both")
         # The panel stays as it is: of a single row the axes show more.
         axes.set_aspect("equal", adjustable="datalim")
@@ -135,8 +143,10 @@ def report(fleet: FleetResults) -> Report:
         "failed each check, and errors by class. d: A over the wafer, or along the batch."
     )
     picture = Picture(fleet.plot, f"Panels: {caption} {counts}", caption)
-    title = f"Calibrations of {fleet.name}"
-    failed = bool(fleet.failed)
     return Report(
-        title=title, verdict=counts, failed=failed, pictures=[picture], messages=fleet.messages
+        title=f"Calibrations of {fleet.name}",
+        verdict=counts,
+        failed=bool(fleet.failed),
+        pictures=[picture],
+        messages=fleet.messages,
     )

@@ -133,9 +133,9 @@ def calibrate_many(
         raise InputError(problem, cure="Give a concurrent.futures.Executor, or leave it out.")
     method = options.get("method", "white-noise")
     seed = options.get("seed", 0)
-    of_calibrate = signature(calibrate).parameters
-    of_method = {name: value for name, value in options.items() if name not in of_calibrate}
-    chosen_method(method, of_method, seed=seed)
+    calibration = signature(calibrate).parameters
+    further = {name: value for name, value in options.items() if name not in calibration}
+    chosen_method(method, further, seed=seed)
     task = partial(_calibrated, options=options)
     items = enumerate(scans)
     sized = list(items) if isinstance(scans, Sized) else items

@@ -14,7 +14,7 @@ from memscal.model.result import Result
 #: A value farther from the median is an outlier, in robust standard deviations: of a million
 #: normal values one; and how much more is allowed where the deviation is that of few values.
 _ROBUST_LIMIT = 5.0
-_OF_FEW = 8.0
+_FEW_VALUES = 8.0
 _TO_SIGMA = 1.4826  # of a normal law's median absolute deviation
 
 
@@ -45,7 +45,7 @@ class FleetResults(Result):
 def robust_limit(count: int) -> float:
     """Return how many robust deviations from the median none of so many values lies by chance."""
     # In 1 of 100 batches or fewer, by simulation of 4 to 1000 normal values.
-    return _ROBUST_LIMIT * (1 + _OF_FEW / max(count, 1))
+    return _ROBUST_LIMIT * (1 + _FEW_VALUES / max(count, 1))
 
 
 def robust_spread(values: FloatArray) -> float:

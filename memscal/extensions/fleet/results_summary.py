@@ -59,7 +59,7 @@ def outliers(fleet: FleetResults) -> dict[int, str]:
         deviations[symbol] = np.nan_to_num((values - np.median(known)) / (spread or 1.0))
     farthest = np.max([np.abs(z) for z in deviations.values()], axis=0)
     limit = _limit(fleet)
-    chosen = {int(i) for i in np.flatnonzero(farthest > limit)}
+    chosen = set(np.flatnonzero(farthest > limit).tolist())
     chosen |= fleet.failed.keys() - fleet.errors.keys()
     reasons = {}
     for i in sorted(chosen, key=lambda i: (-farthest[i], i)):
@@ -82,13 +82,17 @@ def tables(fleet: FleetResults) -> list[Table]:
     further = len(reasons) - _MOST_ROWS
     if further > 0:
         title += f" ({further} further ones are in the tables)"
-    rows = _outlier_rows(fleet, reasons)
+    outlying = []
+    for i, reason in list(reasons.items())[:_MOST_ROWS]:
+        a = format_measured(fleet.conversion_constant[i], fleet.conversion_constant_errors[i])
+        sigma = format_measured(fleet.gaussian_sigma[i], fleet.gaussian_sigma_errors[i])
+        outlying.append((fleet.paths[i], a, sigma, reason))
     return [
         Table("Sensors", ("", "number", "share"), _shares(fleet, counts(fleet))),
         _distributions(fleet),
         Table("Failed checks", ("check", "sensors", "share"), _shares(fleet, failures(fleet))),
         _errors_table(fleet),
-        Table(title, ("scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), rows),
+        Table(title, ("scan", f"A ({fleet.unit})", "sigma (mm)", "reason"), outlying),
     ]
 
 
@@ -112,20 +116,11 @@ def _distributions(fleet: FleetResults) -> Table:
 
 def _errors_table(fleet: FleetResults) -> Table:
     first = {kind: i for i, (kind, _) in reversed(list(fleet.errors.items()))}
-    rows: list[tuple[str, ...]] = []
+    rows = []
     for kind, number in error_classes(fleet).items():
         text = fleet.errors[first[kind]][1].partition("\n")[0]
         rows.append((kind, str(number), fleet.paths[first[kind]], text))
     return Table("Not calibrated", ("error", "scans", "the first of them", "its error"), rows)
-
-
-def _outlier_rows(fleet: FleetResults, reasons: dict[int, str]) -> list[tuple[str, ...]]:
-    rows: list[tuple[str, ...]] = []
-    for i, reason in list(reasons.items())[:_MOST_ROWS]:
-        a = format_measured(fleet.conversion_constant[i], fleet.conversion_constant_errors[i])
-        sigma = format_measured(fleet.gaussian_sigma[i], fleet.gaussian_sigma_errors[i])
-        rows.append((fleet.paths[i], a, sigma, reason))
-    return rows
 
 
 def mapping(fleet: FleetResults) -> dict[str, Any]:

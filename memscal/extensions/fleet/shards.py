@@ -141,7 +141,6 @@ def _schema(readings: Iterable[Reading]) -> Any:
     single = pa.float32()
     double = pa.float64()
     text = pa.string()
-    message = {"kind": text, "text": text}
     source = {"quantity": text, "source": text, "errors": single}
     check = {"name": text, "passed": pa.bool_(), **dict.fromkeys(_CHECK, single)}
     columns = {
@@ -151,13 +150,10 @@ def _schema(readings: Iterable[Reading]) -> Any:
         "wafer_x": double,
         "wafer_y": double,
         "resolved_wavenumber": double,
-        "r": pa.list_(single),
-        "g": pa.list_(single),
-        "g_errors": pa.list_(single),
-        "correlation": pa.list_(single),
+        **dict.fromkeys(("r", "g", "g_errors", "correlation"), pa.list_(single)),
         "correlated": pa.list_(text),
         "checks": pa.list_(pa.struct(check)),
-        "messages": pa.list_(pa.struct(message)),
+        "messages": pa.list_(pa.struct({"kind": text, "text": text})),
         "budget": pa.list_(pa.struct(source)),
     }
     units = {
@@ -229,8 +225,12 @@ def _correlation(covariance: FloatArray) -> FloatArray:
 def write_shard(path: Path, rows: Sequence[Mapping[str, Any]], digest: str) -> None:
     """Write a table whole or not at all; its metadata state the digest of what it is made from."""
     pa = arrow()
-    about = {"memscal_schema": FLEET_SCHEMA, "memscal_schema_version": FLEET_SCHEMA_VERSION}
-    about |= {"memscal_version": __version__, DIGEST: digest}
+    about = {
+        "memscal_schema": FLEET_SCHEMA,
+        "memscal_schema_version": FLEET_SCHEMA_VERSION,
+        "memscal_version": __version__,
+        DIGEST: digest,
+    }
     readings = {row["reading"] for row in rows if "reading" in row} or {VOLTS}
     table = pa.Table.from_pylist(list(rows), _schema(readings).with_metadata(about))
     packing = {"compression": "zstd", "use_dictionary": False, "write_page_checksum": True}
@@ -341,12 +341,10 @@ class _Statements:
                 if message["kind"] == OVERRIDE:
                     self.overridden.setdefault(number, message["text"])
             if digest:
-                self._add_content(number, int(digest[:15], 16))
-
-    def _add_content(self, number: int, digest: int) -> None:
-        if digest in self.contents:
-            self.repeated.append(number)
-        self.contents.add(digest)
+                content = int(digest[:15], 16)
+                if content in self.contents:
+                    self.repeated.append(number)
+                self.contents.add(content)
 
     def messages(self, scans: int) -> Iterator[Message]:
         """Yield what is missing of so many scans, mixed, repeated or overridden."""

@@ -58,13 +58,12 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
 def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
         place = bounded(compared.length.values, _MIDDLE)
+        rise = deviance_rise(compared.length)
         label = f"{direction}, {lubricated_words(compared.lubrication)}"
-        axes.plot(
-            place, deviance_rise(compared.length), color=COLOURS[_COLOURS[direction]], label=label
-        )
+        axes.plot(place, rise, color=COLOURS[_COLOURS[direction]], label=label)
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
-    axes.xaxis.set_ticks(list(bounded(np.array(_TICKS) * _UM, _MIDDLE)), names)
+    axes.xaxis.set_ticks(bounded(np.array(_TICKS) * _UM, _MIDDLE), names)
     axes.set(xlim=(-0.02, 1.02), xlabel="length (µm)", ylabel=RISE)
     legend_above(axes, columns=1)
 
@@ -81,7 +80,7 @@ def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison
             axes.plot(below, height, "o", color=COLOURS[_COLOURS[direction]], ms=5)
             names.append(textwrap.fill(law.name, 22))
             height += 1
-    axes.yaxis.set_ticks(list(range(height)), names)
+    axes.yaxis.set_ticks(range(height), names)
     axes.set_ylim(height - 0.5, -0.5)
     axes.axvline(0.0, color="0.6", lw=0.6)
     axes.set_xlabel("ln of marginal likelihood\nover the best")

@@ -257,7 +257,7 @@ def curve(channel: Channel, *, also: Iterable[float] = (), fine: int = _FINE) ->
     first = family.coordinates[0]
     last = family.coordinates[-1]
     # Nodes are even in the bounded coordinate, closer where it matters.
-    extra = bounded(list(also), family.scale)
+    extra = bounded([*also], family.scale)
     coarse = np.unique([*np.linspace(first, last, _COARSE), *extra])
     rough = likelihood(channel.at(unbounded(coarse, family.scale))).statistics
     fall = log_likelihood(rough)[0]

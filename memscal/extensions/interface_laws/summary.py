@@ -125,18 +125,16 @@ def _between(ends_about_best: FloatArray) -> str:
 
 def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
     """Return laws, evidence and lengths as JSON holds them."""
-    directions = {name: _laws_json(compared) for name, compared in comparison.by_direction.items()}
-    return directions | {"warnings": texts_of(comparison.messages)}
-
-
-def _laws_json(compared: results.LawComparison) -> dict[str, Any]:
-    return {
-        **members(COMPARED_LAWS, compared),
-        "laws": [members(LAW, law) for law in compared.laws],
-        "bayes_factors": [members(BAYES_FACTOR, factor) for factor in compared.factors],
-        "length": bounded_json(SLIP_LENGTH, compared.length),
-        "implied": None if compared.implied is None else _implied_json(compared.implied),
-    }
+    whole: dict[str, Any] = {}
+    for direction, compared in comparison.by_direction.items():
+        whole[direction] = {
+            **members(COMPARED_LAWS, compared),
+            "laws": [members(LAW, law) for law in compared.laws],
+            "bayes_factors": [members(BAYES_FACTOR, factor) for factor in compared.factors],
+            "length": bounded_json(SLIP_LENGTH, compared.length),
+            "implied": None if compared.implied is None else _implied_json(compared.implied),
+        }
+    return whole | {"warnings": texts_of(comparison.messages)}
 
 
 def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:

@@ -274,7 +274,14 @@ def read_reference_mesh(
     frame = find_frame(mesh, to_si(mesh.points, r_unit, "length", name), vertical)
     normal = _find(mesh, frame, sigma, frame.vertical)
     section = len(frame.radial) == 1
-    _require_meaning(name, section, shear, centre)
+    if section and centre is not None:
+        problem = f"A centre was given, but the mesh in {name} is a section."
+        cure = "Leave out the centre (--centre), or shift the mesh."
+        raise InputError(problem, why="The axis of a section is at radius 0.", cure=cure)
+    if not section and shear is not None:
+        problem = f"A shear field was given, but the mesh in {name} is a body in 3-D."
+        cure = "Leave it out (shear; --shear), or give a section of the film."
+        raise InputError(problem, why="The radial shear is read from sections only.", cure=cure)
     tangential = _shear_component(mesh, frame, normal, shear) if section else None
     footing = find_base(mesh, frame, base)
     places, values = _at_base(mesh, frame, footing, normal)
@@ -322,19 +329,6 @@ def _along_radius(
     reference.require_numbers(samples)  # a mean would leave out what is missing
     columns, note = average_over_circles(places - np.array(centre), samples.columns)
     return replace(samples, columns=columns, notes=[*samples.notes, *import_notes([note])])
-
-
-def _require_meaning(
-    name: str, section: bool, shear: str | None, centre: tuple[float, float] | None
-) -> None:
-    if section and centre is not None:
-        problem = f"A centre was given, but the mesh in {name} is a section."
-        cure = "Leave out the centre (--centre), or shift the mesh."
-        raise InputError(problem, why="The axis of a section is at radius 0.", cure=cure)
-    if not section and shear is not None:
-        problem = f"A shear field was given, but the mesh in {name} is a body in 3-D."
-        cure = "Leave it out (shear; --shear), or give a section of the film."
-        raise InputError(problem, why="The radial shear is read from sections only.", cure=cure)
 
 
 def _shear_component(

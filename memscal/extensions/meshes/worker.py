@@ -20,7 +20,7 @@ _MOST_FILES = 32
 _MOST_PRINTED = 300
 _FORBIDDEN = {"ctypes", "ftplib", "pickle", "pty", "shutil", "socket", "subprocess", "urllib"}
 # What an import does: modules that are needed late, such as an encoding, may still be loaded.
-_ALLOWED_OF_OS = {"os.listdir", "os.scandir"}
+_ALLOWED = {"os.listdir", "os.scandir"}
 
 
 def main() -> None:
@@ -105,7 +105,7 @@ def _forbid_files() -> None:
             if not (reading and module):
                 raise PermissionError(f"it asks for the file {name}, which no mesh needs")
         elif event.partition(".")[0] in _FORBIDDEN or (
-            event.startswith("os.") and event not in _ALLOWED_OF_OS
+            event.startswith("os.") and event not in _ALLOWED
         ):
             raise PermissionError(f"it asks for {event}, which no mesh needs")
 

@@ -24,23 +24,24 @@ DRAWN = (
 def tables(result: MonteCarlo) -> list[Table]:
     """Return each parameter's standard uncertainty by the budget and by draws."""
     rows = []
-    disagreeing = set()
-    for i, comparison in enumerate(result.comparisons):
+    for comparison in result.comparisons:
         quantity = estimated_quantity(comparison.name).read_in(result.reading)
         scale = quantity.scale
         low, high = comparison.symmetric
-        row = [f"{quantity.words} ({quantity.unit})"]
-        row.append(f"{comparison.first_order / scale:.2g}")
-        row.append(f"{comparison.uncertainty / scale:.2g}")
-        row.append(f"{low / scale:.4g} to {high / scale:.4g}")
-        rows.append([*row, "yes" if comparison.agrees else "no"])
-        if not comparison.agrees:
-            disagreeing.add(i)
+        row = [
+            f"{quantity.words} ({quantity.unit})",
+            f"{comparison.first_order / scale:.2g}",
+            f"{comparison.uncertainty / scale:.2g}",
+            f"{low / scale:.4g} to {high / scale:.4g}",
+            "yes" if comparison.agrees else "no",
+        ]
+        rows.append(row)
     *others, last = (source.replace("_", " ") for source in result.sources)
     sources = f"{', '.join(others)} and {last}" if others else last
     title = f"What scatters, by {result.draws} draws of {sources} (seed {result.seed})"
     head = ("", "u by the budget", "u of the draws", "95 % interval", "agrees")
-    return [Table(title, head, rows, frozenset(disagreeing))]
+    disagreeing = frozenset(i for i, c in enumerate(result.comparisons) if not c.agrees)
+    return [Table(title, head, rows, disagreeing)]
 
 
 def mapping(result: MonteCarlo) -> dict[str, Any]:

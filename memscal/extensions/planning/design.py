@@ -412,9 +412,9 @@ def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) 
         return FitError(f"No {what} makes a scan that can be calibrated with.", cure=cure)
     name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
     by_reached = partial(_reached, name=name)
-    best = (
-        max(tried, key=by_reached) if name == "resolved_wavenumber" else min(tried, key=by_reached)
-    )
+    best = min(tried, key=by_reached)
+    if name == "resolved_wavenumber":
+        best = max(tried, key=by_reached)
     goal = _in_words(name, targets[name])
     reached = _in_words(name, _reached(best, name))
     count = f"{best.plan.repeats} repeats"
@@ -542,7 +542,7 @@ def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[
     """Return the designs with one number of the plan (SI) replaced; unusable plans are left out."""
     designs = []
     for value in Task("plans", len(values)).counted(values):
-        changes: dict[str, Any] = {vary: int(value) if vary == "repeats" else float(value)}
+        changes: dict[str, Any] = {vary: value}
         with suppress(FitError), reporting(nobody):
             designs.append(evaluate(replace(planned.plan, **changes), planned.method))
     return designs

@@ -72,10 +72,9 @@ def _expected_rows(planned: Design) -> list[tuple[str, str, str, str]]:
     rows = []
     for name, (words, _) in _SHOWN.items():
         shown = ESTIMATED[name]
-        share = planned.relative_uncertainty(name)
         value = f"{planned.parameters[name] / shown.scale:.4g} {shown.unit}"
         error = f"{planned.parameters.uncertainty(name) / shown.scale:.2g}"
-        rows.append((words, value, error, _percent(share)))
+        rows.append((words, value, error, _percent(planned.relative_uncertainty(name))))
     g = planned.g[0] / PER_MM2
     u = planned.g_errors[0] / PER_MM2
     rows.append(("G at the axis", f"{g:.4g} 1/mm^2", f"{u:.2g}", _percent(u / abs(g))))
@@ -110,6 +109,11 @@ def _contributions_table(planned: Design) -> Table:
 def mapping(planned: Design) -> dict[str, Any]:
     """Return the object of ``design --json``; the contract fixes its form."""
     axis = {"g_at_axis": planned.g[0], "g_at_axis_uncertainty": planned.g_errors[0]}
+    wanted = {}
+    for name, value in planned.want.items():
+        wanted[name] = {"value": value, "unit": "1"}
+        if name == "resolved":
+            wanted[name] = {"value": value / PER_MM, "unit": "rad/mm"}
     expected = {}
     for name in _SHOWN:
         expected[name] = {
@@ -121,28 +125,20 @@ def mapping(planned: Design) -> dict[str, Any]:
         "planned": True,
         "method": planned.method,
         "plan": declared.members(PLAN, planned.plan),
-        "wanted": {name: _wanted(name, value) for name, value in planned.want.items()},
+        "wanted": wanted,
         "expected": expected,
         **declared.members(EXPECTED, planned, **axis),
     }
 
 
-def _wanted(name: str, value: float) -> dict[str, Any]:
-    if name == "resolved":
-        return {"value": value / PER_MM, "unit": "rad/mm"}
-    return {"value": value, "unit": "1"}
-
-
 def dataset(planned: Design) -> declared.Dataset:
     """Return G along r and its transfer function along k, with standard uncertainties."""
-    values = {quantity.name: getattr(planned, quantity.name) for quantity in _QUANTITIES}
-    return declared.labelled_dataset(_QUANTITIES, values)
+    return declared.labelled_dataset(_QUANTITIES, vars(planned))
 
 
 def frame(planned: Design) -> declared.DataFrame:
     """Return one row for each radius at which G is expected."""
-    names = ("r", "g", "g_errors")
-    return declared.data_frame(_QUANTITIES[:3], {name: getattr(planned, name) for name in names})
+    return declared.data_frame(_QUANTITIES[:3], vars(planned))
 
 
 def correlated(planned: Design) -> dict[str, Any]:

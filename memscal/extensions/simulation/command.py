@@ -268,7 +268,7 @@ def command(
         return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
     output = output or Path("synthetic_scan.h5")
     laboratory = options["laboratory"]
-    prove_writable([output], force=force, inputs=[laboratory] if laboratory else [])
+    prove_writable([output], force=force, inputs=[laboratory])
 
     from memscal.extensions.simulation.rod_scan import simulate
     from memscal.formats.scan import write_scan

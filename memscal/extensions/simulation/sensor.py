@@ -126,8 +126,11 @@ def simulated_scan(
         largest_shear = float(np.abs(shear).max())
         shear_draws = np.random.default_rng([seed, 1]).standard_normal(draws.shape)
         tangential = _read("u_xz", shear, largest_shear, shear_draws, x, disturbances)
-        of_channel = {"conversion_constant": shear_constant, **disturbances.in_volts(largest_shear)}
-        described = {**kernel.describe(), **of_channel}
+        described = {
+            **kernel.describe(),
+            "conversion_constant": shear_constant,
+            **disturbances.in_volts(largest_shear),
+        }
         tangential_truth = {f"{name}_xz": value for name, value in described.items()}
     load = float(loads.mean())
     uncertainty = disturbances.load_uncertainty

@@ -82,13 +82,17 @@ def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
         raise InputError(f"{name} has a negative radius ({lowest * 1e3:g} mm).", why=why, cure=cure)
     notes = list(samples.notes)
     # Stated is what no table or mesh holds: load, film, indenter.
-    fields: dict[str, Any] = {**_sorted_by_radius(samples, notes), **stated}
-    profile = StressProfile(**fields, discretisation=samples.discretisation, source=samples.source)
+    profile = StressProfile(
+        **_sorted_by_radius(samples, notes),
+        **stated,
+        discretisation=samples.discretisation,
+        source=samples.source,
+    )
     notes += _compare_with_load(profile, samples)
     return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
 
 
-def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, FloatArray]:
+def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, Any]:
     """Sort, and average the values that element-wise output gives twice at a shared node."""
     columns = samples.columns
     order = np.argsort(columns["r"], kind="stable")

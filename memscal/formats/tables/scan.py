@@ -147,8 +147,16 @@ def import_table(
         conditions=conditions or ScanConditions(),
         uncertainties=uncertainties or ScanUncertainties(),
     )
-    named = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz, "u_zz_errors": u_errors}
-    named |= {"normal_load": load_column, "x": x, "y": y, "branch": branch}
+    named = {
+        "u_zz": u,
+        "u_xz": u_xz,
+        "u_yz": u_yz,
+        "u_zz_errors": u_errors,
+        "normal_load": load_column,
+        "x": x,
+        "y": y,
+        "branch": branch,
+    }
     numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
     named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
     require_sign("sign of the voltage", layout.u_sign)
@@ -384,12 +392,12 @@ def _direction(columns: Columns, notes: list[str]) -> str:
     if "y" not in columns or min(x, y) > LINE * max(x, y):
         return "x"
     along, across = ("y", "x") if y > x else ("x", "y")
+    stays = ""
     if across in columns and min(x, y) > 0:
         stays = f": {across} stays within {min(x, y) * 1e3:.4g} mm"
-    else:
-        stays = ""
     notes.append(f"The points are a line along {along}{stays}.")
-    columns["x"] = columns.pop("y") if along == "y" else columns["x"]
+    if along == "y":
+        columns["x"] = columns["y"]
     columns.pop("y", None)
     return along
 
@@ -412,7 +420,7 @@ def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> N
     return lines
 
 
-def _placed(columns: Columns, notes: list[str], of_rows: Callable[[Any], str]) -> Columns:
+def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str]) -> Columns:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
     stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
     finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
@@ -421,10 +429,10 @@ def _placed(columns: Columns, notes: list[str], of_rows: Callable[[Any], str]) -
     for name, values in columns.items():
         rows = np.flatnonzero(finite & np.isnan(values))
         if rows.size:
-            notes.append(f"{name} is missing (NaN) in {of_rows(rows)}.")
+            notes.append(f"{name} is missing (NaN) in {name_rows(rows)}.")
     if not finite.all():
         rows = np.flatnonzero(~finite)
-        notes.append(f"Left out, for they have no position: {of_rows(rows)}.")
+        notes.append(f"Left out, for they have no position: {name_rows(rows)}.")
         columns = {name: values[finite] for name, values in columns.items()}
     if "repeat" in columns:
         columns["repeat"] = np.unique(columns["repeat"], return_inverse=True)[1]

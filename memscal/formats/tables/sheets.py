@@ -31,9 +31,7 @@ from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_FILE_BYTES, MOST_OTHER_TAGS, MOST_TAGS, too_large
 from memscal.progress import Task
 
-_KINDS = dict.fromkeys((".xlsx", ".xlsm"), "workbook") | dict.fromkeys(
-    (".parquet", ".pq"), "Parquet"
-)
+_KINDS = {".xlsx": "workbook", ".xlsm": "workbook", ".parquet": "Parquet", ".pq": "Parquet"}
 _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 #: Options of reading by the kinds of tables that have a use for them.
 _USES = {"delimiter": ("text",), "skip_rows": ("text", "workbook"), "sheet": ("workbook",)}

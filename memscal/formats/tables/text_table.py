@@ -157,13 +157,14 @@ class NamedColumns:
         if isinstance(column, str) and self.names.count(column) == 1:
             return self.names.index(column)
         heads = [_cut(name)[0] for name in self.names]
-        if heads.count(str(column)) > 1:
-            named = [n for n, head in zip(self.names, heads, strict=True) if head == str(column)]
+        sought = str(column)
+        if heads.count(sought) > 1:
+            named = [n for n, head in zip(self.names, heads, strict=True) if head == sought]
             problem = f"{self._name} has several columns {column!r}: {', '.join(named)}."
             raise InputError(problem, cure="Give the number of the column, counted from 1.")
-        if str(column) in heads:
-            return heads.index(str(column))
-        number = int(column) if isinstance(column, int) or column.isdecimal() else 0
+        if sought in heads:
+            return heads.index(sought)
+        number = int(sought) if sought.isdecimal() else 0
         if not 1 <= number <= len(self.names):
             raise InputError(
                 f"{self._name} has no column {column!r}.",
@@ -209,7 +210,7 @@ class NamedColumns:
         if word in item.words:
             return item.words[word]
         if word in self._missing:
-            return float("nan")
+            return np.nan
         text = cell.replace(",", ".") if self.decimal == "," else cell
         with suppress(ValueError):
             if not (self._comma_alone and "." in cell):
@@ -218,10 +219,12 @@ class NamedColumns:
         lines.append(line)
         if len(cells) < _NAMED:
             cells.append(printable(cell, _MAX_NAME))
-        return float("nan")
+        return np.nan
 
     def _refuse_wrong(self, wanted: list[Wanted]) -> None:
-        for item in (item for item in wanted if item.column in self._wrong):
+        for item in wanted:
+            if item.column not in self._wrong:
+                continue
             lines, cells = self._wrong[item.column]
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""

@@ -14,7 +14,6 @@ import numpy as np
 from memscal.errors import ConvergenceError
 from memscal.mechanics.solver import step
 from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target, Touch
-from memscal.model.arrays import BoolArray
 from memscal.progress import Task
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
@@ -239,9 +238,11 @@ def _next_meeting(
     if not rising:
         # Rings that meet without pressing are out of contact on the way back.
         touching = touching & (state.pressure > 0)
-    edge = ~touching & _neighbours(touching) & np.isfinite(problem.heights)
+    neighbours = (1, 0, 1)
+    outside = ~touching & np.isfinite(problem.heights)
+    edge = outside & (np.convolve(touching, neighbours, "same") > 0)
     if not rising:
-        edge = touching & _neighbours(edge)
+        edge = touching & (np.convolve(edge, neighbours, "same") > 0)
         if np.count_nonzero(touching) < 2:
             return None
     onset = replace(state, touching=touching)
@@ -257,13 +258,6 @@ def _next_meeting(
     # A contact with a hole has two edges: what meets, or parts, first comes next.
     nearest = min if rising else max
     return nearest(states, key=lambda following: _reached(following, target), default=None)
-
-
-def _neighbours(rings: BoolArray) -> BoolArray:
-    neighbours = np.zeros_like(rings)
-    neighbours[1:] = rings[:-1]
-    neighbours[:-1] |= rings[1:]
-    return neighbours
 
 
 def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:

@@ -240,13 +240,24 @@ def take_step(
             settled = np.array_equal(revised.slip, status.slip)
             revised = replace(revised, pressing=status.pressing)
         if settled:
-            return _accepted(problem, status, trial, held)
+            break
         status = revised
-    raise ConvergenceError(
-        f"The contact did not settle within {_MOST_ITERATIONS} iterations on the way to {goal}.",
-        why=f"Before it, {start.load:.6g} N were borne at a depth of {start.depth * 1e6:.6g} um.",
-        cure="Try another number of rings, or a friction coefficient nearby.",
-    )
+    else:
+        raise ConvergenceError(
+            f"The contact did not settle within {_MOST_ITERATIONS} iterations on the way to "
+            f"{goal}.",
+            why=f"Before it, {start.load:.6g} N were borne at a depth of {start.depth * 1e6:.6g} "
+            "um.",
+            cure="Try another number of rings, or a friction coefficient nearby.",
+        )
+    p, q, depth, _, u = trial
+    slip = np.where(status.pressing, status.slip, 0).astype(np.int8)
+    # What slips drags its anchor along, a slip length behind; what is free has none.
+    moving = ~status.pressing | (slip != 0)
+    anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
+    touching = status.pressing | (np.arange(p.size) == held)
+    load = float(problem.compliance.areas @ p)
+    return ContactState(p, q, depth, load, touching, slip, anchor, u)
 
 
 def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> BoolArray:
@@ -340,16 +351,3 @@ def _revised_separation(
     closing = status.pressing & (gap < before) & (p > 0)
     borne = law.separation(np.where(closing, p, 1.0), film)
     return np.where(closing, np.clip(borne, gap, before), after)
-
-
-def _accepted(
-    problem: ContactProblem, status: _Status, trial: _Trial, held: int | None
-) -> ContactState:
-    p, q, depth, _, u = trial
-    slip = np.where(status.pressing, status.slip, 0).astype(np.int8)
-    # What slips drags its anchor along, a slip length behind; what is free has none.
-    moving = ~status.pressing | (slip != 0)
-    anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
-    touching = status.pressing | (np.arange(p.size) == held)
-    load = float(problem.compliance.areas @ p)
-    return ContactState(p, q, depth, load, touching, slip, anchor, u)

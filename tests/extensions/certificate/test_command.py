@@ -5,13 +5,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers.console import Run, names
+from helpers.console import names
 
 DATA = Path(__file__).parents[3] / "calibration_data"
 
 
 @pytest.fixture
-def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+def inputs(tmp_path, monkeypatch) -> tuple[str, ...]:
     """The shipped artifact, and the shipped file of a laboratory for its sensor."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(DATA / "rod_scan_65.apparatus.h5", "scan.apparatus.h5")
@@ -19,7 +19,7 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     return ("scan.apparatus.h5", "--lab", "lab.toml")
 
 
-def test_one_certificate_is_written_in_both_forms_of_text(run: Run, inputs):
+def test_one_certificate_is_written_in_both_forms_of_text(run, inputs):
     outputs = ("-o", "c.html", "-o", "c.xml")
     made = run("certificate", *inputs, *outputs).exits(0, "Written: c.html, c.xml")
     assert "conversion constant  conforms" in made.out
@@ -32,7 +32,7 @@ def test_one_certificate_is_written_in_both_forms_of_text(run: Run, inputs):
     assert (item["name"], item["conforms"]) == ("conversion_constant", True)
 
 
-def test_missing_fields_are_all_named_and_nothing_is_written(run: Run, inputs):
+def test_missing_fields_are_all_named_and_nothing_is_written(run, inputs):
     Path("lab.toml").write_text('[laboratory]\nname = "a"\n', "utf-8")
     refused = run("certificate", *inputs, "-o", "c.pdf").exits(3, "lab.toml", "load cell")
     keys = "[laboratory] city", "[customer] name", "[sensor] serial", "[conditions] start_time"
@@ -44,11 +44,11 @@ def test_missing_fields_are_all_named_and_nothing_is_written(run: Run, inputs):
     (("-o", "c.txt"), 2, "'c.txt' does not end in .html, .pdf, .xml"), ((), 2, "--output"),
     (("-o", "a.xml", "-o", "a.xml"), 2, "same name"), (("-o", "nowhere/c.xml"), 4, "nowhere"),
 ])  # fmt: skip
-def test_wrong_outputs_are_refused_first(run: Run, inputs, arguments, code, words):
+def test_wrong_outputs_are_refused_first(run, inputs, arguments, code, words):
     run("certificate", *inputs, *arguments).exits(code, words)
 
 
-def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run: Run, inputs, monkeypatch):
+def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     run("certificate", *inputs, "-o", "c.pdf").exits(3, "memscal[certificate]")
     run("certificate", *inputs, "-o", "c.html").exits(0)

@@ -3,7 +3,6 @@
 import base64
 import os
 from dataclasses import replace
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -143,7 +142,7 @@ def test_the_profile_is_that_of_the_page(root, certificate):
     assert len(g.findall(".//si:columnXMLList", NAMES)) == certificate.profile.r.size
 
 
-def test_the_artifact_in_it_is_whole_and_says_the_same(root, apparatus, tmp_path: Path):
+def test_the_artifact_in_it_is_whole_and_says_the_same(root, apparatus, tmp_path):
     held = found(root, ".//dcc:byteData/dcc:dataBase64").text
     assert held is not None
     path = tmp_path / "artifact.h5"

@@ -45,14 +45,14 @@ def written(folder: Path, text: str) -> Path:
         ("[sensor\n", "no TOML"),
     ],
 )
-def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path: Path, text: str, words: str):
+def test_what_a_file_may_not_hold_is_refused_by_name(tmp_path, text: str, words: str):
     with pytest.raises(MemscalError) as refusal:
         read_laboratory(written(tmp_path, text))
     assert words in str(refusal.value)
     assert "lab.toml" in str(refusal.value)
 
 
-def test_degrees_celsius_are_kelvins_of_another_zero_and_the_same_uncertainty(tmp_path: Path):
+def test_degrees_celsius_are_kelvins_of_another_zero_and_the_same_uncertainty(tmp_path):
     for value, unit in ((23.0, "degC"), (23.0, "°C"), (296.15, "K")):
         quantity = f'{{value = {value}, unit = "{unit}", uncertainty = 0.3}}'
         read = read_laboratory(written(tmp_path, f"[conditions]\ntemperature = {quantity}"))
@@ -75,7 +75,7 @@ def imported(folder: Path, *options: str) -> int:
     return main(["import", str(table), *given])
 
 
-def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_path: Path):
+def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_path):
     assert imported(tmp_path) == 0
     scan = tmp_path / "scan.h5"
     artifact = tmp_path / "artifact.h5"
@@ -96,6 +96,6 @@ def test_an_imported_scan_and_its_artifact_carry_the_file_but_no_customer(tmp_pa
         assert b"A. Placeholder" not in content
 
 
-def test_a_scan_that_says_otherwise_than_the_file_is_refused(tmp_path: Path, capsys):
+def test_a_scan_that_says_otherwise_than_the_file_is_refused(tmp_path, capsys):
     assert imported(tmp_path, "--sensor-name", "another") == 3
     assert "name of the sensor is 'a simulated sensor'" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from memscal.errors import DomainError, InputError
 R = np.linspace(0.0, 4e-3, 30)
 
 
-def test_a_light_rod_stresses_the_base_as_in_the_linear_film() -> None:
+def test_a_light_rod_stresses_the_base_as_in_the_linear_film():
     finite = indent(FILM, ROD, load=0.01, friction=math.inf, strain="finite")
     linear = indent(FILM, ROD, load=0.01, friction=math.inf)
     difference = finite.base_stress(R) - linear.base_stress(R)
@@ -38,6 +38,6 @@ def test_a_light_rod_stresses_the_base_as_in_the_linear_film() -> None:
         (SPHERE, {"load": 500.0}, DomainError, "contact would be"),
     ],
 )
-def test_what_is_not_modelled_at_finite_strain_is_refused(indenter, asked, error, message) -> None:
+def test_what_is_not_modelled_at_finite_strain_is_refused(indenter, asked, error, message):
     with pytest.raises(error, match=message):
         indent(FILM, indenter, **{"load": 0.1, "strain": "finite", **asked})

@@ -50,7 +50,7 @@ def relative_uncertainty(length: float, precision: Precision) -> float:
 
 
 @pytest.mark.parametrize("length", [7e-6, 50e-6])
-def test_a_slip_length_is_found_where_it_is_the_truth(length: float) -> None:
+def test_a_slip_length_is_found_where_it_is_the_truth(length: float):
     found = weighed("slipping", length)
     assert found.yielding_preferred
     assert all(factor.favoured == found.laws[-1].name for factor in found.factors)
@@ -60,7 +60,7 @@ def test_a_slip_length_is_found_where_it_is_the_truth(length: float) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2])
-def test_an_effective_coefficient_is_found_where_it_is_the_truth(friction: float) -> None:
+def test_an_effective_coefficient_is_found_where_it_is_the_truth(friction: float):
     found = weighed("rigid", friction)
     assert not found.yielding_preferred
     one, each, slip = found.laws
@@ -69,7 +69,7 @@ def test_an_effective_coefficient_is_found_where_it_is_the_truth(friction: float
     assert each.best == pytest.approx([friction] * len(LOADS), abs=0.02)
 
 
-def test_more_freedom_is_charged_by_occams_factor() -> None:
+def test_more_freedom_is_charged_by_occams_factor():
     # Both explain the data without a misfit: the law of four parameters pays for them.
     one, each, _ = weighed("rigid", 0.2).laws
     assert each.least == pytest.approx(one.least, abs=0.5)
@@ -84,7 +84,7 @@ def test_more_freedom_is_charged_by_occams_factor() -> None:
         (lambda: normal(yielding(), 0.0), math.inf),
     ],
 )
-def test_a_rigid_interface_gives_an_upper_bound_of_the_length(compared, bound) -> None:
+def test_a_rigid_interface_gives_an_upper_bound_of_the_length(compared, bound):
     found = compared()
     assert not found.yielding_preferred
     assert found.length.value is None
@@ -93,14 +93,14 @@ def test_a_rigid_interface_gives_an_upper_bound_of_the_length(compared, bound) -
     assert "upper bound" in found.length.reason
 
 
-def test_without_friction_a_slip_length_has_no_upper_bound() -> None:
+def test_without_friction_a_slip_length_has_no_upper_bound():
     found = weighed("rigid", 0.0)
     assert found.length.value is None
     assert found.length.interval.high is None
     assert "lower bound" in found.length.reason
 
 
-def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load() -> None:
+def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load():
     implied = weighed("slipping", 16e-6).implied
     assert np.all(np.diff(implied.friction, axis=0) > 0)
     # A longer slip length means less friction.
@@ -117,7 +117,7 @@ def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load(
         assert on_axis[0] == pytest.approx(on_axis[1], rel=1e-4)
 
 
-def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() -> None:
+def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length():
     found = weighed("slipping", 16e-6)
     implied = found.implied
     length = found.length.value
@@ -142,23 +142,23 @@ def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() ->
 )
 def test_how_well_a_slip_length_can_be_known_is_what_the_documentation_says(
     length: float, precision: Precision, expected: float
-) -> None:
+):
     assert relative_uncertainty(length, precision) == pytest.approx(expected, rel=0.15)
 
 
-def test_the_papers_slip_length_cannot_be_known_to_a_fifth_from_data_like_the_papers() -> None:
+def test_the_papers_slip_length_cannot_be_known_to_a_fifth_from_data_like_the_papers():
     assert relative_uncertainty(1.82e-6, PAPER) > 0.7
     assert relative_uncertainty(1.82e-6, PRECISE) > 0.2
 
 
-def test_the_interval_is_as_wide_as_the_slope_of_the_likelihood_says() -> None:
+def test_the_interval_is_as_wide_as_the_slope_of_the_likelihood_says():
     found = weighed("slipping", 16e-6).length
     assert found.standard_uncertainty is not None
     expected = relative_uncertainty(16e-6, PRECISE) * 16e-6
     assert found.standard_uncertainty == pytest.approx(expected, rel=0.15)
 
 
-def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain() -> None:
+def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain():
     # Where nothing slips the law knows friction over slip length only: a change of one by a
     # tenth is undone by a change of the other.
     exact = slipping()
@@ -178,18 +178,18 @@ def normal(truth: ProfileFamily, value: float) -> LawComparison:
     return weigh_normal_compliance(measured(read_without_error(truth, value, PRECISE), yielding()))
 
 
-def test_a_normal_compliance_is_found_where_it_is_the_truth() -> None:
+def test_a_normal_compliance_is_found_where_it_is_the_truth():
     found = normal(yielding(), 2e-6)
     assert found.yielding_preferred
     assert found.length.value == pytest.approx(2e-6, rel=0.05)
 
 
-def test_nothing_measured_is_refused() -> None:
+def test_nothing_measured_is_refused():
     with pytest.raises(InputError, match="measured profiles, but none"):
         compare_interface([], None, macroscopic=1.6)
 
 
-def test_a_law_is_preferred_only_if_its_likelihood_speaks_for_it_too() -> None:
+def test_a_law_is_preferred_only_if_its_likelihood_speaks_for_it_too():
     found = weighed("slipping", 16e-6)
     one = found.factors[0]
     ratio = found.laws[-1].log_likelihood - found.laws[0].log_likelihood

@@ -28,7 +28,7 @@ def statistics(residual: np.ndarray, systematic: np.ndarray, noise: np.ndarray) 
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(seed) -> None:
+def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(seed):
     rng = np.random.default_rng(seed)
     residual = rng.normal(size=12)
     systematic = rng.normal(size=(12, 3))
@@ -40,7 +40,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncert
     assert chi_square.item() == pytest.approx(residual @ np.linalg.solve(covariance, residual))
 
 
-def test_a_law_that_makes_data_less_certain_pays_for_it() -> None:
+def test_a_law_that_makes_data_less_certain_pays_for_it():
     # Data as the noise alone has them: the larger systematic change has the smaller chi-square,
     # and the smaller likelihood.
     residual = np.array([1.0, -1.0, 1.0, -1.0, 1.0])
@@ -51,7 +51,7 @@ def test_a_law_that_makes_data_less_certain_pays_for_it() -> None:
     assert wide.item() < narrow.item()
 
 
-def test_data_without_any_misfit_have_no_chi_square() -> None:
+def test_data_without_any_misfit_have_no_chi_square():
     _, chi_square = log_likelihood(statistics(np.zeros(4), np.ones((4, 1)), np.ones(4)))
     assert chi_square.item() == pytest.approx(0.0, abs=1e-12)
 
@@ -98,7 +98,7 @@ class Linear:
 
 @pytest.mark.parametrize("loads", [1, 2, 4])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, loads) -> None:
+def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, loads):
     # The systematic changes correlate the parameters: alone each is known ten times worse.
     model = Linear(seed, loads)
     exact, best, errors = model.exact()
@@ -122,14 +122,14 @@ def evidence(values: np.ndarray, edges: np.ndarray, log: np.ndarray, prior: Prio
     return law.log_evidence
 
 
-def test_one_parameter_is_integrated_over_its_prior() -> None:
+def test_one_parameter_is_integrated_over_its_prior():
     values = np.linspace(-8, 8, 161)
     edges = np.concatenate([values[:1], (values[1:] + values[:-1]) / 2, values[-1:]])
     found = evidence(values, edges, -(values**2) / 2, lambda below: (below + 8) / 16)
     assert found == pytest.approx(LOG_2PI / 2 - np.log(16))
 
 
-def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence() -> None:
+def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence():
     # A likelihood that is narrow about 1: its evidence goes with the prior's density there.
     values = np.geomspace(1e-3, 1e3, 4001)
     edges = np.concatenate([values[:1], np.sqrt(values[1:] * values[:-1]), values[-1:]])
@@ -145,7 +145,7 @@ def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence() -
     [bounded_prior(0.3), log_uniform_prior(0.01, 10)],
     ids=["bounded", "log-uniform"],
 )
-def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior) -> None:
+def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior):
     weights = np.diff(prior(np.concatenate([[0.0], np.geomspace(1e-3, 50, 40), [np.inf]])))
     assert np.all(weights >= 0)
     assert weights.sum() == pytest.approx(1.0)
@@ -162,10 +162,10 @@ def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior) -> N
         (151.0, "very strong"),
     ],
 )
-def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor: float, words: str) -> None:
+def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor: float, words: str):
     # Their table: 1 to 3, 3 to 20, 20 to 150, above 150.
     assert BayesFactor("one", "other", float(np.log(factor))).words == words
 
 
-def test_a_bayes_factor_beyond_all_numbers_is_infinite() -> None:
+def test_a_bayes_factor_beyond_all_numbers_is_infinite():
     assert BayesFactor("one", "other", 5000.0).value == np.inf

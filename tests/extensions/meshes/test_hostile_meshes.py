@@ -23,6 +23,7 @@ from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileErro
 from memscal.extensions.meshes import mesh_files
 from memscal.extensions.meshes.mesh_files import Mesh, read_mesh
 
+AT_ONCE = pytest.mark.usefixtures("at_once")
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
 BOMB = "".join(
     f'<!ENTITY e{i} "{"".join([f"&e{i - 1};"] * 10) if i else "ha" * 10}">' for i in range(12)
@@ -75,7 +76,7 @@ def refused(path: Path, words="cannot be read", kind: type[MemscalError] = Forma
     ],
     ids=["laughs", "laughs", "file", "parameter", "document type"],
 )
-def test_entities_neither_grow_nor_open_a_file(tmp_path: Path, name, document_type):
+def test_entities_neither_grow_nor_open_a_file(tmp_path, name, document_type):
     (tmp_path / "other").write_text('<!ENTITY e11 "a secret">')
     path = tmp_path / name
     head = document_type.replace("{}", (tmp_path / "other").as_uri())
@@ -85,15 +86,14 @@ def test_entities_neither_grow_nor_open_a_file(tmp_path: Path, name, document_ty
 
 
 @pytest.mark.parametrize("text", ["<a>" * 10**5, f"<VTKFile>{'<b/>' * 10**5}</VTKFile>"])
-def test_absurd_xml_is_refused(tmp_path: Path, text):
+@AT_ONCE
+def test_absurd_xml_is_refused(tmp_path, text):
     path = tmp_path / "film.vtu"
     path.write_text(text)
     refused(path)
 
 
-def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(tmp_path, monkeypatch):
     """Eighty blocks of 16 MiB."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     block = zlib.compress(bytes(2**24), 9)
@@ -105,7 +105,8 @@ def test_compressed_blocks_of_gigabytes_meet_the_limits_and_leave_nothing(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path: Path, monkeypatch):
+@AT_ONCE
+def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path, monkeypatch):
     path = small(tmp_path / "film.vtu")
     monkeypatch.setattr(mesh_files, "_ANSWER", 0)
     size = path.stat().st_size
@@ -117,7 +118,7 @@ def test_what_a_reader_answers_is_bounded_by_the_size_of_the_mesh(tmp_path: Path
 
 
 def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path, monkeypatch
 ):
     path = small(tmp_path / "film.vtk")
     folder = tmp_path / "temporary"
@@ -150,7 +151,8 @@ def test_a_reader_that_is_killed_leaves_nothing_and_a_full_folder_is_no_damage(
         ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
     ],
 )
-def test_a_count_beyond_the_files_size_is_refused(tmp_path: Path, section_name, options):
+@AT_ONCE
+def test_a_count_beyond_the_files_size_is_refused(tmp_path, section_name, options):
     path = small(tmp_path / "film.vtk", **options)
     head, name, rest = path.read_bytes().partition(section_name.encode() + b" ")
     rest = re.sub(rb"^\d+", b"900000000000", rest)
@@ -158,7 +160,7 @@ def test_a_count_beyond_the_files_size_is_refused(tmp_path: Path, section_name, 
     refused(path)
 
 
-def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path):
+def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path):
     path = tmp_path / "film.vtk"
     path.write_text(
         "# vtk DataFile Version 3.0\na title\nASCII\nDATASET STRUCTURED_POINTS\n"
@@ -168,7 +170,8 @@ def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path)
 
 
 @pytest.mark.parametrize("kind", ["polygon", "VTK_LAGRANGE_TRIANGLE"])
-def test_cells_that_state_their_own_size_are_read(tmp_path: Path, kind):
+@AT_ONCE
+def test_cells_that_state_their_own_size_are_read(tmp_path, kind):
     mesh = meshio.Mesh(SMALL.points, [(kind, SMALL.cells[0].data[:, :3])])
     meshio.vtk.write(tmp_path / "film.vtk", mesh)
     meshio.vtu.write(tmp_path / "film.vtu", mesh)
@@ -178,7 +181,8 @@ def test_cells_that_state_their_own_size_are_read(tmp_path: Path, kind):
 
 
 @pytest.mark.parametrize("offsets", ["3000000000 4", "-4 4", "0 4", "4 9", "4.0 8.0"])
-def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets):
+@AT_ONCE
+def test_a_cell_with_billions_of_nodes_is_refused(tmp_path, offsets):
     path = tmp_path / "film.vtu"
     mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
     meshio.vtu.write(path, mesh, binary=False)
@@ -199,14 +203,15 @@ def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets):
         "<![CDATA[/other/film.h5:/data9]]>",
     ],
 )
-def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path: Path, address):
+@AT_ONCE
+def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path, address):
     path = edited(small(tmp_path / "film.xdmf"), "film.h5:/data1", address)
     with h5py.File(tmp_path / "film.h5", "r") as file, h5py.File(tmp_path / "other.h5", "w") as to:
         file.copy("data1", to)
     refused(path, "takes its numbers from", UnsafeFileError)
 
 
-def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path: Path):
+def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path):
     path = small(tmp_path / "film.xdmf", data_format="XML")
     head, _, rest = path.read_text().partition('Format="XML"')
     rest = rest.partition("</DataItem>")[2]
@@ -214,7 +219,8 @@ def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path: Path):
     refused(path, "asks for the file /etc/passwd", UnsafeFileError)
 
 
-def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path: Path):
+@AT_ONCE
+def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path):
     path = small(tmp_path / "film.xdmf")
     mesh = read_mesh(path)
     assert [source.file_name for source in mesh.sources] == ["film.xdmf", "film.h5"]
@@ -238,11 +244,13 @@ def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path: Pat
     ('Dimensions="10 9"', 'Dimensions="10 ten"', "cannot be read"),
     ('Dimensions="10 9"', 'Dimensions="9 10"', "cannot be read"),
 ])  # fmt: skip
-def test_xdmf_that_is_more_than_a_mesh_with_numbers_is_refused(tmp_path: Path, old, new, words):
+@AT_ONCE
+def test_xdmf_that_is_more_than_a_mesh_with_numbers_is_refused(tmp_path, old, new, words):
     refused(edited(small(tmp_path / "film.xdmf", data_format="XML"), old, new), words)
 
 
-def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_not(tmp_path: Path):
+@AT_ONCE
+def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_not(tmp_path):
     path = small(tmp_path / "film.xdmf")
     edited(path, "<Xdmf ", '<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []><Xdmf ')
     assert read_mesh(path).point_data["S9"].shape == (10, 9)
@@ -253,7 +261,8 @@ def test_a_series_of_xdmf_is_refused_and_a_document_type_as_fenics_writes_it_is_
     refused(path, "Unknown section 'Grid'")
 
 
-def test_entities_in_the_text_of_xml_do_not_grow(tmp_path: Path):
+@AT_ONCE
+def test_entities_in_the_text_of_xml_do_not_grow(tmp_path):
     """meshio parses the text of an element again, as XML."""
     path = small(tmp_path / "film.xdmf")
     bomb = f"<Information><![CDATA[<!DOCTYPE a [{BOMB}]><a>&e11;</a>]]></Information>"
@@ -268,7 +277,8 @@ def test_entities_in_the_text_of_xml_do_not_grow(tmp_path: Path):
     ('NumberOfPoints="10"', 'NumberOfPoints="11"', "cannot be read as a mesh"),
     ('Name="connectivity"', 'Name="joints"', "connectivity"),
 ])  # fmt: skip
-def test_a_vtu_file_of_another_shape_is_refused(tmp_path: Path, old, new, words):
+@AT_ONCE
+def test_a_vtu_file_of_another_shape_is_refused(tmp_path, old, new, words):
     refused(edited(small(tmp_path / "film.vtu"), old, new), words)
 
 
@@ -280,12 +290,14 @@ TEXTS = '<DataArray type="String" Name="names" format="ascii">104 105 0</DataArr
     ("<PointData>", f"<PointData>{TEXTS}", "String"),
     ("<UnstructuredGrid>", f"<UnstructuredGrid><FieldData>{TEXTS}</FieldData>", "String"),
 ])  # fmt: skip
+@AT_ONCE
 def test_vtu_that_meshio_does_not_read_is_refused_with_the_form_it_reads(tmp_path, old, new, words):
     message = refused(edited(small(tmp_path / "film.vtu"), old, new), words)
     assert "data mode ASCII or Binary and without texts" in message
 
 
-def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path: Path):
+@AT_ONCE
+def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path):
     path = small(tmp_path / "film.vtu", binary=False)
     text = path.read_text()
     types = numbers_of(path, "types")
@@ -297,7 +309,8 @@ def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize(("name", "before"), [("film.vtu", 'Name="S9"'), ("film.vtk", "POINTS")])
-def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path: Path, name, before):
+@AT_ONCE
+def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path, name, before):
     path = small(tmp_path / name, binary=False)
     head, mark, rest = path.read_text().partition(before)
     ended = "\n" if name == "film.vtk" else ">"
@@ -306,7 +319,8 @@ def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path: Path, name,
     refused(path, "string or file could not be read")
 
 
-def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path: Path):
+@AT_ONCE
+def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path):
     path = tmp_path / "film.vtu"
     meshio.vtu.write(path, meshio.Mesh(SMALL.points, [("quad", SMALL.cells[0].data + 100)]))
     refused(path, "a node that is not there")
@@ -316,14 +330,16 @@ def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path: Path):
     refused(path, "not finite")
 
 
-def test_text_from_a_mesh_cannot_steer_the_terminal(tmp_path: Path):
+@AT_ONCE
+def test_text_from_a_mesh_cannot_steer_the_terminal(tmp_path):
     mesh = meshio.Mesh(SMALL.points, SMALL.cells, point_data={"S\x9b[2J": np.zeros(10)})
     meshio.vtu.write(tmp_path / "film.vtu", mesh)
     assert list(read_mesh(tmp_path / "film.vtu").point_data) == ["S[2J"]
 
 
 @pytest.mark.parametrize("ending", [".vtu", ".vtk", ".xdmf"])
-def test_what_is_no_file_with_something_in_it_is_refused(tmp_path: Path, ending):
+@AT_ONCE
+def test_what_is_no_file_with_something_in_it_is_refused(tmp_path, ending):
     path = tmp_path / f"film{ending}"
     with pytest.raises(InputError, match="No such file"):
         read_mesh(path)
@@ -337,7 +353,8 @@ def test_what_is_no_file_with_something_in_it_is_refused(tmp_path: Path, ending)
         refused(path, "not a regular file", UnsafeFileError)
 
 
-def test_meshio_does_not_print_to_the_terminal(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+@AT_ONCE
+def test_meshio_does_not_print_to_the_terminal(tmp_path, capfd):
     """It warns on the terminal of a cell that it does not know; here this is a note."""
     path = small(tmp_path / "film.vtu", binary=False)
     types = numbers_of(path, "types")
@@ -361,7 +378,7 @@ vtk = types.SimpleNamespace(read=read)
 
 
 @pytest.fixture
-def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+def hostile(tmp_path, monkeypatch) -> Callable[[str], Path]:
     """A mesh whose reader does, in the place of meshio, what a damaged one could be made to do."""
 
     def with_reader(code: str) -> Path:
@@ -374,9 +391,7 @@ def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     return with_reader
 
 
-def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
-    tmp_path: Path, hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
-):
+def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(tmp_path, hostile, monkeypatch):
     secret = tmp_path / "secret"
     secret.write_text("a secret")
     monkeypatch.setenv("A_SECRET", "a secret")
@@ -416,17 +431,18 @@ def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
     ("import meshio.other", "No module named"),
     ("return types.SimpleNamespace(cells=[], points=[[print]], **NONE)", "ended by an error"),
 ], ids=["memory", "exit", "silence", "crash", "no mesh", "no module", "objects"])  # fmt: skip
-def test_whatever_ends_the_reader_is_an_error_of_ours(hostile: Callable[[str], Path], code, words):
+def test_whatever_ends_the_reader_is_an_error_of_ours(hostile, code, words):
     refused(hostile(code), words)
 
 
-def test_an_endless_reader_ends(hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch):
+def test_an_endless_reader_ends(hostile, monkeypatch):
     monkeypatch.setattr(mesh_files, "_SECONDS", 0.5)
     refused(hostile("while True:\n    pass"), "takes longer than 0.5", UnsafeFileError)
 
 
 @pytest.mark.parametrize("name", ["film.vtu", "film.vtk", "film.xdmf", "vtk_film.vtu"])
-def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path: Path, name):
+@AT_ONCE
+def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path, name):
     path = tmp_path / name
     if name == "vtk_film.vtu":
         path.write_bytes((Path(__file__).parents[2] / "data" / name).read_bytes())

@@ -17,6 +17,8 @@ from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.film_response import base_stress
 from memscal.model.film import ElasticFilm
 
+pytestmark = pytest.mark.usefixtures("at_once")
+
 DATA = Path(__file__).parents[2] / "data"
 
 
@@ -84,12 +86,12 @@ def test_a_mesh_as_paraview_writes_it_is_read_at_its_nodes_and_in_its_cells():
     ("film.vtu", {"header_type": "UInt64"}), ("film.vtk", {}), ("film.vtk", {"fmt_version": "4.2"}),
     ("film.xdmf", {}), ("film.xdmf", {"data_format": "XML"}),
 ])  # fmt: skip
-def test_every_kind_of_file_gives_the_same_stress(tmp_path: Path, name, options):
+def test_every_kind_of_file_gives_the_same_stress(tmp_path, name, options):
     assert_is_the_section(imported(saved(section(), tmp_path / name, **options), "S9"))
 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
-def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path: Path, compression):
+def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path, compression):
     path = tmp_path / "film.vtu"
     saved(section(), path, compression=compression, header_type="UInt64")
     raw = b""
@@ -111,11 +113,11 @@ def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path: Path, com
 @pytest.mark.parametrize(
     ("sigma", "plane"), [("S4", "xy"), ("S4", "yz"), ("S6", "xz"), ("S6", "yz"), ("S9", "xz")]
 )
-def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path: Path, sigma, plane):
+def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path, sigma, plane):
     assert_is_the_section(imported(saved(section(plane), tmp_path / "film.vtu"), sigma))
 
 
-def test_the_axis_across_the_film_can_be_named(tmp_path: Path):
+def test_the_axis_across_the_film_can_be_named(tmp_path):
     path = saved(section("yx"), tmp_path / "film.vtu")  # y is the radius, x the height
     (warning,) = [note for note in imported(path).notes if note.kind == "vertical_axis"]
     assert "8 mm along y but 2 mm along x" in warning.text
@@ -124,7 +126,7 @@ def test_the_axis_across_the_film_can_be_named(tmp_path: Path):
         imported(path, vertical="z")
 
 
-def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path: Path):
+def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path):
     mesh = section()
     mesh.point_data["S:2"] = mesh.point_data["S33"]
     path = saved(mesh, tmp_path / "film.vtu")
@@ -137,13 +139,13 @@ def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path: Path):
         imported(path, "S6:7")
 
 
-def test_a_film_hanging_from_its_base_has_its_shear_turned(tmp_path: Path):
+def test_a_film_hanging_from_its_base_has_its_shear_turned(tmp_path):
     mesh = section(heights=HEIGHTS - 2.0)
     # The stress of the base, now at y = 0, is that of the highest nodes.
     assert_is_the_section(imported(saved(mesh, tmp_path / "film.vtu"), base=0.0), turned=-1)
 
 
-def test_what_lies_below_the_base_of_the_film_is_left_out(tmp_path: Path):
+def test_what_lies_below_the_base_of_the_film_is_left_out(tmp_path):
     """Film and substrate share no nodes where the radial stress jumps, as programs save it."""
     film = section()
     substrate = section(heights=np.linspace(-1.0, 0.0, 3))
@@ -160,7 +162,7 @@ def test_what_lies_below_the_base_of_the_film_is_left_out(tmp_path: Path):
     np.testing.assert_allclose(found.sigma_zz, 1e6 * pressure(1e3 * found.r), rtol=1e-12)
 
 
-def test_a_rigid_bodys_own_node_and_the_faces_of_the_mesh_do_not_count(tmp_path: Path):
+def test_a_rigid_bodys_own_node_and_the_faces_of_the_mesh_do_not_count(tmp_path):
     mesh = section()
     lone = np.concatenate([mesh.points, [[0.0, -5.0, 0.0]]])
     fields = {"S6": np.concatenate([mesh.point_data["S6"], np.full((1, 6), np.nan)])}
@@ -174,7 +176,7 @@ def test_a_rigid_bodys_own_node_and_the_faces_of_the_mesh_do_not_count(tmp_path:
     assert imported(path, "C33").profile.force == pytest.approx(1.0, rel=1e-3)
 
 
-def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Path):
+def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path):
     mesh = section()
     corners = mesh.cells[0].data
     stress = mesh.point_data["S33"][corners] * [0.9, 1.1, 1.0, 1.0]
@@ -199,7 +201,7 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Pa
     ],
     ids=["quarter", "whole", "half, off the centre"],
 )
-def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x, y, centre):
+def test_a_film_in_3d_is_averaged_over_circles(tmp_path, x, y, centre):
     """Linear interpolation on squares of 0.2 mm costs at most 0.2² / 4 of the curvature."""
     place = (1e-3 * centre[0], 1e-3 * centre[1]) if any(centre) else None
     found = imported(saved(block(x, y, centre=centre), tmp_path / "film.vtu"), centre=place).profile
@@ -208,7 +210,7 @@ def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x, y, centre):
     assert found.force == pytest.approx(1.0, abs=0.01)
 
 
-def test_units_and_signs_are_those_that_are_given(tmp_path: Path):
+def test_units_and_signs_are_those_that_are_given(tmp_path):
     mesh = section()
     mesh.points = mesh.points * 1e-3
     mesh.point_data = {"p": -1e3 * mesh.point_data["S33"]}
@@ -223,7 +225,7 @@ def test_units_and_signs_are_those_that_are_given(tmp_path: Path):
         imported(path, "p", r_unit="kPa", sigma_unit="kPa", sign=1)
 
 
-def test_a_field_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path):
+def test_a_field_that_is_not_there_is_answered_with_those_that_are(tmp_path):
     path = saved(section(), tmp_path / "film.vtu")
     with pytest.raises(InputError, match=r"at the nodes: S4 \(4\).*in the cells: C33 \(1\)"):
         imported(path, "Stress")
@@ -232,7 +234,7 @@ def test_a_field_that_is_not_there_is_answered_with_those_that_are(tmp_path: Pat
         imported(path, "Stress")
 
 
-def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path: Path):
+def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path):
     with pytest.raises(InputError, match=r'"S6:2"'):
         imported(saved(section(), tmp_path / "film.xdmf"), "S6")
     assert imported(tmp_path / "film.xdmf", "S6:2").profile.sigma_rz is None
@@ -261,14 +263,14 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path: Path):
         (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
     ],
 )
-def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path: Path, mesh, options, words):
+def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path, mesh, options, words):
     path = saved(mesh, tmp_path / "film.vtk")
     with pytest.raises(InputError, match=words) as caught:
         imported(path, **options)
     assert caught.value.cure
 
 
-def test_a_value_that_is_no_number_is_refused_only_where_it_matters(tmp_path: Path):
+def test_a_value_that_is_no_number_is_refused_only_where_it_matters(tmp_path):
     mesh = section()
     inside = int(np.flatnonzero(mesh.points[:, 1] > 0)[5])
     mesh.point_data["S6"][inside] = np.nan

@@ -25,26 +25,26 @@ def paper() -> Design:
     return memscal.design()
 
 
-def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences() -> None:
+def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences():
     # About the middle of an even scan a drift, which is odd, tells nothing of the width.
     bound = cramer_rao(0.004, centre=(0.0, 0.0))["gaussian_sigma"]
     found = memscal.design(**EXACT, noise=0.004).parameters.uncertainty("gaussian_sigma")
     assert found == pytest.approx(bound, rel=1e-3)
 
 
-def test_twice_the_load_or_four_repeats_halve_what_a_voltage_of_noise_makes_of_sigma() -> None:
+def test_twice_the_load_or_four_repeats_halve_what_a_voltage_of_noise_makes_of_sigma():
     changes: list[dict[str, Any]] = [{}, {"load": 2.0}, {"repeats": 4}]
     plans = [memscal.design(**EXACT, noise_voltage=5e-5, **change) for change in changes]
     once, heavy, often = (plan.relative_uncertainty("gaussian_sigma") for plan in plans)
     assert [heavy, often] == pytest.approx([once / 2, once / 2], rel=1e-6)
 
 
-def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper: Design) -> None:
+def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper: Design):
     again = memscal.design(noise_voltage=paper.plan.point_noise)
     np.testing.assert_allclose(again.parameters.covariance, paper.parameters.covariance)
 
 
-def test_the_loads_uncertainty_is_as_much_of_a() -> None:
+def test_the_loads_uncertainty_is_as_much_of_a():
     # At finite strain the load changes the shape of the stress, too.
     film = replace(PAPER_FILM, law="linear")
     planned = memscal.design(load_uncertainty=0.03, film=film)
@@ -53,7 +53,7 @@ def test_the_loads_uncertainty_is_as_much_of_a() -> None:
     assert planned.largest_source("conversion_constant") == "load"
 
 
-def test_without_uncertain_inputs_only_noise_and_the_prior_are_left() -> None:
+def test_without_uncertain_inputs_only_noise_and_the_prior_are_left():
     budget = memscal.design(**EXACT).budget["gaussian_sigma"]
     # The posterior mean of a Gaussian's voltages departs from them by far less than their noise.
     assert 0 < budget.pop("misfit") < 1e-2 * budget["noise"]
@@ -61,12 +61,12 @@ def test_without_uncertain_inputs_only_noise_and_the_prior_are_left() -> None:
     assert all(part < small for source, part in budget.items() if source != "noise")
 
 
-def test_the_expected_noise_is_the_one_that_was_planned() -> None:
+def test_the_expected_noise_is_the_one_that_was_planned():
     solution, _ = expected_calibration(Plan(repeats=3), create_regulariser("evidence"))
     assert solution.estimate.weighed.noise == pytest.approx(1.0, abs=0.02)
 
 
-def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
+def test_expectations_are_the_means_over_draws_of_the_noise():
     """Weights of the hypotheses, and the resolved band: expected at once, or one scan at a time."""
     expected, _ = expected_calibration(
         Plan(film=EXACT_FILM, rod=EXACT_ROD, load_uncertainty=None), create_regulariser("evidence")
@@ -83,7 +83,7 @@ def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
     )
 
 
-def test_a_disc_is_expected_as_a_disc() -> None:
+def test_a_disc_is_expected_as_a_disc():
     disc = memscal.SmoothedDisc(radius=0.9e-3, sigma=0.2e-3)
     planned = memscal.design(kernel=disc, repeats=100, noise=0.002)
     flat = planned.r < 1.5e-3
@@ -96,7 +96,7 @@ def test_a_disc_is_expected_as_a_disc() -> None:
     assert ours < 0.5 * theirs
 
 
-def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design) -> None:
+def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design):
     other = memscal.design(method="white-noise")
     assert other.method == "white-noise"
     assert other.budget["fwhm"]["window"] > 0
@@ -105,7 +105,7 @@ def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design
         paper.relative_uncertainty("colour")
 
 
-def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
+def test_plans_are_varied_one_number_at_a_time(paper: Design):
     steps = [0.2e-3, 0.5e-3, 4e-3]
     designs = varied_designs(paper, "step", steps)
     # Of the last, five positions, nothing can be determined.
@@ -115,10 +115,10 @@ def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
 
 
 @pytest.mark.parametrize(("want", "vary"), [
-    ({"A": 0.016}, "step"), ({"sigma": 0.027}, "repeats"), ({"A": 0.02}, "half_range"),
+    ({"A": 0.016}, "step"), ({"A": 0.02}, "half_range"),
     ({"resolved": 3.8e3}, "repeats"), ({"A": 0.018, "sigma": 0.028}, "repeats"),
 ])  # fmt: skip
-def test_what_is_found_reaches_the_target_and_one_less_does_not(want, vary) -> None:
+def test_what_is_found_reaches_the_target_and_one_less_does_not(want, vary):
     found = memscal.design(noise=0.01, want=want, vary=vary)
     less = {
         "step": {"step": 2 * found.plan.half_range / (found.plan.positions - 2)},
@@ -141,10 +141,10 @@ def reaches(planned: Design, want: dict[str, float]) -> bool:
     ({"sigma": 0.01}, "repeats", r"the best is .* of sigma of 2\.39.*\n.*thickness"),
     ({"A": 0.005}, "step", r"\nload alone contributes 1\.06 %"),
     ({"resolved": 7e3}, "repeats", "passes little"),
-    ({"resolved": 20e3}, "half_range", "best is a resolved wavenumber"),
+    ({"resolved": 20e3}, "step", "best is a resolved wavenumber"),
     ({"resolved": 4e3, "step": 1e-3}, "repeats", r"step of 1 mm samples no more than 3\.142"),
 ])  # fmt: skip
-def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, vary, told) -> None:
+def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, vary, told):
     step = want.pop("step", 0.25e-3)
     with pytest.raises(FitError, match=told):
         memscal.design(step=step, want=want, vary=vary)
@@ -160,12 +160,12 @@ def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, v
     ({"half_range": 8.0}, "positions"),
     ({"kernel": memscal.GaussianMixture(sigmas=(0.561e-6,))}, "a point to a film of 2 mm"),
 ])  # fmt: skip
-def test_a_plan_that_makes_no_scan_is_refused(given: dict[str, Any], told: str) -> None:
+def test_a_plan_that_makes_no_scan_is_refused(given: dict[str, Any], told: str):
     with pytest.raises(InputError, match=told):
         Plan(**given)
 
 
-def test_too_few_positions_or_too_short_a_range_determine_nothing() -> None:
+def test_too_few_positions_or_too_short_a_range_determine_nothing():
     with pytest.raises(FitError, match="5 measured positions; at least 6"):
         memscal.design(step=2e-3, half_range=4e-3)
     with pytest.raises(FitError, match="not distinct from zero"):
@@ -175,14 +175,14 @@ def test_too_few_positions_or_too_short_a_range_determine_nothing() -> None:
 @pytest.mark.parametrize(
     ("step", "half_range", "count"), [(0.25e-3, 8e-3, 65), (0.1e-3, 0.7e-3, 15), (0.3e-3, 8e-3, 54)]
 )
-def test_positions_are_whole_steps_within_the_range(step, half_range, count) -> None:
+def test_positions_are_whole_steps_within_the_range(step, half_range, count):
     scan = Plan(step=step, half_range=half_range).scan()
     assert scan.x.size == count
     np.testing.assert_allclose(np.diff(scan.x), step)
     assert scan.x[-1] <= half_range * (1 + 1e-6)
 
 
-def test_noise_is_a_share_of_the_signal_above_the_sensor() -> None:
+def test_noise_is_a_share_of_the_signal_above_the_sensor():
     plan = Plan(noise=0.02)
     assert plan.point_noise == pytest.approx(0.02 * float(plan.scan().u_zz.max()), rel=1e-6)
     assert Plan(noise_voltage=3e-5).point_noise == 3e-5

@@ -1,15 +1,13 @@
 """``memscal simulate``."""
 
-from pathlib import Path
-
 import numpy as np
-from helpers.console import Run, names
+from helpers.console import names
 from helpers.records import assert_same
 
 import memscal
 
 
-def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
+def test_the_defaults_are_those_of_the_library(run, folder):
     run("simulate").exits(0)
     assert names(folder) == ["synthetic_scan.h5"]
     found = memscal.read_scan("synthetic_scan.h5")

@@ -29,7 +29,7 @@ def truth(scan: Scan) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
-def test_the_voltage_over_the_plane_is_the_constant_times_each_load(friction: float) -> None:
+def test_the_voltage_over_the_plane_is_the_constant_times_each_load(friction: float):
     scan = simulate_contacts(
         load=[0.34, 1.37],
         friction=friction,
@@ -46,7 +46,7 @@ def test_the_voltage_over_the_plane_is_the_constant_times_each_load(friction: fl
     np.testing.assert_allclose(total, 3e-8 * np.array([0.34, 1.37]), rtol=1e-6)
 
 
-def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) -> None:
+def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int):
     options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
@@ -65,7 +65,7 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) ->
     assert np.all(np.abs(scan.u_zz - expected) < 3e-4 * top)
 
 
-def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads() -> None:
+def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads():
     law = memscal.Interface(slip_length=3e-6)
     scan = simulate_contacts(load=1.37, friction=0.8, interface=law, points=17, **EXACT)
     contact = memscal.indent(LINEAR.expected, PAPER_SPHERE, load=1.37, friction=0.8, interface=law)
@@ -79,7 +79,7 @@ def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads() -> None:
         assert scan.u_zz[i] == pytest.approx(1e-7 * float(np.sum(weight * stress)), rel=1e-4)
 
 
-def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -> None:
+def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads():
     heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
     np.testing.assert_allclose(heavy.u_zz, simulate_contacts(load=[1.1], **EXACT).u_zz, rtol=1e-12)
     assert (heavy.load, truth(heavy)["load_1"]) == pytest.approx((1.0, 1.1))
@@ -91,7 +91,7 @@ def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -
     [
         ({"load": []}, InputError, "list of loads is empty"),
         ({"load": [0.3, 0.3]}, InputError, "given twice"),
-        ({"load": 1e7}, DomainError, "load|film"),
+        ({"load": 1e12}, DomainError, "load|film"),
         ({"points": 1}, InputError, "two contacts"),
         ({"repeats": 0}, InputError, "one row"),
         ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
@@ -103,7 +103,7 @@ def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -
         ({"kernel": 561e-6}, InputError, "transform"),
     ],
 )
-def test_what_cannot_be_scanned_is_refused(options, error, problem) -> None:
+def test_what_cannot_be_scanned_is_refused(options, error, problem):
     with pytest.raises(error, match=problem):
         simulate_contacts(**{"load": [0.34], **options})
 
@@ -112,7 +112,7 @@ FEW: dict[str, Any] = {"loads": [0.69], "lubricated_loads": [0.69], "points": 9,
 NOMINAL = Reality(film=PAPER_FILM, rod=PAPER_ROD, sphere=PAPER_SPHERE)
 
 
-def test_the_scans_of_one_seed_share_no_noise() -> None:
+def test_the_scans_of_one_seed_share_no_noise():
     options = {**FEW, "friction": 0.0, "load_scatter": 0.0, "position_error": 0.0}
     noisy = simulate_experiment(**options, noise=0.01)
     still = simulate_experiment(**options, noise=0.0)
@@ -125,7 +125,7 @@ def test_the_scans_of_one_seed_share_no_noise() -> None:
     assert np.abs(again.dry.u_zz - noisy.dry.u_zz).min() > 0
 
 
-def test_what_is_drawn_scatters_as_it_is_stated() -> None:
+def test_what_is_drawn_scatters_as_it_is_stated():
     draws = [drawn(NOMINAL, 0.01, seed) for seed in range(2000)]
     film = PAPER_FILM
     sampled = {
@@ -146,7 +146,7 @@ def test_what_is_drawn_scatters_as_it_is_stated() -> None:
     assert np.abs(np.corrcoef(own) - np.eye(len(own))).max() < 6 / np.sqrt(len(draws))
 
 
-def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones() -> None:
+def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones():
     found = simulate_experiment(**FEW, **EXACT, draw_inputs=True, seed=3)
     told = truth(found.dry)
     rod = truth(found.rod)
@@ -182,7 +182,7 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
     np.testing.assert_allclose(found.rod.u_zz, pressed.u_zz, rtol=1e-12)
 
 
-def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> None:
+def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface():
     normal = memscal.ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6)
     law = memscal.Interface(normal=normal, slip_length=2e-6)
     found = simulate_experiment(**FEW, load_scatter=0.0, friction=0.3, interface=law)
@@ -199,6 +199,6 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
     ({"loads": []}, "list of loads is empty"), ({"rod_load": 0.0}, "load"),
     ({"repeats": 0}, "one row"),
 ])  # fmt: skip
-def test_an_experiment_that_cannot_be_made_is_refused(options, problem) -> None:
+def test_an_experiment_that_cannot_be_made_is_refused(options, problem):
     with pytest.raises(InputError, match=problem):
         simulate_experiment(**{**FEW, **options})

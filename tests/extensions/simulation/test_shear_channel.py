@@ -18,7 +18,7 @@ LINEAR = replace(PAPER_FILM, law="linear", poisson_ratio_uncertainty=None)
 BOTH = {"shear": (KERNEL, 4e-8)}
 
 
-def test_the_normal_channel_is_the_same_with_and_without_the_other() -> None:
+def test_the_normal_channel_is_the_same_with_and_without_the_other():
     for make in (memscal.simulate, simulate_contacts):
         one = make(seed=3)
         other = make(seed=3, **BOTH)
@@ -27,14 +27,14 @@ def test_the_normal_channel_is_the_same_with_and_without_the_other() -> None:
         assert set(other.channels) == {"u_xz", "u_xz_errors"}
 
 
-def test_a_rod_s_shear_is_odd_about_the_sensor_and_falls_where_the_rod_is_beyond_it() -> None:
+def test_a_rod_s_shear_is_odd_about_the_sensor_and_falls_where_the_rod_is_beyond_it():
     scan = simulate(film=LINEAR, centre=(0.0, 0.0), **QUIET, **BOTH)
     u = scan.channels["u_xz"]
     np.testing.assert_allclose(u, -u[::-1], atol=1e-12 * np.abs(u).max())
     assert u[scan.x > 0].max() < 0 < u[scan.x < 0].min()
 
 
-def test_a_raster_s_shear_is_one_component_of_a_vector_field() -> None:
+def test_a_raster_s_shear_is_one_component_of_a_vector_field():
     scan = simulate(raster=True, points=21, centre=(0.0, 0.0), **QUIET, **BOTH)
     u = scan.channels["u_xz"]
     np.testing.assert_allclose(u, -u[:, ::-1], atol=1e-12 * np.abs(u).max())
@@ -43,7 +43,7 @@ def test_a_raster_s_shear_is_one_component_of_a_vector_field() -> None:
     np.testing.assert_allclose(np.hypot(u, u.T), np.hypot(u, u.T)[:, ::-1], rtol=1e-6)
 
 
-def test_a_narrow_g_shows_the_shear_of_rod_and_sphere_at_its_friction() -> None:
+def test_a_narrow_g_shows_the_shear_of_rod_and_sphere_at_its_friction():
     options = {**QUIET, **BOTH, "centre": (0.0, 0.0), "film": LINEAR}
     options["shear"] = (GaussianMixture(sigmas=(5e-6,)), 4e-8)
     exact = {"load_scatter": 0.0, "position_error": 0.0, "load": 1.37, **options}
@@ -56,13 +56,13 @@ def test_a_narrow_g_shows_the_shear_of_rod_and_sphere_at_its_friction() -> None:
         np.testing.assert_allclose(found, expected, atol=close * np.abs(expected).max())
 
 
-def test_the_truth_of_the_channel_is_stored() -> None:
+def test_the_truth_of_the_channel_is_stored():
     scan = simulate(seed=5, **BOTH)
     assert scan.synthetic["conversion_constant_xz"] == 4e-8
     assert scan.synthetic["gaussian_sigma_xz"] == 400e-6
 
 
-def test_a_whole_experiment_has_the_channel_in_all_of_its_scans() -> None:
+def test_a_whole_experiment_has_the_channel_in_all_of_its_scans():
     for scan in simulate_experiment(loads=[0.69], lubricated_loads=[0.69], **BOTH).scans.values():
         assert "u_xz" in scan.channels
         assert scan.synthetic["conversion_constant_xz"] == 4e-8
@@ -71,12 +71,12 @@ def test_a_whole_experiment_has_the_channel_in_all_of_its_scans() -> None:
 @pytest.mark.parametrize(
     ("shear", "problem"), [((KERNEL, 0.0), "channel xz is 0"), ((4e-4, 5e-8), "transform")]
 )
-def test_a_channel_without_an_apparatus_function_or_a_constant_is_refused(shear, problem) -> None:
+def test_a_channel_without_an_apparatus_function_or_a_constant_is_refused(shear, problem):
     with pytest.raises(InputError, match=problem):
         memscal.simulate(shear=shear)
 
 
-def test_the_arguments_of_an_earlier_version_make_the_same_scan_with_a_warning() -> None:
+def test_the_arguments_of_an_earlier_version_make_the_same_scan_with_a_warning():
     old = {"channels": ("zz", "xz"), "shear_kernel": KERNEL, "noise": 0.01, "drift": 0.1}
     with pytest.warns(DeprecationWarning, match="becomes") as warned:
         found = memscal.simulate(**old, seed=2)

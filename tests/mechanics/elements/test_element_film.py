@@ -38,7 +38,7 @@ def worst(found: np.ndarray, expected: np.ndarray, scale: np.ndarray) -> float:
         for width in (0.5, 1.7)
     ],
 )
-def test_surface_and_base_are_as_by_hankel_transforms(nu: float, width: float) -> None:
+def test_surface_and_base_are_as_by_hankel_transforms(nu, width) -> None:
     ours = elements(nu, width)
     hankel = HankelFilm(ours.film, ours.r)
     p, q = tractions(ours.r)

@@ -33,7 +33,7 @@ def test_quadratic_triangles_cover_the_film_anticlockwise() -> None:
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
-def test_the_stress_balances_the_tractions_on_both_faces(nu: float) -> None:
+def test_the_stress_balances_the_tractions_on_both_faces(nu) -> None:
     field, mesh, rings, pressure = solved(nu)
     r, z = mesh.points.T
     top = np.isclose(z, H, atol=1e-12)

@@ -31,7 +31,7 @@ def test_a_path_and_its_end_alone_are_one_contact() -> None:
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
-def test_what_sticks_gives_back_the_work_done(nu: float) -> None:
+def test_what_sticks_gives_back_the_work_done(nu) -> None:
     for contact in indent(film(nu), SPHERE, load=[0.5, 2.0], friction=math.inf, rings=64):
         assert contact.dissipated_energy == 0
         assert contact.work == pytest.approx(contact.elastic_energy, rel=1e-3)
@@ -39,7 +39,7 @@ def test_what_sticks_gives_back_the_work_done(nu: float) -> None:
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 @pytest.mark.parametrize("friction", [0.05, 0.2])
-def test_work_is_stored_or_lost_to_friction(nu: float, friction: float) -> None:
+def test_work_is_stored_or_lost_to_friction(nu, friction) -> None:
     previous = 0.0
     for contact in indent(film(nu), SPHERE, load=[0.5, 2.0, 1.0, 2.0], friction=friction, rings=64):
         assert contact.work is not None
