@@ -22,7 +22,7 @@ from memscal.estimation.reference_spectra import (
     difference,
     law_sensitivities,
 )
-from memscal.mechanics.film_response import base_normal_from_pressure, base_shear_from_pressure
+from memscal.mechanics.film_response import base_normal, base_shear
 from memscal.mechanics.press_rod import is_tabulated
 from memscal.model.arrays import FloatArray
 from memscal.model.film import NEO_HOOKEAN
@@ -132,9 +132,9 @@ def _film_changes(
     k = reference.wavenumbers.k
     nothing = np.zeros_like(k)
     x = np.minimum(k * film.thickness, _LARGEST_KH)
-    bonded = base_normal_from_pressure(x, film.poisson_ratio)
+    bonded, _ = base_normal(x, film.poisson_ratio)
     sliding = 2 * (np.sinh(x) + x * np.cosh(x)) / (np.sinh(2 * x) + 2 * x)
-    shear = base_shear_from_pressure(x, film.poisson_ratio)
+    shear, _ = base_shear(x, film.poisson_ratio)
     changes = {
         "base_slip": (reference.values * (sliding / bonded - 1), nothing),
         "shear_sensitivity": (-reference.values * k * shear / bonded, nothing),
