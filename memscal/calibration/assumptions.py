@@ -14,6 +14,8 @@ from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
 
 _ASKED_FOR = ("poisson_ratio", "thickness", "load_scale")
+#: Lines that pass farther away, in widths of the Gaussian, are hardly those of one stage.
+_FARTHEST = 2.0
 #: Correlations of neighbours that are tried.
 _CORRELATIONS = np.linspace(0.02, 0.98, 49)
 #: By name the uncertainty that a scan, its film or its sensor states.
@@ -45,6 +47,25 @@ def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ..
         if name in sizes and (state != STATED or name not in _ASKED_FOR):
             assumptions.append(Assumption(name, state, sizes[name]))
     return tuple(assumptions)
+
+
+def at_offsets(solution: Solution) -> Solution:
+    """Solve crossed lines again at the offset at which each passes, by the other's centre."""
+    # The lines are those of one stage, along x at y = 0 and along y at x = 0.
+    points = solution.estimate.points
+    if points.order or points.planar or not points.ellipse:
+        return solution
+    centres = solution.estimate.centres
+    scans = []
+    for scan, free in zip(solution.scans, points.free, strict=True):
+        axis = int(free[0])
+        offset = -float(centres[points.free[:, axis], axis].mean())
+        scans.append(replace(scan, line_offset=offset))
+    farthest = max(abs(scan.line_offset) for scan in scans)
+    if farthest > _FARTHEST * solution.estimate.gaussian.sigma:
+        return solution
+    moved = solve(scans, solution.stresses, solution.method, owners=solution.owners)
+    return replace(moved, apart=solution.apart)
 
 
 def less_mean_offset(solution: Solution) -> Solution:

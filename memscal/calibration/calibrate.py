@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
-from memscal.calibration.assumptions import assumptions_of, less_mean_offset
+from memscal.calibration.assumptions import assumptions_of, at_offsets, less_mean_offset
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.fields import RasterFields
@@ -240,7 +240,8 @@ def calibrate(
     if free:
         prepared = _with_thickness(prepared)
     given = (prepared.scans, prepared.stresses, request.method, channel)
-    solution = less_mean_offset(solve(*given, centre=centre, owners=prepared.owners))
+    solution = at_offsets(solve(*given, centre=centre, owners=prepared.owners))
+    solution = less_mean_offset(solution)
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")

@@ -64,6 +64,14 @@ def calibration_messages(
         messages.append(Message("experimental", text))
     if solution.per_repeat:
         messages.append(_centres(solution))
+    offsets = [abs(scan.line_offset) for scan in solution.scans]
+    if max(offsets) > 0:
+        distances = " and ".join(f"{offset * 1e3:.3f} mm" for offset in offsets)
+        text = (
+            f"The lines pass the sensor's centre at {distances}, each by the centre of the line "
+            "across it: their positions are taken as those of one stage."
+        )
+        messages.append(Message("line_offset", text))
     messages += point_messages(estimate)
     if estimate.points.u_errors is None:
         text = (

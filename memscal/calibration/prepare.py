@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -27,6 +28,7 @@ from memscal.model.notation import Reading
 from memscal.model.provenance import accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.stress import IdealReference, StressField, StressProfile
+from memscal.readings.crossed_lines import crossed_lines
 
 if TYPE_CHECKING:
     from memscal.calibration.film_inference import FreeThickness
@@ -80,6 +82,8 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
         problem = f"There is no choice of centre {request.centre!r}."
         raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
     require_size(as_stated)
+    if request.reference is None:
+        as_stated = tuple(chain(*map(crossed_lines, as_stated)))
     as_stated = require_one_sensor(as_stated)
     references = _references(request.reference, as_stated, request)
     for scan, given in zip(as_stated, references, strict=True):

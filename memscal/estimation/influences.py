@@ -67,10 +67,8 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
 
 
 def measured_by(points: ScanPoints) -> tuple[str, ...]:
-    """Return what points show by themselves: crossed lines an ellipse, a plane its centre too."""
-    if points.planar:
-        return "roundness", "line_offset"
-    return ("roundness",) if points.ellipse else ()
+    """Return what points show by themselves: planes and crossed lines an ellipse and its centre."""
+    return ("roundness", "line_offset") if points.ellipse else ()
 
 
 def _parabolas(estimate: ProfileEstimate) -> FloatArray:

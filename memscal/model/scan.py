@@ -191,6 +191,8 @@ class Scan:
         ``"x"`` or ``"y"``: which way a line scan ran across the sensor; its positions are in ``x``.
     position_scale_uncertainty : float, optional
         Relative standard uncertainty of the stage's scale, common to all positions.
+    line_offset : float
+        Distance at which a line passes the sensor's centre, in m.
     gain_uncertainty, gain_curvature_uncertainty : float, optional
         Relative standard uncertainty of the sensor's chain, common to all readings; and b of a
         reading :math:`U (1 - b\,U/U_{max})`.
@@ -247,6 +249,7 @@ class Scan:
     u_zz_correlation: FloatArray | None = None
     direction: str = "x"
     position_scale_uncertainty: float | None = None
+    line_offset: float = 0.0
     gain_uncertainty: float | None = None
     gain_curvature_uncertainty: float | None = None
     roundness_uncertainty: float | None = None
@@ -356,12 +359,12 @@ class Scan:
 
     @property
     def positions(self) -> tuple[FloatArray, FloatArray]:
-        """Position of every voltage along x and y, in m; each like ``u_zz``, zero across a line."""
+        """Position of every voltage along x and y, in m, each like ``u_zz``."""
         along = np.broadcast_to(self.x, self.u_zz.shape)
         if self.y is not None:
             y = self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1))
             return along, np.broadcast_to(y, along.shape)
-        across = np.zeros(self.u_zz.shape)
+        across = np.full(self.u_zz.shape, self.line_offset)
         return (across, along) if self.direction == "y" else (along, across)
 
     @property

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.console import Run
-from helpers.outside import ROUND, A, World
+from helpers.outside import ROUND, A, World, elliptic
 from helpers.outside import scan as outside_scan
 
 import memscal
@@ -118,3 +118,41 @@ def test_options_of_import_state_them(run: Run, tmp_path: Path) -> None:
         "base_slip": 0.1,
         "baseline_curvature": 0.0,
     }
+
+
+def crossed(world: World, *, offset: float = 0.0, seed: int = 1) -> list[memscal.Scan]:
+    """Lines along x at y = 0 and along y at x = 0 of a sensor at (offset, offset)."""
+    passing = replace(world, line_offset=-offset)
+    lines = []
+    for along in ("x", "y"):
+        line = outside_scan(passing, seed, noise=0.001, along=along)
+        lines.append(replace(line, x=line.x + offset))
+        seed += 1
+    return lines
+
+
+@pytest.mark.parametrize("world", [ROUND, elliptic(1.4)], ids=["round", "elliptic"])
+def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world: World) -> None:
+    calibration = memscal.calibrate(crossed(world, offset=0.3e-3))
+    apparatus = calibration.apparatus
+    # Without the offsets A is 4 % smaller.
+    error = apparatus.conversion_constant / A - 1
+    assert abs(error) < 1.5 * apparatus.parameters.uncertainty("conversion_constant") / A
+    ratio = (1 + apparatus.parameters["ellipticity"]) / (1 - apparatus.parameters["ellipticity"])
+    assert ratio**0.5 == pytest.approx(1.4 if world != ROUND else 1.0, abs=0.03)
+    states = {assumption.name: assumption.state for assumption in apparatus.assumptions}
+    assert states["roundness"] == states["line_offset"] == "measured"
+    texts = [m.text for m in apparatus.process.messages if m.kind == "line_offset"]
+    assert "at 0.30" in texts[0]
+
+
+def test_points_on_two_lines_are_two_lines() -> None:
+    lines = crossed(ROUND)
+    x = np.concatenate([lines[0].x, np.zeros(lines[1].x.size)]) + 3e-3
+    y = np.concatenate([np.zeros(lines[0].x.size), lines[1].x]) - 2e-3
+    u = np.concatenate([line.u_zz for line in lines])
+    errors = np.concatenate([line.u_zz_errors for line in lines])
+    points = memscal.calibrate(replace(lines[0], x=x, y=y, u_zz=u, u_zz_errors=errors)).apparatus
+    apart = memscal.calibrate(lines).apparatus
+    # One reading where they cross is of the first line.
+    assert points.conversion_constant == pytest.approx(apart.conversion_constant, rel=2e-3)
