@@ -73,6 +73,7 @@ DEFINITIONS: Mapping[str, tuple[str, Mapping[str, Record], tuple[str, ...]]] = {
             "reconvolution": records.RECONVOLUTION,
             "parameters": _ANYTHING,
             "quality": _ANYTHING,
+            "assumptions": _ANYTHING,
             **_SCANNED,
             "reference": records.REFERENCE_DATA,
             "process": records.PROCESS,

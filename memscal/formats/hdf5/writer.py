@@ -26,7 +26,7 @@ SCAN_SCHEMA = "memscal-scan"
 REFERENCE_SCHEMA = "memscal-reference"
 ARTIFACT_SCHEMA = "memscal-artifact"
 STRESS_SCHEMA = "memscal-stress"
-SCHEMA_VERSION = "1.1.0"
+SCHEMA_VERSION = "1.2.0"
 #: Those with an application definition, in ``formats/definitions``.
 DEFINED = (SCAN_SCHEMA, REFERENCE_SCHEMA, ARTIFACT_SCHEMA, STRESS_SCHEMA)
 
