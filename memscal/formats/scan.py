@@ -135,6 +135,8 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
     arrays: dict[str, Any] = {}
+    if file.has(f"{_DATA}/line_offset"):
+        arrays["line_offset"] = values.require_scalar(file, f"{_DATA}/line_offset", "length")
     for name in STATED_ERRORS:
         path = f"{_DATA}/{name}_errors"
         if file.has(path):
@@ -217,6 +219,8 @@ def _data_group(scan: Scan) -> Group:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, positions, axes if points else (along,))
+    if scan.line_offset:
+        data["line_offset"] = si(scan.line_offset, "length")
     for name in STATED_ERRORS:
         stated = getattr(scan, f"{name}_uncertainty")
         if stated is not None:
