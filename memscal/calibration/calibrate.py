@@ -17,16 +17,14 @@ from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import MemscalError
-from memscal.estimation.reference_spectra import (
-    expected_spectra,
-    press_neo_hookean,
-    reference_spectra,
-)
+from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.set_up import reference_profile
 from memscal.extensions import hook
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.assumptions import Assumption
+from memscal.model.film import LINEAR
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.model.sizes import MOST_OF_LINES
@@ -154,15 +152,16 @@ def calibrate(
         the first scan.
     alternative : StressProfile, Contact or path, optional
         The same by another model of the film.  Its difference is counted as a rectangular
-        uncertainty of the model's form, ``model_form``, in place of the neo-Hookean film's.
+        uncertainty of the model's form, ``model_form``, in place of the linear film's.
     film_law : str, optional
         Law by which the rod is solved: ``"linear"``, ``"neo-hookean"`` or ``"mooney-rivlin"`` (with
         ``mooney_rivlin_ratio``, :math:`C_2/C_1`).  By default the law that scan or reference
-        state; it counts as known.  Where none is stated the reference is that of a linear film,
-        and its difference from a neo-Hookean one is counted as ``model_form``.
+        state; it counts as known.  Where none is stated the reference is that of a neo-Hookean
+        film, and its difference from a linear one is counted as ``model_form``.
     rod_friction : float, optional
         0 or ``inf``: whether the film slides freely under the rod or sticks, which matters at
-        finite strain.  By default as the scan states it; else the difference is counted.
+        finite strain.  By default as the scan states it; else the reference is midway, and half
+        the difference is counted.
     channel : str, default "zz"
         ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
         by method ``"bayesian"``; see docs/tangential.md.
@@ -304,7 +303,7 @@ def _effects(
     if "model_form" in effects and (stresses or solved):
         # Two laws differ by too much for the first order.
         with suppress(MemscalError):
-            stresses = stresses or [press_neo_hookean(scan.set_up) for scan in scans]
+            stresses = stresses or [press_rod(*s.set_up.expected.under(LINEAR)) for s in scans]
             exact = solve(scans, stresses, solution.method, estimate.points.channel)
             effects["model_form"] = replace(effects["model_form"], exact=exact)
     return effects

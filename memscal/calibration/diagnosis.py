@@ -25,6 +25,7 @@ from memscal.estimation.reference_spectra import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
+from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.readings.mistaken_unit import mistaken_unit
@@ -285,7 +286,7 @@ def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
             rod = replace(rod, radius=rod.radius * factor)
         else:
             film = replace(film, thickness=film.thickness * factor)
-        return press_rod(replace(film, law="", mooney_rivlin_ratio=None), rod, _LOAD)
+        return press_rod(replace(film, law=LINEAR, mooney_rivlin_ratio=None), rod, _LOAD)
     profile = stress_table(stress)
     ideal = profile.ideal
     if ideal is not None:

@@ -22,7 +22,7 @@ from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.assumptions import ASSUMED, Assumption
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.film import LINEAR, NEO_HOOKEAN
+from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
@@ -179,15 +179,16 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         a, sigma = sign * _relative_changes(results, changes[by]) / RECTANGLE
         return f"would change A by {a:+.1%} and sigma by {sigma:+.1%}"
 
-    if law in ("", LINEAR):
-        rubber = f"a neo-Hookean film under a rod that sticks {changed('model_form', 1)}"
     if law == LINEAR:
+        rubber = f"a neo-Hookean film {changed('model_form', -1)}"
         text = f"The film is taken as linear elastic, as stated; {rubber}: it is not counted."
     elif not law:
-        text = (
-            "The film's law is not stated (film/law, --film-law), and the reference is that of a "
-            f"linear film; {rubber}."
-        )
+        text = "The film's law is not stated (film/law, --film-law): "
+        if isinstance(solution.stress, Contact):
+            taken = law_in_words(solution.stress.film_of_law.law)
+            text += f"it is taken as {taken}. "
+        other = LINEAR if "model_form" in changes else law_in_words(NEO_HOOKEAN)
+        text += f"A {other} film {changed('model_form', 1)}."
         if "model_form" in changes:
             text += " Changes up to that, of either sign, count as equally likely (model_form)."
     else:
@@ -197,12 +198,16 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         )
         if isinstance(solution.stress, Contact):
             text += f" The rod is found by {solution.stress.discretisation}."
-        if solution.scan.rod_friction is None:
-            text += (
-                " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "
-                f"--rod-friction): it is taken to stick, and sliding {changed('rod_friction', -1)}."
-            )
-            text += " The difference is counted (rod_friction)." * ("rod_friction" in changes)
+    if law != LINEAR and solution.scan.rod_friction is None:
+        text += (
+            " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "
+            "--rod-friction): "
+        )
+        if "rod_friction" in changes:
+            text += f"the reference is midway. A film that sticks {changed('rod_friction', 1)}, "
+            text += "one that slides by the opposite: that is counted (rod_friction)."
+        else:
+            text += f"it is taken to stick, and sliding {changed('rod_friction', 1)}."
     return [Message("film_law", text)]
 
 
@@ -229,7 +234,7 @@ def _unstated(solution: Solution) -> list[Message]:
         return []
     uncertainties = {"rod radius": solution.scan.set_up.indenter.radius_uncertainty}
     # At a given load the stress in a linear film does not depend on its modulus.
-    if film.law not in ("", LINEAR):
+    if film.law != LINEAR:
         uncertainties["Young's modulus"] = film.young_modulus_uncertainty
     return quality.uncertainty_unstated_messages(uncertainties)
 

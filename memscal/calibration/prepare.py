@@ -138,9 +138,11 @@ def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Sca
         scan = replace(scan, film=film, reference=None)
     stress = reference or scan.reference
     made_on = film_of(stress) if stress else None
-    if stress and made_on and made_on.law and scan.film and not scan.film.law:
-        ratio = made_on.mooney_rivlin_ratio
-        scan = replace(scan, film=replace(scan.film, law=made_on.law, mooney_rivlin_ratio=ratio))
+    if stress and made_on and made_on.law and scan.film:
+        if not scan.film.law:
+            ratio = made_on.mooney_rivlin_ratio
+            film = replace(scan.film, law=made_on.law, mooney_rivlin_ratio=ratio)
+            scan = replace(scan, film=film)
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         if made_on.law != LINEAR and scan.rod_friction is None and friction in (0.0, np.inf):
             scan = replace(scan, rod_friction=friction)

@@ -133,11 +133,11 @@ calibration_options = options_of(
     ),
     option("--alternative", FILE, metavar="FILE")(
         "The same stress by another model of the film (memscal-reference): its difference is "
-        "counted as an uncertainty of the model's form, in place of the neo-Hookean film's."
+        "counted as an uncertainty of the model's form, in place of the linear film's."
     ),
     option("--film-law", click.Choice(common.FILM_LAWS))(
         "Law of the film by which the rod is solved, taken as known. By default the one that scan "
-        "or reference state; else linear, and its difference from neo-hookean is counted "
+        "or reference state; else neo-hookean, and its difference from linear is counted "
         "(model_form)."
     ),
     option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
@@ -145,7 +145,7 @@ calibration_options = options_of(
     ),
     common.rod_friction_option(
         "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite"
-        " strain. By default as the scan states it; else it sticks, and the difference is counted."
+        " strain. By default as the scan states it; else midway, and the rest is counted."
     ),
     option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
         "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."

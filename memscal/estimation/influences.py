@@ -25,7 +25,7 @@ from memscal.estimation.reference_spectra import (
 from memscal.mechanics.film_response import base_normal, base_shear
 from memscal.mechanics.press_rod import is_tabulated
 from memscal.model.arrays import FloatArray
-from memscal.model.film import NEO_HOOKEAN
+from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.scan import Scan
 
 #: Distance of a line from the centre, over the width of the Gaussian, at which its change is taken.
@@ -33,8 +33,9 @@ _OFF = 0.2
 #: Steps of the thickness, relative, and of Poisson's ratio.
 _STEP = 0.05
 _STEP_OF_RATIO = 0.015
-#: What two models of a film differ by, by the names of budget and assumption.
-_LAW = {"model_form": "film_law", "rod_friction": "rod_friction"}
+#: What two models of a film differ by: assumptions by lines of the budget, and half widths of the
+#: line's rectangle that they are apart.
+_LAW = {"model_form": ("film_law", 1.0), "rod_friction": ("rod_friction", -2.0)}
 #: Wavenumbers times thickness beyond which nothing reaches the base.
 _LARGEST_KH = 38.0
 
@@ -149,11 +150,9 @@ def _film_changes(
             changes[name] = (by_step[0] - square * steps[0], square)
     if not is_tabulated(*set_up.under(NEO_HOOKEAN)._replace(rod_friction=None)):
         return changes
-    for name, sign in (("model_form", 1.0), ("rod_friction", -1.0)):
-        law = "" if name == "model_form" else film.law
-        ratio = film.mooney_rivlin_ratio if law else None
-        unstated = replace(film, law=law, mooney_rivlin_ratio=ratio)
-        by_law = law_sensitivities(set_up._replace(film=unstated, rod_friction=None), reference)
-        if name in by_law:
-            changes[_LAW[name]] = (sign * by_law[name] / RECTANGLE, nothing)
+    unstated = law_sensitivities(set_up.under("")._replace(rod_friction=None), reference)
+    for name, change in unstated.items():
+        if name == "model_form" or film.law != LINEAR:
+            assumption, widths = _LAW[name]
+            changes[assumption] = (widths * change / RECTANGLE, nothing)
     return changes

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -9,12 +10,11 @@ from itertools import product
 import numpy as np
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, hankel_transform
-from memscal.errors import ConvergenceError, DomainError, InputError
+from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.set_up import film_of
 from memscal.mechanics.contact import BaseStress, Contact
-from memscal.mechanics.press_rod import is_tabulated, press_rod
-from memscal.mechanics.tabulated_rod import largest_tabulated_load
+from memscal.mechanics.press_rod import UNSOLVED, is_tabulated, press_rod, stick_and_slide
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, more_and_less
 from memscal.model.indenter import Rod
@@ -29,7 +29,7 @@ _LARGEST_KH = 20.0
 _PASSED = 4 * math.pi
 _WAVENUMBERS = 400
 _NOTHING = 1e-6
-#: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
+#: A bound, anywhere within which the truth may lie, over its half width: a rectangle.
 RECTANGLE = 1 / math.sqrt(3)
 #: Rods of somewhat larger load are in the table, too, where it serves for varied inputs.
 _MARGIN = 1.1
@@ -198,7 +198,7 @@ def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str,
         changes["young_modulus"] = np.zeros_like(reference.values)
     # At a given load the modulus does not change the stress in a linear film.
     names = ["thickness", "poisson_ratio"]
-    if film.law not in ("", LINEAR):
+    if film.law != LINEAR:
         names.append("young_modulus")
     for name in names:
         ends = more_and_less(film, name)
@@ -227,7 +227,7 @@ def load_sensitivities(
     # None in a linear film; in others the stress spreads with the load over E h^2.
     changes = [np.zeros_like(reference.values) for reference in references]
     for i, (scan, reference) in enumerate(zip(scans, references, strict=True)):
-        if scan.film and scan.film.law not in ("", LINEAR) and scan.load_uncertainty:
+        if scan.film and scan.film.law != LINEAR and scan.load_uncertainty:
             set_up = scan.set_up.expected
             more = set_up._replace(load=set_up.load + scan.load_uncertainty)
             less = set_up._replace(load=set_up.load - scan.load_uncertainty)
@@ -235,39 +235,31 @@ def load_sensitivities(
     return changes
 
 
-def press_neo_hookean(set_up: SetUp) -> Contact:
-    """Press a rod on its film as if that were neo-Hookean, and stuck to it."""
-    # One that slides differs less from a linear film, and is not solved to any depth.
-    return press_rod(*set_up.expected.under(NEO_HOOKEAN)._replace(rod_friction=None))
-
-
 def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by what is not known of the film's law."""
-    # Rectangles, of which the standard uncertainty is the half width over the root of three: where
-    # no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
-    # at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
-    # sliding. Nothing where the rod goes deeper than is solved.
-    film, rod, load, friction = set_up
-    if film.law == LINEAR or (film.law and friction is not None):
-        return {}
-    rubber = set_up.under(NEO_HOOKEAN).film
-    end = load
-    if film.law and isinstance(rod, Rod):
-        # A film that slides is drawn out from under the rod, and is not solved to any depth.
-        end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False)) or load
-    try:
-        if film.law:
-            first = press_rod(rubber, rod, end, math.inf)
-            second = press_rod(rubber, rod, end, 0.0)
-        else:
-            first = press_neo_hookean(set_up)
-            second = press_rod(film, rod, load)
-    except (ConvergenceError, DomainError):
-        return {}
+    # Rectangles: half as wide as the difference of a linear film is large where no law is stated
+    # (``model_form``), and as half that of sticking and sliding where the friction of a rod on a
+    # film at finite strain is not (``rod_friction``), for the reference is midway.
+    film = set_up.film
+    rod = set_up.indenter
+    changes: dict[str, FloatArray] = {}
+    if film.law == LINEAR or not isinstance(rod, Rod):
+        return changes
     k = reference.wavenumbers.k.tobytes()
-    upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
-    source = "rod_friction" if film.law else "model_form"
-    return {source: RECTANGLE * (upper - lower) * load / first.load}
+
+    def apart(first: Contact, second: Contact) -> FloatArray:
+        upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
+        return RECTANGLE * (upper - lower) * set_up.load / first.load
+
+    if not film.law:
+        own = press_rod(*set_up)
+        if own.strain == "linear":
+            return changes
+        changes["model_form"] = apart(press_rod(*set_up.under(LINEAR)), own)
+    if set_up.rod_friction is None:
+        with suppress(*UNSOLVED):
+            changes["rod_friction"] = apart(*stick_and_slide(film, rod, set_up.load)) / 2
+    return changes
 
 
 #: Whose error each is: scans of one film share that of the film.
@@ -294,7 +286,7 @@ def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetU
 
 def law_at_once(set_up: SetUp) -> str:
     """Law by which such rods are solved in milliseconds: the film's own, or the nearest one."""
-    if set_up.film.law in ("", LINEAR):
+    if set_up.film.law == LINEAR:
         return LINEAR
     larger = set_up.under(NEO_HOOKEAN)._replace(load=_MARGIN * set_up.load)
     return NEO_HOOKEAN if is_tabulated(*larger) else LINEAR

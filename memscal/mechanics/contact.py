@@ -47,7 +47,8 @@ class Contact(Result):
         Radius of the contact, and of its part that sticks, in m.  Where the interface is normally
         compliant the contact ends where the pressure has fallen to a thousandth of its largest.
     friction : float
-        Amontons' coefficient; ``inf`` for a contact that sticks wherever it touches.
+        Amontons' coefficient; ``inf`` for a contact that sticks wherever it touches, ``nan``
+        midway between sticking and sliding.
     loading, strain, backend : str
         As of :func:`memscal.indent`; ``loading`` is ``""`` where it makes no difference (a rod).
     convergence : float
@@ -207,7 +208,7 @@ class Contact(Result):
             depth=self.depth,
             contact_radius=self.contact_radius,
             stick_radius=self.stick_radius,
-            friction_coefficient=self.friction,
+            friction_coefficient=None if math.isnan(self.friction) else self.friction,
             loading=self.loading,
             film=self.film_of_law,
             indenter=self.indenter,

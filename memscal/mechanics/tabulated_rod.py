@@ -74,7 +74,7 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
     scale = film.shear_modulus * film.thickness**2
     depth = float(brentq(lambda d: _load(rows, d) - load / scale, 0.0, deepest, xtol=1e-12))
     normal, shear = rows(np.cbrt(depth))[1:].reshape(2, -1) * load
-    inside: Any = TabulatedField(_table()["kh"] / film.thickness, (normal, shear), rod.radius)
+    inside: Any = TabulatedField(base_wavenumbers(film), (normal, shear), rod.radius)
     loads = _load(rows, _STEPS * depth) * scale
     work = float(np.trapezoid(loads, _STEPS * depth * film.thickness))
     return Contact(
@@ -97,6 +97,11 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
         dissipated_energy=0.0,
         strain="finite",
     )
+
+
+def base_wavenumbers(film: ElasticFilm) -> FloatArray:
+    """Return the wavenumbers (rad/m) of a rod's base stress in the table."""
+    return _table()["kh"] / film.thickness
 
 
 def largest_tabulated_load(film: ElasticFilm, rod: Rod, *, sticking: bool) -> float:

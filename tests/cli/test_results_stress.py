@@ -35,7 +35,7 @@ def contact() -> memscal.Contact:
 
 @pytest.fixture(scope="module")
 def planned() -> memscal.Design:
-    return memscal.design(noise=0.01, want={"sigma": 0.028}, vary="repeats")
+    return memscal.design(noise=0.01, want={"sigma": 0.0345}, vary="repeats")
 
 
 @pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])

@@ -14,16 +14,25 @@ from memscal.cli.options import PAPER_FILM, Quantity, figure_option, option, out
 from memscal.formats.files import together
 
 #: Options in other units than SI, by the power of ten.
-_IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
-_SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
+_IN_MM_OR_MV = (
+    "conversion_constant",
+    "step",
+    "half_range",
+    "noise_voltage",
+    "centre",
+    "line_offset_uncertainty",
+)
+_IN_PERCENT = ("load_uncertainty", "noise", "position_scale_uncertainty")
+_SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(_IN_PERCENT, -2)
+_AS_GIVEN = ("load", "repeats", "method", "rod_friction", "roundness_uncertainty")
 
 EXAMPLES = """\b
 Examples:
   memscal design
   memscal design --step 0.5 --half-range 10 --repeats 4 --noise 1
   memscal design --load 0.5 --noise-voltage 0.05 --figure design.png
-  memscal design --noise 1 --want A=1.3% --vary step
-  memscal design --thickness-uncertainty 0.005 --want sigma=1.2% --vary repeats --json
+  memscal design --noise 1 --rod-friction inf --want A=1.3% --vary step
+  memscal design --thickness-uncertainty 0.005 --load 0.2 --want sigma=1.2% --vary repeats --json
   memscal design --disc-radius 800 --sigma 300 --want resolved=4.5 --vary repeats
 """
 
@@ -64,6 +73,16 @@ def _target(value: str) -> tuple[str, float]:
 @option("--centre", Quantity("mm", low=-float("inf")), 0.0)(
     "Expected position of the sensor along the scan, in mm."
 )
+@common.rod_friction_option(f"{common.FREE_OR_STUCK} Default: the scan will not state it.")
+@option("--position-scale-uncertainty", Quantity("percent", open_low=False))(
+    "Standard uncertainty (k = 1) of the stage's scale, in percent."
+)
+@option("--line-offset-uncertainty", Quantity("mm", open_low=False))(
+    "That of the distance at which the line passes the sensor's centre, in mm."
+)
+@option("--roundness-uncertainty", Quantity("ratio", open_low=False))(
+    "That of the sensor's axis ratio less one."
+)
 @option("--method", default="bayesian")(
     "Method of memscal calibrate with which the scan would be evaluated."
 )
@@ -101,7 +120,7 @@ def command(
 
     from memscal.extensions.planning.design import design
 
-    settings: dict[str, Any] = {name: options[name] for name in ("load", "repeats", "method")}
+    settings: dict[str, Any] = {name: options[name] for name in _AS_GIVEN}
     for name, power in _SCALED.items():
         settings[name] = si(options[name], power)
     settings["rod"] = common.indenter_from("rod", options)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.calibration.calibrate import uncertainties
 from memscal.calibration.stages import Solution, solved
@@ -29,8 +28,8 @@ from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.estimation.set_up import reference_profile
-from memscal.extensions.simulation.disturbances import Disturbances
-from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
+from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.extensions.simulation.sensor import blurred_stress
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
@@ -58,7 +57,8 @@ class Plan:
 
     ``load_uncertainty`` and ``noise`` are relative, to the load and to the signal with the rod
     right above the sensor; ``noise_voltage`` (V) replaces ``noise``.  Positions run from minus to
-    plus ``half_range``, or to the last whole step within.
+    plus ``half_range``, or to the last whole step within.  What is ``None``
+    the scan will not state.
 
     >>> Plan(step=0.5e-3, repeats=2).positions
     33
@@ -76,6 +76,10 @@ class Plan:
     noise: float = 0.005
     noise_voltage: float | None = None
     centre: float = 0.0
+    rod_friction: float | None = None
+    position_scale_uncertainty: float | None = None
+    line_offset_uncertainty: float | None = None
+    roundness_uncertainty: float | None = None
 
     def __post_init__(self) -> None:
         require_positive("step of the scan", self.step, "m")
@@ -124,49 +128,40 @@ class Plan:
     @property
     def signal(self) -> float:
         """Voltage to expect with the rod right above the sensor, in V."""
-        wavenumbers = Wavenumbers.covering(_LARGEST_KH / self.film.thickness, self.film.thickness)
-        contact = press_rod(self.film.expected, self.rod, self.load)
-        spectrum = contact.base_spectrum(wavenumbers.k) * self.kernel.transform(wavenumbers.k)
-        peak = RadialSpectrum(wavenumbers, spectrum).at(np.zeros(1))[0]
-        return float(self.conversion_constant * peak)
+        return float(self._voltages(np.array([0.0, self.half_range]))[0])
 
     @property
     def point_noise(self) -> float:
         """Standard deviation of one voltage, in V."""
         return self.noise * self.signal if self.noise_voltage is None else self.noise_voltage
 
+    def _voltages(self, distance: FloatArray) -> FloatArray:
+        """Voltages to expect at distances (m) of the rod from the sensor, in V."""
+        contact = press_rod(self.film.expected, self.rod, self.load, self.rod_friction)
+        stress = blurred_stress([contact], self.kernel, distance)[0]
+        return np.asarray(self.conversion_constant * stress)
+
     def scan(self) -> Scan:
         """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
-        half_range = self.step * (count - 1) / 2
-        require_plausible(
-            Scan(
-                x=np.linspace(-1.0, 1.0, count) * half_range,
-                u_zz=np.zeros(count),
-                film=self.film,
-                indenter=self.rod,
-                load=self.load,
-            )
-        )
-        undisturbed = Disturbances(
-            noise=0.0,
-            baseline=0.0,
-            drift=0.0,
-            centre=(self.centre, 0.0),
-            load_uncertainty=self.load_uncertainty,
-        )
-        scan = simulate(
+        x = np.linspace(-1.0, 1.0, count) * self.step * (count - 1) / 2
+        scan = Scan(
+            x=x,
+            u_zz=np.zeros(count),
             film=self.film,
-            rod=self.rod,
-            kernel=self.kernel,
-            conversion_constant=self.conversion_constant,
+            indenter=self.rod,
             load=self.load,
-            half_range=half_range,
-            points=count,
-            disturbances=undisturbed,
+            load_uncertainty=self.load_uncertainty and self.load_uncertainty * self.load,
+            rod_friction=self.rod_friction,
+            position_scale_uncertainty=self.position_scale_uncertainty,
+            line_offset_uncertainty=self.line_offset_uncertainty,
+            roundness_uncertainty=self.roundness_uncertainty,
+            title="Planned rod scan",
         )
+        require_plausible(scan)
         noise = self.point_noise / math.sqrt(self.repeats)
-        return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
+        voltages = self._voltages(np.abs(x - self.centre))
+        return replace(scan, u_zz=voltages, u_zz_errors=np.full(count, noise))
 
 
 def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
@@ -302,6 +297,7 @@ _CURES = {
     "poisson_ratio": "Determine the film's Poisson's ratio better.",
     "rod_radius": "Measure the rod's radius better.",
     "load": "Determine the load better.",
+    "rod_friction": "State whether the film sticks under the rod, or lower the load.",
     "noise": "Lower the noise, or raise the load.",
     "regularisation": "It is what the film hides of G: a thinner film shows more of it, and so do "
     "less noise and a finer step.",
@@ -458,6 +454,10 @@ def design(
     noise: float = 0.005,
     noise_voltage: float | None = None,
     centre: float = 0.0,
+    rod_friction: float | None = None,
+    position_scale_uncertainty: float | None = None,
+    line_offset_uncertainty: float | None = None,
+    roundness_uncertainty: float | None = None,
     method: str | Regulariser = "bayesian",
     seed: int = 0,
     want: Mapping[str, float] | None = None,
@@ -484,6 +484,10 @@ def design(
         sensor, or in V in place of the share.
     centre : float
         Expected position of the sensor along the scan, in m.
+    rod_friction : float, optional
+        What the scan will state: 0, the film slides under the rod; ``inf``, it sticks.
+    position_scale_uncertainty, line_offset_uncertainty, roundness_uncertainty : float, optional
+        Likewise, as of a :class:`memscal.Scan`.
     method, seed : str or Regulariser, int
         How the scan would be evaluated; seed of methods that draw random numbers.
     want : mapping of str to float, optional
@@ -511,10 +515,10 @@ def design(
     >>> import memscal
     >>> planned = memscal.design(noise=0.01)
     >>> round(planned.relative_uncertainty("gaussian_sigma"), 3)
-    0.03
+    0.036
     >>> planned.largest_source("gaussian_sigma")
     'thickness'
-    >>> finer = memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")
+    >>> finer = memscal.design(noise=0.01, want={"sigma": 0.0335}, vary="repeats")
     >>> finer.plan.repeats
     3
     """
@@ -532,6 +536,10 @@ def design(
         noise=noise,
         noise_voltage=noise_voltage,
         centre=centre,
+        rod_friction=rod_friction,
+        position_scale_uncertainty=position_scale_uncertainty,
+        line_offset_uncertainty=line_offset_uncertainty,
+        roundness_uncertainty=roundness_uncertainty,
     )
     evaluated = partial(evaluate, method=method, seed=seed)
     planned = evaluated(plan) if vary is None else least_design(plan, targets, vary, evaluated)

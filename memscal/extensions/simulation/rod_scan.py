@@ -70,8 +70,8 @@ def simulate(
     ----------
     film, rod
         What is pressed on what; the paper's where absent, its film neo-Hookean.  A film that states
-        no law is taken as linear.  Of an uncertain Poisson's ratio that ends at 1/2 the true one is
-        the mean (``film.expected``).
+        no law is taken as linear, and the scan states that.  Of an uncertain
+        Poisson's ratio that ends at 1/2 the true one is the mean (``film.expected``).
     rod_friction : float, optional
         0: the film slides freely under the rod; ``inf``: it sticks.  By default a linear film
         slides, and one of another law sticks.
@@ -124,7 +124,8 @@ def simulate(
     loads = checked_loads(load)
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
-    linear = film.law in ("", LINEAR)
+    film = replace(film, law=film.law or LINEAR)
+    linear = film.law == LINEAR
     if rod_friction is None and not linear:
         rod_friction = math.inf
     # The stress in a linear film is proportional to the load: one contact serves for all.
@@ -150,7 +151,7 @@ def simulate(
     truth: dict[str, float | str | None] = {
         "centre": disturbances.centre[0],
         "centre_y": disturbances.centre[1],
-        "film_law": film.law or LINEAR,
+        "film_law": film.law,
         "poisson_ratio": true.poisson_ratio,
         "mooney_rivlin_ratio": film.mooney_rivlin_ratio,
         "rod_friction": rod_friction,

@@ -102,7 +102,7 @@ def test_the_rod_is_pressed_by_the_law_at_each_load():
 def test_the_scan_states_its_law_if_it_has_one_and_it_is_wanted(film, law, friction):
     scan = simulate(film=film, points=9)
     silent = simulate(film=film, points=9, state_law=False)
-    assert (scan.film, scan.rod_friction) == (film, friction)
+    assert (scan.film, scan.rod_friction) == (replace(film, law=law), friction)
     assert (silent.film, silent.rod_friction) == (replace(film, law=""), None)
     assert scan.synthetic == silent.synthetic
     assert (scan.synthetic["film_law"], scan.synthetic.get("rod_friction")) == (law, friction)

@@ -1,0 +1,144 @@
+"""Values between two ends: what is recognised is corrected, and what is left is counted.
+
+Set MEMSCAL_FULL_STUDY for 60 seeds in place of 8, and 20 of each design in place of 6.
+"""
+
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from helpers.bounds import FULL
+from helpers.direct import direct_scan
+from helpers.scans import CONVERSION, GAUSSIAN, SIGMA, simulate
+from scipy.stats import chi2, norm
+
+import memscal
+from memscal import Plan, Scan
+from memscal.extensions.simulation.rod_scan import PAPER_FILM
+
+pytestmark = pytest.mark.accuracy
+
+SEEDS = 60 if FULL else 8
+MADE = 20 if FULL else 6
+CHANCE = 1e-4
+TRUTHS = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA}
+LAWLESS = replace(PAPER_FILM, law="")
+
+
+def drawn(scan: Scan, seed: int) -> Scan:
+    """The scan with film, rod and load as stated by their uncertainties about the true ones."""
+    rng = np.random.default_rng([35, seed])
+    film = replace(
+        PAPER_FILM,
+        law=scan.film.law,
+        thickness=rng.normal(PAPER_FILM.thickness, PAPER_FILM.thickness_uncertainty),
+        young_modulus=rng.normal(PAPER_FILM.young_modulus, PAPER_FILM.young_modulus_uncertainty),
+    )
+    load = scan.load * rng.normal(1.0, 0.01)
+    return replace(scan, film=film, load=load, load_uncertainty=0.01 * load)
+
+
+def deviations(scans: list[Scan], **options: object) -> np.ndarray:
+    """Errors of A and sigma over their stated uncertainties, a row for each scan."""
+    rows = []
+    for scan in scans:
+        p = memscal.calibrate(scan, other=False, **options).apparatus.parameters
+        rows.append([(p[name] - truth) / p.uncertainty(name) for name, truth in TRUTHS.items()])
+    return np.array(rows)
+
+
+def margin(z: np.ndarray) -> np.ndarray:
+    """What chance adds to a mean."""
+    return norm.isf(CHANCE) * np.std(z, axis=0, ddof=1) / math.sqrt(len(z))
+
+
+def direct(law: str, stated: str) -> list[Scan]:
+    """Scans at 1 N by finite elements and direct convolution, of a rod that sticks."""
+    scans = []
+    for seed in range(SEEDS):
+        scan = direct_scan(GAUSSIAN, law=law, noise=0.005, seed=seed)
+        scan = replace(scan, film=replace(scan.film, law=stated, mooney_rivlin_ratio=None))
+        scans.append(replace(drawn(scan, seed), rod_friction=None))
+    return scans
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian"])
+def test_rubber_whose_law_is_not_stated_is_right(method: str) -> None:
+    z = deviations(direct("neo-hookean", ""), method=method)
+    assert np.all(np.abs(z.mean(axis=0)) < 0.8 + margin(z))
+    assert np.all(np.sqrt(np.mean(z**2, axis=0)) < 1.3 * np.sqrt(chi2.isf(CHANCE, SEEDS) / SEEDS))
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian"])
+def test_a_linear_film_whose_law_is_not_stated_is_within_two_uncertainties(method: str) -> None:
+    z = deviations(direct("linear", ""), method=method)
+    assert np.all(np.abs(z.mean(axis=0)) < 2.0 + margin(z))
+
+
+@pytest.mark.parametrize(("friction", "load"), [(math.inf, 1.0), (math.inf, 0.3), (0.0, 0.3)])
+def test_a_rod_at_an_end_of_its_friction_is_within_its_uncertainty(friction, load) -> None:
+    scans = []
+    for seed in range(SEEDS):
+        made = simulate(seed=seed, load=load, rod_friction=friction)
+        scans.append(replace(drawn(made, seed), rod_friction=None))
+    z = deviations(scans)
+    assert np.all(np.abs(z.mean(axis=0)) < 1.2 + margin(z))
+
+
+#: The default and five others, of which some state what scans take for granted.
+PLANS = {
+    "default": Plan(),
+    "coarse": Plan(load=0.3, noise=0.01, step=0.5e-3, repeats=3, position_scale_uncertainty=0.005),
+    "light": Plan(
+        load=0.05,
+        film=replace(PAPER_FILM, law="linear"),
+        line_offset_uncertainty=0.1e-3,
+        roundness_uncertainty=0.05,
+    ),
+    "no law": Plan(film=LAWLESS, noise=0.01),
+    "thin": Plan(
+        film=replace(PAPER_FILM, thickness=1.5e-3),
+        load=0.2,
+        kernel=memscal.GaussianMixture((1.0,), (0.7e-3,)),
+        rod_friction=math.inf,
+        half_range=6e-3,
+    ),
+    "thick": Plan(
+        film=replace(PAPER_FILM, thickness=2.5e-3, thickness_uncertainty=0.05e-3),
+        noise=0.002,
+        position_scale_uncertainty=0.003,
+        roundness_uncertainty=0.03,
+        centre=1e-3,
+    ),
+}
+STATED = ("position_scale_uncertainty", "line_offset_uncertainty", "roundness_uncertainty")
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian"])
+@pytest.mark.parametrize("name", PLANS)
+def test_a_plan_predicts_what_calibrations_of_imported_scans_state(name: str, method: str) -> None:
+    plan = PLANS[name]
+    options = {field.name: getattr(plan, field.name) for field in fields(Plan)}
+    planned = memscal.design(**options, method=method)
+    stated = []
+    for seed in range(MADE):
+        made = simulate(
+            film=plan.film,
+            kernel=plan.kernel,
+            load=plan.load,
+            half_range=plan.step * (plan.positions - 1) / 2,
+            points=plan.positions,
+            repeats=plan.repeats,
+            noise=plan.noise,
+            load_uncertainty=plan.load_uncertainty,
+            centre=(plan.centre, 0.0),
+            seed=seed,
+        )
+        statements = {each: getattr(plan, each) for each in STATED}
+        scan = replace(made, film=plan.film, rod_friction=plan.rod_friction, **statements)
+        p = memscal.calibrate(scan, method=method, other=False).apparatus.parameters
+        stated.append([p.uncertainty(each) / p[each] for each in TRUTHS])
+    predicted = np.array([planned.relative_uncertainty(each) for each in TRUTHS])
+    mean = np.mean(stated, axis=0)
+    assert np.all(np.abs(predicted / mean - 1) < 0.1 + margin(np.array(stated)) / mean)
