@@ -146,7 +146,11 @@ def deconvolve(
         signal = model.signal(estimate.gaussian.geometry, spectrum) + estimate.oval
     predicted = signal + estimate.background
     misfit = _misfit(estimate, predicted)
-    return Deconvolution(quotient, a, g, sigma, predicted, misfit, divided=posterior is None)
+    # What the window takes from the estimate of G, that of the posterior.
+    passed = np.interp(model.k, fields.grid.wavenumber_axis, quotient.window[0], right=0.0)
+    lost = (1 - passed if posterior is None else np.zeros_like(passed)) * estimate.kernel / a
+    hidden = model.reference.wavenumbers.synthesise(lost, g.r)
+    return Deconvolution(quotient, a, g, sigma, hidden, predicted, misfit, posterior is None)
 
 
 def require_channel_method(channel: str, method: Method) -> None:
@@ -196,6 +200,7 @@ class Deconvolution:
     conversion_constant: float  # in V/Pa
     g: Field  # on its support, in 1/m^2
     gaussian_sigma: float  # of the Gaussian nearest to G, in m
+    hidden: FloatArray  # (m,): what the window takes from G at its radii, in 1/m^2
     predicted: FloatArray  # (n,): voltages at the measured points, in V
     misfit: Misfit
     divided: bool = True  # by a division of the fields; else the posterior's

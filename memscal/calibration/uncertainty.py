@@ -221,6 +221,8 @@ class _Derivatives:
     by_voltage: VoltageMap  # (m, n)
     by_state: FloatArray  # (m, p): by the posterior's parameters, beside what voltages do to them
     hidden: FloatArray  # (m, q): columns
+    # (m, p): by the posterior's parameters, what a window hides; of parameters, what is corrected
+    lost: FloatArray
 
 
 def propagate(
@@ -239,7 +241,7 @@ def propagate(
     columns = {
         "noise": estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.fixed_root,
-        "window": derivatives.hidden,
+        "window": np.hstack([derivatives.hidden, derivatives.lost @ estimate.fixed_root]),
     }
     rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -327,7 +329,8 @@ def _replace_exactly(
 def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float], FloatArray]:
     """A and the numbers read off G, and G at other radii (m), zero beyond its support."""
     g = result.g
-    numbers = {f.name: f.value for f in kernel_functionals(g, result.gaussian_sigma)}
+    read = kernel_functionals(g, result.gaussian_sigma, result.hidden)
+    numbers = {functional.name: functional.value for functional in read}
     inside = radial_spline(g.r, g.radial)(np.minimum(radii, g.r[-1]))
     numbers["conversion_constant"] = result.conversion_constant
     return numbers, np.where(radii <= g.r[-1], inside, 0.0)
@@ -368,7 +371,7 @@ def _parameters(
     """Names and values of the parameters as reported; derivatives of these, of G, its transfer."""
     fit = estimate.gaussian
     g = deconvolution.g
-    functionals = kernel_functionals(g, deconvolution.gaussian_sigma)
+    functionals = kernel_functionals(g, deconvolution.gaussian_sigma, deconvolution.hidden)
     read_off_g = np.stack([functional.row for functional in functionals])
     radial = slice(1, 1 + g.r.size)
     # A round departure beside an ellipse would be read as less of width and ellipticity.
@@ -376,10 +379,13 @@ def _parameters(
     ellipse = estimate.points.ellipse
     nuisances, scale = _nuisances(estimate.points.free)
     count = len(scale)
+    # The full width is corrected by the estimate, with whose noise it scatters.
+    corrected = np.zeros((len(functionals), kernel.lost.shape[1]))
+    corrected[1] = functionals[1].row @ kernel.lost[radial]
     parts = [
         kernel.by_voltage[:1],
         gain[[1, *range(len(gain) - ellipse, len(gain))]],
-        read_off_g @ kernel.by_voltage[radial],
+        read_off_g @ kernel.by_voltage[radial] + corrected @ estimate.weighed.gain,
         estimate.weighed.gain[2 : 2 + count] * scale,
         gain[:1],
         kernel.by_voltage[1:],
@@ -388,7 +394,9 @@ def _parameters(
     # No regularisation touches what was fitted: its rows stay zero, but for the nuisances' own.
     by_state = np.zeros((len(by_voltage), kernel.by_state.shape[1]))
     hidden = np.zeros((len(by_voltage), kernel.hidden.shape[1]))
+    lost = np.zeros_like(by_state)
     widths = slice(2 + ellipse, 2 + ellipse + len(functionals))
+    lost[widths] = corrected
     for rows, of_kernel in ((by_state, kernel.by_state), (hidden, kernel.hidden)):
         rows[0] = of_kernel[0]
         rows[widths] = read_off_g @ of_kernel[radial]
@@ -399,6 +407,8 @@ def _parameters(
         whole = g.radial + kernel.hidden[radial, 0]
         area = 1 / np.sum(ring_areas(g.r) * whole**2)
         hidden[widths.stop - 1, 0] = area - functionals[-1].value
+        hidden[widths.start + 1, 0] -= functionals[1].row @ deconvolution.hidden
+        hidden[widths.start + 1, 1:] = 0.0
     values = [
         *(deconvolution.conversion_constant, fit.sigma, *fit.ellipticity[:ellipse]),
         *(functional.value for functional in functionals),
@@ -413,7 +423,7 @@ def _parameters(
         *nuisances,
         "conversion_constant_gaussian",
     )
-    return names, np.array(values), _Derivatives(by_voltage, by_state, hidden)
+    return names, np.array(values), _Derivatives(by_voltage, by_state, hidden, lost)
 
 
 def _nuisances(free: BoolArray) -> tuple[list[str], FloatArray]:
@@ -445,7 +455,7 @@ def _kernel_derivatives(
     spread = division.lost[:, 1:] @ square_root(estimate.weighed.covariance)
     by_voltage = division.direct + by_nuisance @ estimate.weighed.gain[division.places]
     hidden = np.hstack([division.lost[:, :1], spread])
-    return _Derivatives(by_voltage, by_state, hidden), division
+    return _Derivatives(by_voltage, by_state, hidden, division.lost[:, 1:]), division
 
 
 def _posterior_kernel(
@@ -464,7 +474,8 @@ def _posterior_kernel(
     share = (place - below)[:, None]
     transfer = (1 - share) * normalised[below] + share * normalised[below + 1]
     rows = np.vstack([basis.integrals, radial, transfer])
-    return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
+    nothing = np.zeros((len(rows), 0))
+    return _Derivatives(rows @ estimate.weighed.gain, rows, nothing, np.zeros_like(rows))
 
 
 @dataclass(frozen=True, eq=False)

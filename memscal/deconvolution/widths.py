@@ -83,8 +83,11 @@ class Functional:
     row: FloatArray
 
 
-def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
+def kernel_functionals(
+    field: Field, sigma: float, hidden: FloatArray | float = 0.0
+) -> tuple[Functional, ...]:
     """Return the Gaussian width nearest to G, its half width and noise-equivalent area."""
+    # A window makes G wider: its half width is read with what the window hides.
     r = field.r
     g = field.radial
     # The noise-equivalent area is 4 pi sigma^2 of a Gaussian.
@@ -99,7 +102,7 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     left = unit_gaussian(r, sigma) - g
     row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
     nearest = Functional("gaussian_sigma_deconvolved", sigma, row)
-    return nearest, _half_width(r, g), noise_width
+    return nearest, _half_width(r, g + hidden), noise_width
 
 
 def _half_width(r: FloatArray, g: FloatArray) -> Functional:
