@@ -89,9 +89,15 @@ Examples:
     "each load and friction coefficient. Repeated."
 )
 @option("--lubricated", click.Choice(["frictionless", "apart"]))(
-    "Fit lubricated loads with no friction together with the dry ones, which cancels most of what "
-    "A, G and film leave uncertain; or each kind by itself.  [default: together unless the check "
-    "lubricated_frictionless fails]"
+    "Fit lubricated loads with no friction (--lubricated-friction 0) together with the dry ones, "
+    "or each kind by itself.  [default: together]"
+)
+@option("--lubricated-friction", Quantity("ratio", open_low=False), 0.015, metavar="MU")(
+    "Width of the half-normal distribution of the friction coefficient of lubricated loads; 0 "
+    "holds it at none."
+)
+@option("--between-scan-gain", Quantity("percent", open_low=False), 0.5)(
+    "Standard uncertainty of the gain of each scan that the others do not share, in percent."
 )
 @option("--shear", FILE, metavar="ARTIFACT")(
     "Artifact of the tangential channel of the sensor: coefficients of all loads together are by "
@@ -166,6 +172,7 @@ def command(
     out.prove_writable(outputs, force=force, inputs=inputs)
     friction = options["friction"]
     settings = {name: options[name] for name in _SETTINGS}
+    settings["between_scan_gain"] = options["between_scan_gain"] / 100
     with out.working("Comparing with calculated contacts"):
         comparison = compare(
             data,
@@ -229,7 +236,14 @@ def _drawn(comparison: FrictionComparison, named: Mapping[str, Path]) -> dict[Pa
 
 
 #: Options that are those of :func:`memscal.compare`.
-_SETTINGS = ("lubricated", "macroscopic", "macroscopic_uncertainty", "interface", "override")
+_SETTINGS = (
+    "lubricated",
+    "lubricated_friction",
+    "macroscopic",
+    "macroscopic_uncertainty",
+    "interface",
+    "override",
+)
 #: Options that the comparison of a shear does not have, and how they are typed.
 _NORMAL_STRESS_ONLY = {
     "references": "reference",

@@ -372,6 +372,11 @@ def read_instrument(file: SafeFile, path: str) -> dict[str, Any]:
     return {"sensor": StressSensor(**sensor), "load_cell": LoadCell(**load_cell)}
 
 
+def read_stage(file: SafeFile, path: str) -> Equipment:
+    """Read the stage of an instrument; empty where it is not stated."""
+    return Equipment(**read_record(records.STAGE, file, f"{path}/stage"))
+
+
 def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
     user = write_record(records.USER, of.user)
@@ -381,10 +386,9 @@ def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
 
 def read_circumstances(file: SafeFile) -> dict[str, Any]:
     """Read when, by whom and with which stage a scan was made."""
-    stage = read_record(records.STAGE, file, "/entry/instrument/stage")
     user = read_record(records.USER, file, "/entry/user")
     times = read_record(records.TIMES, file, "/entry")
-    return {"stage": Equipment(**stage), "user": User(**user), **times}
+    return {"stage": read_stage(file, "/entry/instrument"), "user": User(**user), **times}
 
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:

@@ -71,6 +71,7 @@ def _read_scans(
                 film=groups.read_film(file, f"{path}/sample/film"),
                 indenter=groups.read_round_indenter(file, f"{path}/indenter"),
                 **groups.read_instrument(file, f"{path}/instrument"),
+                stage=groups.read_stage(file, f"{path}/instrument"),
                 lubrication=lubrication,
                 source=source,
                 **numbers,
@@ -172,7 +173,7 @@ def _entry(measured: MeasuredStress) -> Group:
         parts: dict[str, Node] = {
             "sample": groups.sample_group(scan.film, scan.lubrication),
             "indenter": groups.indenter_group(scan.indenter),
-            "instrument": groups.instrument_group(scan.sensor, scan.load_cell),
+            "instrument": groups.instrument_group(scan.sensor, scan.load_cell, scan.stage),
             **write_record(records.MEASURED_SCAN, scan).children,
         }
         scans[f"scan_{i}"] = Group("NXcollection", parts)

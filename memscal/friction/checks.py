@@ -1,5 +1,6 @@
 """Quality checks of a comparison: whether any calculated contact explains what was measured."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -56,7 +57,8 @@ def comparison_checks(
             )
             checks.append(_reduced(name, estimates.values(), together))
     if "lubricated" in joint:
-        checks.append(frictionless_check(joint["lubricated"]))
+        dry = [each for state, each in joint.items() if state != "lubricated"]
+        checks.append(frictionless_check(joint["lubricated"], dry))
     return tuple(checks)
 
 
@@ -67,19 +69,33 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
     return check(name, best.least / best.degrees, limit, meaning, best.p_value)
 
 
-def frictionless_check(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
-    """Return the check that the lubricated loads have no friction."""
+#: Lubricated loads without friction exceed this rise of -2 ln p in one of forty experiments.
+_LEAST_RISE = 3.84
+
+
+def frictionless_check(
+    by_loading: Mapping[str, BoundedEstimate],
+    beside: Sequence[Mapping[str, BoundedEstimate]] = (),
+) -> QualityCheck:
+    """Return the check that the lubricated loads have no friction that moves others ``beside``."""
     # The first of the values is no friction.
     rises = (float(joint.deviance[0]) - joint.least for joint in by_loading.values())
     least = max(min(rises), 0.0)
+    limits = [chi_square_limit(1)]
+    for others in beside:
+        for loading, dry in others.items():
+            known = math.hypot(*by_loading[loading].budget.values())
+            if dry.standard_uncertainty and dry.by_lubricated and known > 0:
+                allowed = dry.standard_uncertainty / dry.by_lubricated
+                limits.append((allowed / known) ** 2)
     return check(
         "lubricated_frictionless",
         least,
-        chi_square_limit(1),
+        max(min(limits), _LEAST_RISE),
         "Twice the loss of log likelihood of the lubricated loads from their best friction "
         "coefficient to none. "
-        "A failure means that the lubricated contacts are not frictionless, or that something "
-        "that scales the stress (A, load, film thickness) is not as stated: then the dry "
+        "A failure means that the lubricated contacts have more friction than was counted, or that "
+        "something that scales the stress (A, load, film thickness) is not as stated: then the dry "
         "coefficients are not to be trusted either.",
         float(chdtrc(1, least)),
     )

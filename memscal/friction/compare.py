@@ -19,13 +19,19 @@ from memscal.friction.calculated import FRICTIONS, amontons_family, external_fam
 from memscal.friction.checks import (
     comparison_checks,
     comparison_messages,
-    frictionless_check,
     synthetic_messages,
 )
 from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
 from memscal.friction.effective import FrictionFit, fit_friction, load_comparison, with_loading
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import Channel, load_points, require_line, sensor_of
+from memscal.friction.likelihood import (
+    BETWEEN_SCAN_GAIN,
+    Channel,
+    load_points,
+    points_of,
+    require_line,
+    sensor_of,
+)
 from memscal.friction.results import (
     BoundedEstimate,
     FrictionComparison,
@@ -110,6 +116,8 @@ def same_apparatus(
 FRICTIONLESS = "frictionless"
 APART = "apart"
 """How lubricated loads are fitted: with no friction together with the dry ones, or alone."""
+LUBRICATED_FRICTION = 0.015
+"""Width of the half-normal distribution of a lubricated friction coefficient."""
 
 #: Calculated stresses reach this multiple of a scan's width.
 _REACH = 1.5
@@ -126,6 +134,8 @@ def compare(
     loading: str | Sequence[str] = ("incremental", "total"),
     references: Sequence[StressProfile] | None = None,
     lubricated: str | None = None,
+    lubricated_friction: float = LUBRICATED_FRICTION,
+    between_scan_gain: float = BETWEEN_SCAN_GAIN,
     shear: ApparatusFunction | str | PathLike[str] | None = None,
     macroscopic: float | None = None,
     macroscopic_uncertainty: float | None = None,
@@ -164,9 +174,14 @@ def compare(
         Profiles that were calculated elsewhere, in place of memscal's: each with its load and
         friction coefficient, which take the place of ``friction`` and ``loading``.
     lubricated : str, optional
-        ``"frictionless"``: lubricated loads have no friction, and are fitted together with the dry
-        ones, which cancels most of what A, G and film leave uncertain; ``"apart"``: each kind by
-        itself.  By default together unless the check ``lubricated_frictionless`` fails.
+        ``"frictionless"``: ``lubricated_friction`` is 0; ``"apart"``: each kind by itself.  By
+        default the dry loads are fitted together with the lubricated ones, which cancels most of
+        what A, G and film leave uncertain.
+    lubricated_friction : float
+        Width of the half-normal distribution of the lubricated loads' friction coefficient; 0
+        holds it at none.
+    between_scan_gain : float
+        Relative standard uncertainty of the gain of each scan that the others do not share.
     shear : ApparatusFunction or path, optional
         The tangential channel of the same sensor (experimental): the coefficients of all loads
         together are then those of both channels together, which share the errors of film, contacts
@@ -220,6 +235,9 @@ def compare(
     if lubricated not in (None, FRICTIONLESS, APART):
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
+    require_non_negative("friction of lubricated loads", lubricated_friction)
+    require_non_negative("gain between scans", between_scan_gain)
+    beside = {None: lubricated_friction, FRICTIONLESS: 0.0, APART: None}[lubricated]
     require_contacts(scans_of(opened))
     _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one is not None])
     measured = _measured(opened, sensor, override)
@@ -257,7 +275,8 @@ def compare(
         measured,
         sensor,
         families,
-        lubricated=lubricated,
+        lubricated_friction=beside,
+        between_scan_gain=between_scan_gain,
         shear=tangential,
         shear_families=shear_families,
         macroscopic=sliding,
@@ -383,22 +402,23 @@ def compare_measured(
     apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
     *,
-    lubricated: str | None = None,
+    lubricated_friction: float | None = LUBRICATED_FRICTION,
+    between_scan_gain: float = BETWEEN_SCAN_GAIN,
     shear: ApparatusFunction | None = None,
     shear_families: Mapping[str, ProfileFamily] | None = None,
     macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
     """Compare measured stress with families by loading, which hold every measured load."""
-    channels = channels_of(measured, apparatus, families)
+    channels = channels_of(measured, apparatus, families, (), between_scan_gain)
     fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     joint_fits = fits
     if shear is not None and shear_families is not None:
         common = common_inputs(apparatus, shear)
-        normal = channels_of(measured, apparatus, families, common)
-        sheared = channels_of(measured, shear, shear_families, common)
+        normal = channels_of(measured, apparatus, families, common, between_scan_gain)
+        sheared = channels_of(measured, shear, shear_families, common, between_scan_gain)
         joint_fits = {loading: fit_friction(normal[loading], sheared[loading]) for loading in fits}
     loads = _loads(measured, fits)
-    joint = fit_together(measured, joint_fits, lubricated)
+    joint = fit_together(measured, joint_fits, lubricated_friction)
     joint = {lubrication: with_loading(by_loading) for lubrication, by_loading in joint.items()}
 
     first = next(iter(channels.values()))
@@ -429,9 +449,10 @@ def channels_of(
     apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
     common: Sequence[str] = (),
+    between_scan_gain: float = BETWEEN_SCAN_GAIN,
 ) -> dict[str, Channel]:
     """Return what one channel measured with the contacts of each family, by its loading."""
-    points = [load_points(profile, apparatus.sensor.channel) for profile in measured.profiles]
+    points = points_of(measured.profiles, apparatus.sensor.channel, between_scan_gain)
     reach = max(float(readings.radius.max()) for readings in points)
     channels = {}
     for loading, family in families.items():
@@ -457,9 +478,11 @@ def _loads(
 
 
 def fit_together(
-    measured: MeasuredStress, fits: Mapping[str, FrictionFit], lubricated: str | None = APART
+    measured: MeasuredStress,
+    fits: Mapping[str, FrictionFit],
+    lubricated_friction: float | None = None,
 ) -> dict[str, dict[str, BoundedEstimate]]:
-    """Fit all loads of a kind; lubricated ones together with the dry, if they have no friction."""
+    """Fit all loads of a kind; the dry beside lubricated ones of about that friction, if any."""
     indices: dict[str, list[int]] = {}
     for i, profile in enumerate(measured.profiles):
         indices.setdefault(profile.lubrication, []).append(i)
@@ -469,14 +492,12 @@ def fit_together(
     }
     held = indices.pop("lubricated", [])
     first = next(iter(fits.values())).channel.family.values[0]
-    if not held or lubricated == APART or first > 0:
-        return joint
-    if lubricated is None and not frictionless_check(joint["lubricated"]).passed:
+    if not held or lubricated_friction is None or first > 0:
         return joint
     for lubrication, chosen in indices.items():
         for loading, fit in fits.items():
-            estimate = fit.coefficient(chosen, held)
-            joint[lubrication][loading] = replace(estimate, beside=len(held))
+            estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
+            joint[lubrication][loading] = estimate
     return joint
 
 

@@ -18,6 +18,7 @@ from memscal.friction.likelihood import (
     predict,
     standardise,
 )
+from memscal.friction.marginal_likelihood import log_likelihood
 from memscal.friction.results import DryAgainstLubricated
 from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
@@ -72,8 +73,12 @@ def dry_against_lubricated(
     apart = points_at(dry.offset, dry, voltage, noise)
     apart = replace(apart, flat=flat, correlation=correlation)
     nothing = np.zeros((1, noise.size))
-    standardised = standardise(apart, Predicted(nothing, nothing, nothing, nothing, {}))
-    chi_square = float(standardised.statistics.chi_square[0])
+    # Of what all scans share only the difference is left; the rest is each scan's own.
+    columns = {}
+    for source, column in dry_contact.columns.items():
+        columns[source] = column - lubricated_contact.columns[source]
+    standardised = standardise(apart, Predicted(nothing, nothing, nothing, nothing, columns))
+    _, (chi_square,) = log_likelihood(standardised.statistics)
 
     # Stresses, at the places and the load of the dry scan.
     profiles = [measured.profiles[i] for i in pair]
@@ -84,16 +89,20 @@ def dry_against_lubricated(
     heavier = lubricated_contact.by_load[0] * math.log(profiles[0].load / profiles[1].load)
     moved = (farther + heavier) / sensor.conversion_constant
     difference = dry_stress - lubricated_stress - moved
-    conversion_variance = (conversion_share * difference) ** 2
+    variance = dry_variance + lubricated_variance + (conversion_share * difference) ** 2
     maximum = profiles[0].maximum - profiles[1].maximum
     random = [random_uncertainty(profile.maximum_budget) for profile in profiles]
-    maximum_uncertainty = math.hypot(conversion_share * maximum, *random)
+    # What each scan has for itself, its gain and load, on the axis as nearest to it.
+    own = np.concatenate([columns["between_scan_gain"], columns["load"]], axis=-1)[0]
+    by_scan = np.linalg.norm(own, axis=1) / sensor.conversion_constant
+    on_axis = float(by_scan[np.argmin(dry.radius)])
+    maximum_uncertainty = math.hypot(conversion_share * maximum, on_axis, *random)
     return DryAgainstLubricated(
         load=profiles[0].load,
         r=dry.radius,
         difference=difference,
-        difference_errors=np.sqrt(dry_variance + lubricated_variance + conversion_variance),
-        chi_square=chi_square,
+        difference_errors=np.sqrt(variance + by_scan**2),
+        chi_square=float(chi_square),
         degrees=apart.degrees,
         p_value=float(chdtrc(apart.degrees, chi_square)),
         maximum=maximum,

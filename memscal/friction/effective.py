@@ -5,11 +5,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, erf
 
 from memscal.friction.family import bounded, unbounded
 from memscal.friction.interval import friction_reason, profile_estimate
-from memscal.friction.likelihood import Channel, Likelihood, likelihood, points_at, predict
+from memscal.friction.likelihood import (
+    LUBRICATED_FRICTION,
+    Channel,
+    Likelihood,
+    likelihood,
+    points_at,
+    predict,
+)
 from memscal.friction.results import BoundedEstimate, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredProfile
@@ -31,26 +38,52 @@ class FrictionFit:
     fine: Channel  # the channel at the values along which the likelihood is drawn
     whole: Likelihood  # of all loads, there
 
-    def coefficient(self, chosen: Sequence[int], held: Sequence[int] = ()) -> BoundedEstimate:
-        """Return the coefficient that explains some of the loads together, by their profiles.
+    def coefficient(self, chosen: Sequence[int]) -> BoundedEstimate:
+        """Return the coefficient that explains some of the loads together, by their profiles."""
+        along = self.whole.only(chosen)
+        return self._estimate(along, along.deviance, along.chi_square, self._near(chosen))
 
-        Loads that are ``held`` at no friction tell what errors all loads share.
+    def coefficient_beside(
+        self, chosen: Sequence[int], lubricated: Sequence[int], friction: float
+    ) -> BoundedEstimate:
+        """Return that of some loads beside lubricated ones, which share errors with them.
+
+        The lubricated friction is averaged over half a normal distribution of width ``friction``.
         """
-        along = self.whole.only(chosen).with_held(self.whole.only(held))
-        none = float(self.channel.family.values[0])
+        family = self.channel.family
+        along = self.whole.only(chosen)
+        beside = self.whole.only(lubricated)
+        width = max(friction, _LEAST_WIDTH)
+        weights = half_normal_weights(along.values, width)
+        logs, chi_square, means = along.averaged_over(beside, weights)
+        spread = _HALF_NORMAL_DEVIATION * width
+
+        def near(value: float) -> Likelihood:
+            coordinate = bounded(value, family.scale)
+            mean = float(np.interp(coordinate, along.coordinates, means))
+            by_coordinate = _stretch(mean, family.scale)
+            held = self._near(lubricated)(mean)
+            return self._near(chosen)(value).with_held(held, spread / by_coordinate)
+
+        both = replace(along, loads=(*along.loads, *beside.loads))
+        estimate = self._estimate(both, -2 * logs, chi_square, near)
+        budget = dict(estimate.budget)
+        share = budget.pop(LUBRICATED_FRICTION, None)
+        if friction > 0 and share is not None:
+            budget[LUBRICATED_FRICTION] = share
+        # More friction of the lubricated loads reads as less of the others.
+        moved = None if share is None else -share / spread
+        return replace(estimate, beside=len(lubricated), by_lubricated=moved, budget=budget)
+
+    def _near(self, chosen: Sequence[int]) -> Callable[[float], Likelihood]:
+        """Return the likelihood of some of the loads at any one value."""
         channel = self.channel.only(chosen)
-        frictionless = self.channel.at(none).only(held)
-        if self.shear is None:
-            without = likelihood(frictionless)
-            return self._estimate(
-                along, lambda value: likelihood(channel.at(value)).with_held(without)
-            )
-        shear = self.shear.only(chosen)
-        without = likelihood(frictionless, self.shear.at(none).only(held))
-        return self._estimate(
-            along,
-            lambda value: likelihood(channel.at(value), shear.at(value)).with_held(without),
-        )
+        shear = None if self.shear is None else self.shear.only(chosen)
+
+        def near(value: float) -> Likelihood:
+            return likelihood(channel.at(value), None if shear is None else shear.at(value))
+
+        return near
 
     def coefficient_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
@@ -59,26 +92,38 @@ class FrictionFit:
         top = points_at(np.zeros(1), self.channel.points[index], a * profile.maximum, noise)
         channel = replace(self.channel.only([index]), points=[top])
         along = likelihood(replace(self.fine.only([index]), points=[top]))
-        return self._estimate(along, lambda value: likelihood(channel.at(value)))
+        return self._estimate(
+            along, along.deviance, along.chi_square, lambda value: likelihood(channel.at(value))
+        )
 
-    def _estimate(self, along: Likelihood, at: Callable[[float], Likelihood]) -> BoundedEstimate:
+    def _estimate(
+        self,
+        along: Likelihood,
+        deviance: FloatArray,
+        chi_square: FloatArray,
+        at: Callable[[float], Likelihood],
+    ) -> BoundedEstimate:
         """Return the best coefficient with its interval; its budget by the slope at its value."""
         family = self.channel.family
         last = float(family.values[-1])
         estimate = profile_estimate(
             along.values,
             along.coordinates,
-            along.deviance,
-            along.chi_square,
+            deviance,
+            chi_square,
             family.scale,
             reason=lambda interval: friction_reason(interval, last),
         )
         budget = {}
         if estimate.value is not None:
-            coordinate = bounded(estimate.value, family.scale)
-            stretch = family.scale / (1 - coordinate) ** 2  # of the coefficient by the coordinate
+            stretch = _stretch(estimate.value, family.scale)
             shares = at(estimate.value).budget()
             budget = {source: float(stretch * share) for source, share in shares.items()}
+            # The likelihood is no parabola: the shares of its slope add up to its width.
+            u = estimate.standard_uncertainty
+            whole = math.hypot(*budget.values())
+            if u is not None and whole > 0:
+                budget = {source: share * u / whole for source, share in budget.items()}
         degrees = max(sum(load.degrees for load in along.loads) - 1, 0)
         least = max(estimate.least, 0.0)
         p_value = float(chdtrc(max(degrees, 1), least))
@@ -100,6 +145,31 @@ def fit_friction(channel: Channel, shear: Channel | None = None) -> FrictionFit:
     return FrictionFit(channel, shear, fine, likelihood(fine, fine_shear))
 
 
+def _stretch(value: float, scale: float) -> float:
+    """Return the derivative of a coefficient by its bounded coordinate."""
+    return float(scale / (1 - bounded(value, scale)) ** 2)
+
+
+#: Standard deviation of half a normal distribution over its width.
+_HALF_NORMAL_DEVIATION = math.sqrt(1 - 2 / math.pi)
+#: A friction that is held has this width.
+_LEAST_WIDTH = 1e-6
+#: Values of the lubricated friction over which the likelihood is averaged, and how many widths
+#: they reach.
+_AVERAGED = 48
+_FARTHEST = 4.0
+
+
+def half_normal_weights(values: FloatArray, width: float) -> FloatArray:
+    """Return what of half a normal distribution of a width each of the values stands for, (V,)."""
+    inside = np.flatnonzero(values < _FARTHEST * width)
+    chosen = inside[:: math.ceil(inside.size / _AVERAGED)]
+    middles = (values[chosen][1:] + values[chosen][:-1]) / 2
+    weights = np.zeros(values.size)
+    weights[chosen] = np.diff(erf(np.array([0.0, *middles, np.inf]) / (math.sqrt(2) * width)))
+    return weights
+
+
 def random_uncertainty(budget: Mapping[str, float]) -> float:
     """Return what noise, centre and baseline add to a measured maximum."""
     parts = [u for source, u in budget.items() if source not in _SYSTEMATIC]
@@ -107,15 +177,31 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
 
 
 def with_loading(by_loading: Mapping[str, BoundedEstimate]) -> dict[str, BoundedEstimate]:
-    """Add the standard uncertainty of a rectangle between both loadings, width / sqrt(12)."""
+    """Count the standard uncertainty of a rectangle between both loadings, width / sqrt(12)."""
     counted = dict(by_loading)
     values = [estimate.value for estimate in by_loading.values() if estimate.value is not None]
     if len(values) == 2:
         apart = abs(values[0] - values[1]) / math.sqrt(12)
         for loading, estimate in by_loading.items():
-            budget = {**estimate.budget, "loading": apart}
-            counted[loading] = replace(estimate, budget=budget)
+            counted[loading] = _widened(estimate, apart)
     return counted
+
+
+def _widened(estimate: BoundedEstimate, apart: float) -> BoundedEstimate:
+    """Count one more standard uncertainty, by the loading, in a coefficient and its interval."""
+    value = estimate.best
+    u = estimate.standard_uncertainty
+    interval = estimate.interval
+    low = value - math.hypot(value - interval.low, EXPANDED * apart)
+    high = interval.high
+    if high is not None:
+        high = value + math.hypot(high - value, EXPANDED * apart)
+    return replace(
+        estimate,
+        standard_uncertainty=None if u is None else math.hypot(u, apart),
+        interval=replace(interval, low=max(low, 0.0), high=high),
+        budget={**estimate.budget, "loading": apart},
+    )
 
 
 def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> LoadComparison:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
-from scipy.special import j0, j1
+from scipy.special import j0, j1, logsumexp
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import Wavenumbers
@@ -52,6 +52,11 @@ class LoadPoints:
     free_centre: bool = True
     load_share: float = 0.0  # relative standard uncertainty of all loads
     position_share: float = 0.0  # likewise of the stage's scale
+    gain_share: float = 0.0  # likewise of the sensor's chain, common to all scans
+    own_gain: float = 0.0  # likewise of this scan only
+    # Which of the scans, and of the load cells, it is of: one there, zero elsewhere.
+    scan: FloatArray = field(default_factory=lambda: np.ones(1))
+    load_cell: FloatArray = field(default_factory=lambda: np.ones(1))
     correlation: FloatArray | None = None  # (n, n): of the electronic noise
     # (n, m): one where a reading is of the contact; without it each is of its own.
     contacts: FloatArray | None = None
@@ -114,8 +119,38 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         flat=np.stack([np.ones_like(position), drift], axis=1),
         load_share=(profile.load_uncertainty or 0.0) / profile.load,
         position_share=profile.scan.position_scale_uncertainty or 0.0,
+        gain_share=profile.scan.gain_uncertainty or 0.0,
         correlation=points.correlation,
     )
+
+
+#: Relative standard uncertainty of a scan's gain that others do not share.
+BETWEEN_SCAN_GAIN = 0.005
+
+
+def points_of(
+    profiles: Sequence[MeasuredProfile],
+    channel: str = "zz",
+    between_scan_gain: float = BETWEEN_SCAN_GAIN,
+) -> list[LoadPoints]:
+    """Return the points of profiles, with what each scan and each load cell has for itself."""
+    scans = _own([id(profile.scan) for profile in profiles])
+    # A load cell that is not named is none of the others.
+    cells = []
+    for profile in profiles:
+        cell = profile.scan.load_cell
+        cells.append(cell.serial_number or cell.name or id(profile.scan))
+    points = []
+    for profile, scan, load_cell in zip(profiles, scans, _own(cells), strict=True):
+        own = {"own_gain": between_scan_gain, "scan": scan, "load_cell": load_cell}
+        points.append(replace(load_points(profile, channel), **own))
+    return points
+
+
+def _own(keys: Sequence[Hashable]) -> FloatArray:
+    """Return a row for each of the keys: one in the column of its kind."""
+    kinds = list(dict.fromkeys(keys))
+    return np.eye(len(kinds))[[kinds.index(key) for key in keys]]
 
 
 def points_at(
@@ -126,7 +161,8 @@ def points_at(
 ) -> LoadPoints:
     """Return points of the nominal load at places (n,), with the load's uncertainties of others."""
     nothing = np.zeros(offset.size)
-    return LoadPoints(
+    return replace(
+        like,
         u=nothing + u,
         offset=offset,
         log_load=nothing,
@@ -135,8 +171,8 @@ def points_at(
         x_errors=nothing,
         flat=np.zeros((offset.size, 0)),
         free_centre=False,
-        load_share=like.load_share,
-        position_share=like.position_share,
+        correlation=None,
+        contacts=None,
     )
 
 
@@ -180,6 +216,7 @@ def sensor_of(
     nodes = family.wavenumbers
     known = shared_changes(apparatus, scans, nodes.k)
     shared = {name: change for name, change in known.items() if name in (*family.changes, "load")}
+    shared |= input_changes(apparatus, _one_chain(apparatus, scans), nodes.k)
     inputs = [name for name in common if name not in shared]
     calibration = input_changes(apparatus, inputs, nodes.k)
     transfer, changes = sensor_changes(apparatus, nodes.k, [*shared, *calibration])
@@ -196,6 +233,15 @@ def sensor_of(
         changes = changes @ axes[sizes > _NEGLIGIBLE * sizes[0]].T
     constant = apparatus.conversion_constant
     return Sensor(nodes, constant * transfer, changes, constant, family.order, shared)
+
+
+def _one_chain(apparatus: ApparatusFunction, scans: Sequence[MeasuredScan | Scan]) -> Iterator[str]:
+    """Yield what calibration and contacts have in common of the stage and the sensor's chain."""
+    if all(scan.stage.same_as(apparatus.stage) for scan in scans):
+        yield "position_scale"
+    # The sensor is the same, and so is its chain.
+    if all(scan.gain_uncertainty is not None for scan in scans):
+        yield "gain"
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,15 +285,21 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     if sensor.changes.size:
         changed = [at_points(change * spectra) for change in sensor.changes.T]
         columns["apparatus"] = np.stack(changed, axis=-1)
-    contact = {**members.changes, "load": points.load_share * members.by_load}
+    contact = {name: change[:, load] for name, change in members.changes.items()}
+    contact["load"] = points.load_share * members.by_load[:, load]
+    contact["gain"] = points.gain_share * spectra
     for source in dict.fromkeys([*contact, *sensor.shared]):
         change = sensor.shared.get(source, 0.0) * spectra
         if source in contact:
-            change = change + transfer * contact[source][:, load]
+            change = change + transfer * contact[source]
         columns[source] = at_points(change)[..., None]
-    columns["position_scale"] = (points.position_share * points.radius * slope)[..., None]
+    columns["load"] = columns["load"] * points.load_cell
+    stretched = (points.position_share * points.radius * slope)[..., None]
+    columns["position_scale"] = columns.get("position_scale", 0.0) + stretched
+    signal = at_points(transfer * spectra) + by_load * points.log_load
+    columns["between_scan_gain"] = points.own_gain * signal[..., None] * points.scan
     return Predicted(
-        signal=at_points(transfer * spectra) + by_load * points.log_load,
+        signal=signal,
         by_load=by_load,
         by_coordinate=at_points(transfer * members.by_coordinate[:, load]),
         slope=slope,
@@ -357,6 +409,11 @@ class Standardised:
     log_determinant: FloatArray  # (V,): of N and of the flat information
     degrees: int
 
+    def with_column(self, source: str, column: FloatArray) -> Standardised:
+        """Return the load with one systematic column (V, n, 1) more."""
+        columns = np.concatenate([self.columns, column], axis=-1)
+        return replace(self, columns=columns, widths={**self.widths, source: 1})
+
     @cached_property
     def statistics(self) -> Statistics:
         """What the load tells about the parameter and the systematic errors, shape (V,)."""
@@ -408,6 +465,10 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     )
 
 
+#: Source of the uncertainty by the friction of lubricated loads.
+LUBRICATED_FRICTION = "lubricated_friction"
+
+
 @dataclass(frozen=True, eq=False)
 class Likelihood:
     """Likelihood of one load or several along V values of one parameter."""
@@ -420,9 +481,15 @@ class Likelihood:
         """Return the likelihood of some of the loads."""
         return replace(self, loads=tuple(self.loads[i] for i in chosen))
 
-    def with_held(self, held: Likelihood) -> Likelihood:
-        """Add loads whose parameter is held at their first value; all share systematic errors."""
-        loads = list(self.loads)
+    def with_held(self, held: Likelihood, spread: float = 0.0) -> Likelihood:
+        """Add loads that are held at their first value; all share systematic errors.
+
+        ``spread`` is the standard uncertainty of that value, in the bounded coordinate.
+        """
+        loads = []
+        for load in self.loads:
+            unmoved = np.zeros((*load.slope.shape, 1))
+            loads.append(load.with_column(LUBRICATED_FRICTION, unmoved))
         for load in held.loads:
             first = replace(
                 load,
@@ -431,8 +498,25 @@ class Likelihood:
                 columns=load.columns[:1],
                 log_determinant=load.log_determinant[:1],
             )
-            loads.append(first)
+            moved = spread * load.slope[:1, :, None]
+            loads.append(first.with_column(LUBRICATED_FRICTION, moved))
         return replace(self, loads=tuple(loads))
+
+    def averaged_over(
+        self, held: Likelihood, weights: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Average the likelihood over values (W,) of other loads; all share systematic errors.
+
+        Return log likelihood and mean chi-square, (V,), and the mean of the other loads' value.
+        """
+        among = np.flatnonzero(weights)
+        pairs = zip(self.statistics, held.statistics, strict=True)
+        both = Statistics(*(own[:, None] + other[among] for own, other in pairs))
+        logs, chi_square = log_likelihood(both)
+        weighed = logs + np.log(weights[among])
+        whole = np.asarray(logsumexp(weighed, axis=1))
+        shares = np.exp(weighed - whole[:, None])
+        return whole, np.sum(shares * chi_square, axis=1), shares @ held.values[among]
 
     @cached_property
     def statistics(self) -> Statistics:

@@ -79,10 +79,10 @@ class BoundedEstimate:
     (m,), along ``values`` (m,) that may end in ``inf``, is :math:`-2\ln p(u | \theta)` up to a
     constant, by which its least value is chi-square there: ``least``, of ``degrees`` (0 of one
     datum) and ``p_value``.
-    ``beside``: how many lubricated loads were fitted with it, held at no friction.
-    ``budget``: contribution of each source to the standard uncertainty; ``loading`` is that of the
-    loading's definition.  Printed, it is the value with its interval, or the bound, rounded
-    outward.
+    ``beside``: how many lubricated loads were fitted with it; ``by_lubricated``: how far it moves
+    for one of their friction.  ``budget``: contribution of each source to the standard uncertainty,
+    the squares of which add up; ``loading`` is that of the loading's definition.  Printed, it is
+    the value with its interval, or the bound, rounded outward.
 
     >>> nothing = np.zeros(1)
     >>> print(BoundedEstimate(0.2134, None, Interval(0.171, 0.262), "", nothing, nothing, 0.0))
@@ -103,6 +103,7 @@ class BoundedEstimate:
     p_value: float = 1.0
     unit: str = ""
     beside: int = 0
+    by_lubricated: float | None = None
 
     @property
     def best(self) -> float:

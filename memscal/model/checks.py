@@ -95,7 +95,7 @@ bracketing: share of a load's points outside of what no friction and full stick 
 joint_chi_square: all loads of a kind against one friction coefficient, chi-square per degree
     alone: friction changes with the load, see the coefficient of each, or --interface
 lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
-    they have friction, or A, load or thickness is wrong: the dry ones are doubtful
+    more friction than was counted, or A, load or thickness is wrong: the dry ones are doubtful
 """
 _LINES = _EXPLAINED.splitlines()
 _NAMED = [line.partition(": ") for line in _LINES[::2]]

@@ -29,7 +29,7 @@ from memscal.model.checks import (
 )
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
-from memscal.model.instrument import LoadCell, StressSensor
+from memscal.model.instrument import Equipment, LoadCell, StressSensor
 from memscal.model.notation import Reading, format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
@@ -44,7 +44,8 @@ Record = TypeVar("Record", ElasticFilm, RoundIndenter)
 class MeasuredScan:
     """What is known of a scan beside its points.
 
-    ``width``: its largest extent, in m; ``position_scale_uncertainty``: relative, of the stage;
+    ``width``: its largest extent, in m; ``position_scale_uncertainty``, ``gain_uncertainty``:
+    relative, of the stage and of the sensor's chain;
     ``synthetic``: whether it was simulated; ``source``: the file it was read from; ``unit``: SI
     unit of its readings where they are no voltages.
 
@@ -64,8 +65,10 @@ class MeasuredScan:
     sensor: StressSensor
     width: float
     load_cell: LoadCell = field(default_factory=LoadCell)
+    stage: Equipment = field(default_factory=Equipment)
     lubrication: str = ""
     position_scale_uncertainty: float | None = None
+    gain_uncertainty: float | None = None
     synthetic: bool = False
     source: SourceFile | None = None
     unit: str = ""

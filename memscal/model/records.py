@@ -315,6 +315,7 @@ STRESS_CURVE = record(
     signal="s_zz",
 )
 _OF_SCALE = "relative uncertainty of all positions"
+_OF_GAIN = "relative uncertainty of all readings"
 MEASURED_SCAN = record(
     "NXcollection",
     *required(
@@ -322,6 +323,7 @@ MEASURED_SCAN = record(
         Quantity("synthetic", "truth", "whether the scan is synthetic"),
     ),
     Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors"),
+    Quantity("gain_uncertainty", _ONE, _OF_GAIN, stored="gain_errors"),
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 

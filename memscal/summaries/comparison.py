@@ -110,7 +110,13 @@ def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, fl
 
 
 #: Sources of uncertainty that scans of one sensor on one film do not share.
-_SCAN_SOURCES = {"noise", "load_scatter", "position"}
+_SCAN_SOURCES = {
+    "noise",
+    "load_scatter",
+    "position",
+    "between_scan_gain",
+    "lubricated_friction",
+}
 
 
 def correlated(comparison: FrictionComparison) -> dict[str, Any]:
@@ -213,6 +219,7 @@ def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
         **bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate, **fit),
         "lubricated_beside": estimate.beside,
+        "by_lubricated_friction": estimate.by_lubricated,
         "profile_likelihood": {
             "friction_coefficient": {"value": _shortened(estimate.values), "unit": "1"},
             "deviance": _shortened(estimate.deviance),
@@ -275,7 +282,7 @@ _EQUALS = {VALUE: " =", INTERVAL: " in", UNKNOWN: " is", LOWER_BOUND: "", UPPER_
 
 def answer(comparison: FrictionComparison) -> str:
     """Return the coefficients of all loads with their intervals, and how the checks stand."""
-    held = any(estimate.beside for *_, estimate in _joint(comparison))
+    moved = [estimate.by_lubricated for *_, estimate in _joint(comparison)]
     lines = []
     for lubrication, by_loading in comparison.joint.items():
         estimates = list(by_loading.values())
@@ -294,7 +301,10 @@ def answer(comparison: FrictionComparison) -> str:
         level = f" ({percent(estimates[-1].interval.level)})"
         if kinds & {LOWER_BOUND, UPPER_BOUND, INTERVAL}:
             level = ""
-        taken = ", taken as 0" if held and lubrication == "lubricated" else ""
+        taken = ""
+        if any(moved) and lubrication == "lubricated":
+            largest_move = max(filter(None, moved), key=abs)
+            taken = f"; it moves the others by {largest_move:.2f} of itself"
         name = (lubrication or "all contacts").capitalize()
         lines.append(f"{name}: μ{_EQUALS[estimates[0].kind]} {stated}{level}{taken}.")
     friction = "\n".join(lines)
@@ -437,6 +447,9 @@ def _budget_table(comparison: FrictionComparison) -> Table:
     if rows:
         totals = [_share(joint.standard_uncertainty) for joint in shown.values()]
         rows.append(["standard uncertainty", *totals])
+    moved = [joint.by_lubricated for joint in shown.values()]
+    if any(moved):
+        rows.append(["dμ/dμ of the lubricated", *map(_share, moved)])
     title = "Contributions to the standard uncertainty of the coefficient of all loads"
     return Table(title, ["source", *shown], rows)
 

@@ -13,7 +13,7 @@ from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import load_points, predict, sensor_of
+from memscal.friction.likelihood import load_points, points_of, predict, sensor_of
 
 FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
 TRUTH = 0.2
@@ -106,7 +106,7 @@ def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> N
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
     measured = memscal.measure_stress(wrong, apparatus)
-    found = compare_measured(measured, apparatus, families, lubricated="apart")
+    found = compare_measured(measured, apparatus, families, lubricated_friction=None)
     assert {"applied_force_all", "bracketing_1", "bracketing_2"} <= failed(found)
     assert found.joint["dry"]["incremental"].value is None
 
@@ -155,24 +155,98 @@ def test_options_that_make_no_sense_are_refused(made, apparatus, options, words)
         memscal.compare(made.lubricated, apparatus, **options)
 
 
-def test_lubricated_loads_are_fitted_beside_the_dry_ones_unless_they_have_friction(
-    made, apparatus, families, found
+def test_lubricated_loads_are_fitted_beside_the_dry_ones(made, apparatus, families, found) -> None:
+    measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
+    by = [
+        compare_measured(measured, apparatus, families, lubricated_friction=width)
+        for width in (0.0, 0.015, 0.03, None)
+    ]
+    held, usual, wide, apart = (each.joint["dry"]["incremental"] for each in by)
+    assert [each.beside for each in (held, usual, wide, apart)] == [2, 2, 2, 0]
+    assert held.interval.holds(TRUTH)
+    for source in ("apparatus", "young_modulus", "thickness"):
+        assert held.budget[source] < apart.budget[source] / 2, source
+    assert found.joint["dry"]["incremental"].interval == usual.interval
+    # Without friction the dry coefficient is less by what moves it; the unknown is in the budget.
+    assert held.value < usual.value < wide.value
+    assert apart.by_lubricated is None
+    assert "lubricated_friction" not in held.budget
+    assert usual.budget["lubricated_friction"] < wide.budget["lubricated_friction"]
+    assert held.standard_uncertainty < usual.standard_uncertainty < wide.standard_uncertainty
+
+
+def test_how_far_lubricated_friction_moves_the_dry_coefficient(
+    made, apparatus, families, monkeypatch
 ) -> None:
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
-    by = {w: compare_measured(measured, apparatus, families, lubricated=w) for w in (None, "apart")}
-    together, apart = (each.joint["dry"]["incremental"] for each in by.values())
-    assert (together.beside, apart.beside) == (2, 0)
-    assert together.interval.holds(TRUTH)
-    for source in ("apparatus", "young_modulus", "thickness"):
-        assert together.budget[source] < apart.budget[source] / 2, source
-    assert found.joint["dry"]["incremental"].beside == 2
+
+    def estimate(at: float) -> memscal.BoundedEstimate:
+        def one_value(values: np.ndarray, _: float) -> np.ndarray:
+            return np.eye(values.size)[np.abs(values - at).argmin()]
+
+        monkeypatch.setattr("memscal.friction.effective.half_normal_weights", one_value)
+        found = compare_measured(measured, apparatus, families, lubricated_friction=0.0)
+        return found.joint["dry"]["incremental"]
+
+    none = estimate(0.0)
+    values = none.values
+    little = float(values[np.abs(values - 0.01).argmin()])
+    change = (estimate(little).value - none.value) / little
+    # One that is held at none though it is there lowers the coefficient by as much.
+    assert none.by_lubricated == pytest.approx(-change, rel=0.2)
+
+
+def test_a_failed_check_leaves_the_fit_as_it_is(made, apparatus, families) -> None:
     wrong = [made.dry, replace(made.dry, lubrication="lubricated")]
     refused = memscal.measure_stress(wrong, apparatus)
     chosen = compare_measured(refused, apparatus, families)
     assert "lubricated_frictionless" in failed(chosen)
-    assert chosen.joint["dry"]["incremental"].beside == 0
+    assert chosen.joint["dry"]["incremental"].beside == 2
     with pytest.raises(InputError, match="frictionless"):
-        memscal.compare(measured, apparatus, lubricated="wet")
+        memscal.compare(refused, apparatus, lubricated="wet")
+
+
+def test_a_budget_adds_up_to_its_total(made, apparatus) -> None:
+    found = memscal.compare([made.dry, made.lubricated], apparatus, friction=FRICTION)
+    joint = found.joint["dry"]
+    loads = [one.by_profile for loads in found.loads.values() for one in loads]
+    stated = [one for one in (*joint.values(), *loads) if one.standard_uncertainty is not None]
+    assert len(stated) > 2
+    for one in stated:
+        assert np.linalg.norm([*one.budget.values()]) == pytest.approx(one.standard_uncertainty)
+    assert "loading" in joint["total"].budget
+
+
+def test_each_scan_has_a_gain_of_its_own(made, apparatus, families) -> None:
+    scans = [made.dry, made.lubricated, scaled(made.dry, 1.01)]
+    measured = memscal.measure_stress(scans, apparatus)
+    points = points_of(measured.profiles)
+    assert [one.scan.tolist() for one in points[::2]] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    sensor = sensor_of(apparatus, families["incremental"], 8e-3, measured.scans)
+    column = predict(points[2], sensor, families["incremental"].at(0.2), 0).columns
+    signal = predict(points[2], sensor, families["incremental"].at(0.2), 0).signal
+    assert column["between_scan_gain"][0, :, 1] == pytest.approx(0.005 * signal[0])
+    assert not column["between_scan_gain"][..., [0, 2]].any()
+    # No load cell is named: each scan has a load of its own.
+    assert column["load"].shape[-1] == 3
+
+
+def test_a_gain_of_one_scan_is_counted(made, apparatus, families) -> None:
+    wrong = [made.dry, scaled(made.lubricated, 1.02)]
+    measured = memscal.measure_stress(wrong, apparatus)
+    right = memscal.measure_stress([made.dry, made.lubricated], apparatus)
+
+    def moved(gain: float) -> float:
+        pair = [
+            compare_measured(
+                one, apparatus, families, between_scan_gain=gain, lubricated_friction=0.0
+            )
+            for one in (measured, right)
+        ]
+        values = [each.joint["dry"]["incremental"].best for each in pair]
+        return abs(values[0] - values[1])
+
+    assert moved(0.05) < moved(0.0)
 
 
 def test_a_noise_that_was_estimated_has_no_chi_square(made, apparatus, families) -> None:

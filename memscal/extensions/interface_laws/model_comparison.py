@@ -34,7 +34,7 @@ from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import amontons_family
 from memscal.friction.family import ProfileFamily, bounded, unbounded
 from memscal.friction.interval import profile_estimate
-from memscal.friction.likelihood import Channel, likelihood, load_points, sensor_of
+from memscal.friction.likelihood import Channel, likelihood, points_of, sensor_of
 from memscal.friction.marginal_likelihood import (
     Prior,
     Statistics,
@@ -191,8 +191,7 @@ def _channel(
     """Return what was measured with the contacts of a family, one for each profile."""
     reach = max(profile.r[-1] for profile in profiles)
     points = []
-    for profile, load in zip(profiles, family.loads, strict=True):
-        stated = load_points(profile)
+    for profile, stated, load in zip(profiles, points_of(profiles), family.loads, strict=True):
         # Loads count from that of the calculated contact.
         log_load = stated.log_load + math.log(profile.load / load)
         points.append(replace(stated, log_load=log_load))
