@@ -5,7 +5,6 @@ lubricated contacts may slide with friction.  Its contacts are solved with rings
 load by load, those of the analysis with 56.  Set MEMSCAL_FULL_STUDY for more seeds.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 import memscal
 from memscal.extensions.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE, simulate_contacts
@@ -95,3 +94,39 @@ def deviations(comparisons: list[FrictionComparison]) -> np.ndarray:
 def held(comparisons: list[FrictionComparison]) -> int:
     joint = [one.joint["dry"]["incremental"] for one in comparisons]
     return sum(one.interval.holds(FRICTION) for one in joint)
+
+
+#: A lubricated friction, or a gain or load of the lubricated scan, that nothing states.
+PERTURBED = (
+    {"lubricated": 0.0},
+    {"lubricated": 0.02},
+    {"lubricated": 0.04},
+    {"lubricated": 0.0, "gain": 1.01},
+    {"lubricated": 0.0, "load": 1.02},
+)
+
+
+def root_mean_square(z: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(z**2)))
+
+
+def test_what_the_two_states_do_not_share_is_counted() -> None:
+    def of_seeds(perturbed: dict[str, float]) -> np.ndarray:
+        return deviations([compared(seed=seed, **perturbed) for seed in range(SEEDS)])
+
+    z = np.concatenate([of_seeds(perturbed) for perturbed in PERTURBED])
+    assert root_mean_square(z) < root_mean_square_limit(1.4, SEEDS, CHANCE)
+
+
+def test_the_uncertainty_of_equal_states_stays_small() -> None:
+    joint = [compared(0.0, seed).joint["dry"]["incremental"] for seed in range(SEEDS)]
+    assert np.mean([one.standard_uncertainty for one in joint]) <= 0.013
+
+
+@pytest.mark.parametrize("lubricated", LUBRICATED[:2])
+def test_the_interval_holds_where_gains_and_loads_are_drawn(lubricated: float) -> None:
+    # A lubricated friction of 0.04, 2.7 widths of its prior, it does not: docs/friction.md.
+    found = [compared(lubricated, seed, draw=True) for seed in range(SEEDS)]
+    assert held(found) >= binom.ppf(CHANCE, SEEDS, 0.93)
+    low, high = np.sqrt(chi2.ppf([CHANCE, 1 - CHANCE], SEEDS) / SEEDS)
+    assert 0.7 * low < root_mean_square(deviations(found)) < 1.3 * high

@@ -392,12 +392,16 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
     return float(values[below] + share * (values[above] - values[below]))
 
 
+#: Intervals of a length are wider by this factor: contacts are linearised about the stated film.
+WIDENED = 1.55
+
+
 def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> BoundedEstimate:
     """Return a length by profile likelihood, one-sided where the data give only a bound."""
     return profile_estimate(
         along.values,
         along.coordinates,
-        -2 * along.log_likelihood,
+        -2 * along.log_likelihood / WIDENED**2,
         along.chi_square,
         family.scale,
         reason=lambda interval: _length_reason(what, interval, family.values[-1]),
