@@ -36,20 +36,16 @@ class FrictionFit:
 
         Loads that are ``held`` at no friction tell what errors all loads share.
         """
+
+        def likelihood_at(value: float, loads: Sequence[int]) -> Likelihood:
+            """Likelihood of some of the loads at one value."""
+            shear = None if self.shear is None else self.shear.at(value).only(loads)
+            return likelihood(self.channel.at(value).only(loads), shear)
+
+        frictionless = likelihood_at(float(self.channel.family.values[0]), held)
         along = self.whole.only(chosen).with_held(self.whole.only(held))
-        none = float(self.channel.family.values[0])
-        channel = self.channel.only(chosen)
-        frictionless = self.channel.at(none).only(held)
-        if self.shear is None:
-            without = likelihood(frictionless)
-            return self._estimate(
-                along, lambda value: likelihood(channel.at(value)).with_held(without)
-            )
-        shear = self.shear.only(chosen)
-        without = likelihood(frictionless, self.shear.at(none).only(held))
         return self._estimate(
-            along,
-            lambda value: likelihood(channel.at(value), shear.at(value)).with_held(without),
+            along, lambda value: likelihood_at(value, chosen).with_held(frictionless)
         )
 
     def coefficient_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
