@@ -238,9 +238,7 @@ def calibrate(
     prepared = prepare(scans, request)
     if free:
         prepared = _with_thickness(prepared)
-    given = (prepared.scans, prepared.stresses, request.method, channel)
-    solution = at_offsets(solve(*given, centre=centre, owners=prepared.owners))
-    solution = less_mean_offset(solution)
+    solution = less_mean_offset(at_offsets(_solved(prepared)))
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
@@ -254,13 +252,22 @@ def calibrate(
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 
 
+def _solved(prepared: Prepared) -> Solution:
+    request = prepared.request
+    return solve(
+        prepared.scans,
+        prepared.stresses,
+        request.method,
+        request.channel,
+        centre=request.centre,
+        owners=prepared.owners,
+    )
+
+
 def _with_thickness(prepared: Prepared) -> Prepared:
     """Estimate the thickness of the films from the scans, and take it for that of the rods."""
-    request = prepared.request
-    require_free(request.free, prepared.scans, prepared.references)
-    given = (prepared.scans, prepared.stresses, request.method, request.channel)
-    solution = solve(*given, centre=request.centre, owners=prepared.owners)
-    thickness = free_thickness(solution)
+    require_free(prepared.request.free, prepared.scans, prepared.references)
+    thickness = free_thickness(_solved(prepared))
     scans = thickness.estimated(prepared.scans)
     stresses = tuple(reference_profile(scan, None) for scan in scans)
     return replace(prepared, scans=scans, stresses=stresses, thickness=thickness)

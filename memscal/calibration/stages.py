@@ -123,8 +123,9 @@ def deconvolve(
     posterior = None
     # Eq. 2: A G, by a division or of the posterior, as constrained.
     if isinstance(method, Bayesian):
-        constraints = {"nonnegative": method.nonnegative, "monotone": method.monotone}
-        posterior = constrained_profile(estimate, **constraints)
+        posterior = constrained_profile(
+            estimate, nonnegative=method.nonnegative, monotone=method.monotone
+        )
         window = np.ones_like(stress.transform.real)
         quotient = Quotient(fields.grid, fields.kernel(posterior.radial), window)
     else:

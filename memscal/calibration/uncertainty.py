@@ -221,8 +221,21 @@ class _Derivatives:
     by_voltage: VoltageMap  # (m, n)
     by_state: FloatArray  # (m, p): by the posterior's parameters, beside what voltages do to them
     hidden: FloatArray  # (m, q): columns
-    # (m, p): by the posterior's parameters, what a window hides; of parameters, what is corrected
-    lost: FloatArray
+
+    def __getitem__(self, rows: slice) -> _Derivatives:
+        return _Derivatives(self.by_voltage[rows], self.by_state[rows], self.hidden[rows])
+
+    def combined(self, rows: FloatArray) -> _Derivatives:
+        """Derivatives of sums of the results, by rows (l, m)."""
+        return _Derivatives(rows @ self.by_voltage, rows @ self.by_state, rows @ self.hidden)
+
+    @classmethod
+    def stacked(cls, parts: Sequence[_Derivatives]) -> _Derivatives:
+        """Put the derivatives of several results below each other."""
+        by_voltage = VoltageMap.stacked([part.by_voltage for part in parts])
+        by_state = np.vstack([part.by_state for part in parts])
+        hidden = np.vstack([part.hidden for part in parts])
+        return cls(by_voltage, by_state, hidden)
 
 
 def propagate(
@@ -236,12 +249,13 @@ def propagate(
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
     estimate = solution.estimate
     kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
-    names, values, derivatives = _parameters(estimate, deconvolution, kernel)
+    names, values, parameters = _parameters(estimate, deconvolution, kernel, division)
+    derivatives = _Derivatives.stacked([parameters, kernel[1:]])
     by_voltage = derivatives.by_voltage
     columns = {
         "noise": estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.fixed_root,
-        "window": np.hstack([derivatives.hidden, derivatives.lost @ estimate.fixed_root]),
+        "window": derivatives.hidden,
     }
     rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -341,9 +355,9 @@ def expected_values(solution: Solution) -> dict[str, float]:
     # A division follows the noise of its scan, of which scans drawn about the mean know nothing.
     estimate = solution.estimate
     deconvolution = solution.deconvolution
-    kernel, _ = _kernel_derivatives(solution, deconvolution, np.zeros(0))
-    names, values, derivatives = _parameters(estimate, deconvolution, kernel)
-    noise = derivatives.by_voltage[: len(names)] @ (estimate.points.u - drawn_about(solution))
+    kernel, division = _kernel_derivatives(solution, deconvolution, np.zeros(0))
+    names, values, derivatives = _parameters(estimate, deconvolution, kernel, division)
+    noise = derivatives.by_voltage @ (estimate.points.u - drawn_about(solution))
     return dict(zip(names, (values - noise).tolist(), strict=True))
 
 
@@ -366,49 +380,35 @@ def _budget(
 
 
 def _parameters(
-    estimate: ProfileEstimate, deconvolution: Deconvolution, kernel: _Derivatives
+    estimate: ProfileEstimate,
+    deconvolution: Deconvolution,
+    kernel: _Derivatives,
+    division: DivisionMap | None,
 ) -> tuple[tuple[str, ...], FloatArray, _Derivatives]:
-    """Names and values of the parameters as reported; derivatives of these, of G, its transfer."""
+    """Names, values and derivatives of the parameters, in the order in which they are reported."""
     fit = estimate.gaussian
     g = deconvolution.g
+    radial = kernel[1 : 1 + g.r.size]
     functionals = kernel_functionals(g, deconvolution.gaussian_sigma, deconvolution.hidden)
-    read_off_g = np.stack([functional.row for functional in functionals])
-    radial = slice(1, 1 + g.r.size)
+    widths = radial.combined(np.stack([functional.row for functional in functionals]))
+    if division is not None:
+        lost = functionals[1].row @ division.lost[1 : 1 + g.r.size]
+        lost[0] -= functionals[1].row @ deconvolution.hidden
+        widths = _corrected_full_width(widths, lost, estimate)
+        # What a window hides of G adds to the integral of its square by its own square.
+        whole = g.radial + radial.hidden[:, 0]
+        area = 1 / np.sum(ring_areas(g.r) * whole**2)
+        widths.hidden[-1, 0] = area - functionals[-1].value
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain = fit.gain(estimate.weights)
     ellipse = estimate.points.ellipse
     nuisances, scale = _nuisances(estimate.points.free)
     count = len(scale)
-    # The full width is corrected by the estimate, with whose noise it scatters.
-    corrected = np.zeros((len(functionals), kernel.lost.shape[1]))
-    corrected[1] = functionals[1].row @ kernel.lost[radial]
-    parts = [
-        kernel.by_voltage[:1],
-        gain[[1, *range(len(gain) - ellipse, len(gain))]],
-        read_off_g @ kernel.by_voltage[radial] + corrected @ estimate.weighed.gain,
-        estimate.weighed.gain[2 : 2 + count] * scale,
-        gain[:1],
-        kernel.by_voltage[1:],
-    ]
-    by_voltage = VoltageMap.stacked(parts)
-    # No regularisation touches what was fitted: its rows stay zero, but for the nuisances' own.
-    by_state = np.zeros((len(by_voltage), kernel.by_state.shape[1]))
-    hidden = np.zeros((len(by_voltage), kernel.hidden.shape[1]))
-    lost = np.zeros_like(by_state)
-    widths = slice(2 + ellipse, 2 + ellipse + len(functionals))
-    lost[widths] = corrected
-    for rows, of_kernel in ((by_state, kernel.by_state), (hidden, kernel.hidden)):
-        rows[0] = of_kernel[0]
-        rows[widths] = read_off_g @ of_kernel[radial]
-        rows[-len(of_kernel) + 1 :] = of_kernel[1:]
-    by_state[widths.stop : widths.stop + count, 2 : 2 + count] = np.diag(scale)
-    if deconvolution.divided and hidden.size:
-        # What a window hides of G adds to the integral of its square by its own square.
-        whole = g.radial + kernel.hidden[radial, 0]
-        area = 1 / np.sum(ring_areas(g.r) * whole**2)
-        hidden[widths.stop - 1, 0] = area - functionals[-1].value
-        hidden[widths.start + 1, 0] -= functionals[1].row @ deconvolution.hidden
-        hidden[widths.start + 1, 1:] = 0.0
+    shape = [1, *range(len(gain) - ellipse, len(gain))]
+    nuisance = _fitted(kernel, estimate.weighed.gain[2 : 2 + count] * scale)
+    nuisance.by_state[:, 2 : 2 + count] = np.diag(scale)
+    conversion = _fitted(kernel, gain[:1])
+    parts = [kernel[:1], _fitted(kernel, gain[shape]), widths, nuisance, conversion]
     values = [
         *(deconvolution.conversion_constant, fit.sigma, *fit.ellipticity[:ellipse]),
         *(functional.value for functional in functionals),
@@ -423,7 +423,30 @@ def _parameters(
         *nuisances,
         "conversion_constant_gaussian",
     )
-    return names, np.array(values), _Derivatives(by_voltage, by_state, hidden, lost)
+    return names, np.array(values), _Derivatives.stacked(parts)
+
+
+def _fitted(kernel: _Derivatives, by_voltage: VoltageMap) -> _Derivatives:
+    """Derivatives of parameters that no regularisation touches."""
+    count = len(by_voltage)
+    states = np.zeros((count, kernel.by_state.shape[1]))
+    return _Derivatives(by_voltage, states, np.zeros((count, kernel.hidden.shape[1])))
+
+
+def _corrected_full_width(
+    widths: _Derivatives, lost: FloatArray, estimate: ProfileEstimate
+) -> _Derivatives:
+    """Derivatives of widths of which the second is less what a window adds, (1 + p,), to it."""
+    # It is corrected by the estimate, with whose noise it scatters.
+    corrected = np.zeros((len(widths.by_voltage), lost.size - 1))
+    corrected[1] = lost[1:]
+    by_voltage = widths.by_voltage + corrected @ estimate.weighed.gain
+    hidden = widths.hidden.copy()
+    fixed = lost[1:] @ estimate.fixed_root
+    hidden[1] = 0.0
+    hidden[1, 0] = lost[0]
+    hidden[1, hidden.shape[1] - fixed.size :] = fixed
+    return replace(widths, by_voltage=by_voltage, hidden=hidden)
 
 
 def _nuisances(free: BoolArray) -> tuple[list[str], FloatArray]:
@@ -454,8 +477,10 @@ def _kernel_derivatives(
     by_state[:, division.places] = by_nuisance
     spread = division.lost[:, 1:] @ square_root(estimate.weighed.covariance)
     by_voltage = division.direct + by_nuisance @ estimate.weighed.gain[division.places]
-    hidden = np.hstack([division.lost[:, :1], spread])
-    return _Derivatives(by_voltage, by_state, hidden, division.lost[:, 1:]), division
+    # The last columns are what the estimate leaves unknown of what is corrected.
+    corrected = np.zeros((len(spread), estimate.fixed_root.shape[1]))
+    hidden = np.hstack([division.lost[:, :1], spread, corrected])
+    return _Derivatives(by_voltage, by_state, hidden), division
 
 
 def _posterior_kernel(
@@ -475,7 +500,7 @@ def _posterior_kernel(
     transfer = (1 - share) * normalised[below] + share * normalised[below + 1]
     rows = np.vstack([basis.integrals, radial, transfer])
     nothing = np.zeros((len(rows), 0))
-    return _Derivatives(rows @ estimate.weighed.gain, rows, nothing, np.zeros_like(rows))
+    return _Derivatives(rows @ estimate.weighed.gain, rows, nothing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -517,8 +542,7 @@ def _division_map(
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
     geometry = model.geometry(estimate.centres)
-    by_centre = model.by_free_centres(model.shift_derivative(geometry, estimate.kernel))
-    nuisance = np.hstack([by_centre, model.drift_columns])
+    nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
     starts = range(0, kernels.shape[1], count)
@@ -543,7 +567,7 @@ def route_difference(solution: Solution, division: DivisionMap | None) -> float 
     direct = division.direct[: 1 + rings.size]
     moved = division.kept[: 1 + rings.size, 1:].copy()
     moved[:, division.places] += direct @ division.nuisance
-    noise = estimate.scattered(direct + -moved @ estimate.weighed.gain)
+    noise = estimate.scattered(direct - moved @ estimate.weighed.gain)
     difference = direct @ (estimate.points.u - estimate.predicted)
     variance = np.sum(np.hstack([noise, moved @ estimate.fixed_root]) ** 2, axis=1)
     in_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))

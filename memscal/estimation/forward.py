@@ -264,6 +264,10 @@ class ForwardModel:
         shift[self.axis] -= turn
         return np.asarray(shift)
 
+    def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
+        """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""
+        return self.by_free_centres(self.shift_derivative(geometry, kernel))
+
     def by_free_centres(self, shift: FloatArray) -> FloatArray:
         """Derivatives by the free coordinates of all centres (n, m), of those by each point's."""
         scan = self.points.scan

@@ -90,6 +90,10 @@ class VoltageMap:
             merged[id(right)] = (left if known is None else known[0] + left, right)
         return VoltageMap(tuple(merged.values()))
 
+    def __sub__(self, other: VoltageMap) -> VoltageMap:
+        """Subtract a map to the same numbers."""
+        return self + other * -1.0
+
     def dense(self) -> FloatArray:
         """All derivatives, (m, n)."""
         terms = [left if right is None else (right @ left.T).T for left, right in self.parts]

@@ -241,16 +241,7 @@ def compare(
     require_contacts(scans_of(opened))
     _require_few(opened, [one.sensor.channel for one in (sensor, tangential) if one is not None])
     measured = _measured(opened, sensor, override)
-    # Film, sphere, loads and reach (whole millimetres) of the contacts to calculate.
-    widest = max(scan.width for scan in measured.scans)
-    setting = {
-        "film": measured.scans[0].film,
-        "indenter": measured.scans[0].indenter,
-        "loads": np.unique(measured.loads),
-        "reach": math.ceil(_REACH * widest / _MM) * _MM,
-        "cache": cache,
-        "workers": workers,
-    }
+    setting = _setting(measured, cache, workers)
     if sensor.order:
         others = (references, lubricated, shear, macroscopic)
         if any(option is not None for option in others):
@@ -371,6 +362,20 @@ def _measured(
                 load_points(profile)  # refuses a file without points before anything is calculated
             stresses.append(same_apparatus(item, apparatus, override=override))
     return joined_stress(stresses)
+
+
+def _setting(measured: MeasuredStress, cache: CacheFolder, workers: int) -> dict[str, Any]:
+    """Return film, sphere, loads and reach (whole millimetres) of the contacts to calculate."""
+    scan = measured.scans[0]
+    widest = max(scan.width for scan in measured.scans)
+    return {
+        "film": scan.film,
+        "indenter": scan.indenter,
+        "loads": np.unique(measured.loads),
+        "reach": math.ceil(_REACH * widest / _MM) * _MM,
+        "cache": cache,
+        "workers": workers,
+    }
 
 
 def _families(

@@ -169,23 +169,7 @@ def measure_stress(
         overridden += restore.accept_mismatches(data, sensor, override=override)
     for data in scans:
         require_span(data)
-    origins = []
-    for data in scans:
-        origin = MeasuredScan(
-            film=data.set_up.film,
-            indenter=data.set_up.indenter,
-            sensor=data.sensor,
-            load_cell=data.load_cell,
-            stage=data.stage,
-            width=one_load.width_of(data),
-            lubrication=data.lubrication,
-            position_scale_uncertainty=data.position_scale_uncertainty,
-            gain_uncertainty=data.gain_uncertainty,
-            synthetic=bool(data.synthetic),
-            source=data.source,
-            unit="" if data.unit == "V" else data.unit,
-        )
-        origins.append(origin)
+    origins = tuple(one_load.measured_scan(data) for data in scans)
     singles = [restore.single_loads(data) for data in scans]
     for single in chain(*singles):
         restore.require_contact_size(single)
@@ -198,7 +182,7 @@ def measure_stress(
     checks = stress_checks(profiles, restored)
     return MeasuredStress(
         profiles=profiles,
-        scans=tuple(origins),
+        scans=origins,
         conversion_constant=sensor.conversion_constant,
         conversion_constant_uncertainty=sensor.parameters.uncertainty("conversion_constant"),
         checks=checks,
@@ -262,29 +246,35 @@ def _contents(profile: MeasuredProfile) -> tuple[str, tuple[bytes, ...]]:
 def _measured_loads(
     origins: Sequence[MeasuredScan], singles: Sequence[Sequence[Scan]], sensor: ApparatusFunction
 ) -> Iterator[tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]]:
-    """Yield the profile of each load of each scan, with checks and messages of its restoration."""
     for origin, loads in zip(origins, singles, strict=True):
         signals = one_load.contact_signals(loads, sensor)
-        for scan, signal in zip(loads, signals, strict=True):
-            one_load.require_points(scan, signal)
-            try:
-                prepared = one_load.prepared_scan(scan, sensor, signal)
-                restored = restore.restore_known(prepared.scan, sensor, start=prepared.estimate)
-            except (FitError, InputError) as failure:
-                # A scan that is too short fails here already, and in less plain words.
-                if scan.y is None:
-                    top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-                    one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
-                problem = f"{restore.load_of(scan)}: {failure.problem}"
-                raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
-            one_load.require_ends(scan, signal, restored.centre)
-            profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
-            checks = [check for check in restored.checks if check.name != _REPLACED]
-            noise = None
-            if scan.u_zz_errors is None:
-                checks = [check for check in checks if check.name not in _NOISE_CHECKS]
-                noise = profile.points["zz"].noise
-            yield profile, checks, list(_profile_messages(scan, restored, noise))
+        for single, signal in zip(loads, signals, strict=True):
+            yield _measure(origin, single, sensor, signal)
+
+
+def _measure(
+    origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
+) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
+    """Return the profile of a scan of one load, with checks and messages of its restoration."""
+    one_load.require_points(scan, signal)
+    try:
+        prepared = one_load.prepared_scan(scan, sensor, signal)
+        restored = restore.restore_known(prepared.scan, sensor, start=prepared.estimate)
+    except (FitError, InputError) as failure:
+        # A scan that is too short fails here already, and in less plain words.
+        if scan.y is None:
+            top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
+            one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
+        problem = f"{restore.load_of(scan)}: {failure.problem}"
+        raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
+    one_load.require_ends(scan, signal, restored.centre)
+    profile = one_load.measured_profile(origin, scan, prepared.electronic, restored, signal)
+    checks = [check for check in restored.checks if check.name != _REPLACED]
+    noise = None
+    if scan.u_zz_errors is None:
+        checks = [check for check in checks if check.name not in _NOISE_CHECKS]
+        noise = profile.points["zz"].noise
+    return profile, checks, list(_profile_messages(scan, restored, noise))
 
 
 def _messages(

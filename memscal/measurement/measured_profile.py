@@ -98,7 +98,7 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
         paths.append(_path(scan, targets, math.inf))
     signals = []
     for single, three in zip(loads, places.reshape(-1, near.size), strict=True):
-        width = width_of(single)
+        width = _width(single)
         r = np.linspace(0.0, 1.5 * width, _DISTANCES)
         nodes = Wavenumbers.covering(_LARGEST_KH / scan.set_up.film.thickness, 3 * width)
         transfer = apparatus.conversion_constant * sensor_changes(apparatus, nodes.k)[0]
@@ -115,7 +115,7 @@ def _signals_of_path(loads: Sequence[Scan], apparatus: ApparatusFunction) -> lis
     return signals
 
 
-def width_of(scan: Scan) -> float:
+def _width(scan: Scan) -> float:
     """Width of a line, or diagonal of a raster, in m."""
     return float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y)))
 
@@ -314,6 +314,24 @@ def _electronic_noise(found: _Found, load_noise: FloatArray) -> float:
     return float(tried[np.argmin(deviance)])
 
 
+def measured_scan(scan: Scan) -> MeasuredScan:
+    """Return film, indenter, sensor and the other data of a scan without its points."""
+    return MeasuredScan(
+        film=scan.set_up.film,
+        indenter=scan.set_up.indenter,
+        sensor=scan.sensor,
+        load_cell=scan.load_cell,
+        stage=scan.stage,
+        width=_width(scan),
+        lubrication=scan.lubrication,
+        position_scale_uncertainty=scan.position_scale_uncertainty,
+        gain_uncertainty=scan.gain_uncertainty,
+        synthetic=bool(scan.synthetic),
+        source=scan.source,
+        unit="" if scan.unit == "V" else scan.unit,
+    )
+
+
 def measured_profile(
     origin: MeasuredScan,
     scan: Scan,
@@ -424,8 +442,7 @@ def _place_roots(restored: Restoration, average: Any) -> Mapping[str, FloatArray
     pressure = posterior.stress / restored.scan.stated_load / film
     a = restored.apparatus.conversion_constant
     geometry = model.geometry(np.atleast_2d(restored.centre))
-    slope = model.by_free_centres(model.shift_derivative(geometry, pressure))
-    by_centre = average @ slope / a
+    by_centre = average @ model.centre_derivative(geometry, pressure) / a
     by_drift = average @ model.drift_columns / a
     covariance = posterior.covariance[nodes:, nodes:]
     n = by_centre.shape[1]

@@ -345,8 +345,7 @@ def _direct(restored: Restoration, spectrum: FloatArray) -> tuple[float, int]:
         noise = 1.0
     weights = estimate.weights / noise**2
     points, _ = points.sharing(points.standardised(np.hstack(shifts), weights))
-    by_centre = model.by_free_centres(model.shift_derivative(geometry, pressure))
-    columns = np.hstack([by_centre, model.drift_columns])
+    columns = np.hstack([model.centre_derivative(geometry, pressure), model.drift_columns])
     flat = np.linalg.qr(points.standardised(columns, weights))[0]
     left = points.standardised(points.u - signal, weights)
     left = left - flat @ (flat.T @ left)

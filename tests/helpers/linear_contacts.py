@@ -106,7 +106,7 @@ class Laboratory:
                     common[source] = rng.standard_normal(column.shape[-1]) * systematic
                 u = u + column[0] @ common[source]
             u = u + points.flat @ rng.normal(0.0, 1e-3, 2)
-            u = u + found.slope[0] * np.sign(points.offset) * rng.normal(0.0, 10e-6)
+            u = u + found.slope[0] * -np.sign(points.offset) * rng.normal(0.0, 10e-6)
             measured.append(replace(points, u=u))
         return measured
 

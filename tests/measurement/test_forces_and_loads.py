@@ -21,6 +21,15 @@ def ratios(found: MeasuredStress) -> np.ndarray:
     return np.array([profile.force / profile.load for profile in found.profiles])
 
 
+def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
+    checks = {check.name: check for check in measured(0).checks}
+    names = [name for name in checks if "force" in name]
+    assert names == [*(f"applied_force_{i}" for i in (1, 2, 3, 4)), "applied_force_all"]
+    assert checks["applied_force_3"].meaning.startswith("1.37 N, dry: ")
+    for name in names:
+        assert (checks[name].p_value > 0.05) == (checks[name].value < 1.96)
+
+
 @pytest.mark.parametrize("share", [-0.2, 0.2])
 def test_the_force_does_not_depend_on_the_width_of_g(share: float) -> None:
     scan = contact_scan(1, **QUIET, load=LOADS[::3])

@@ -92,6 +92,10 @@ def test_a_killed_run_leaves_whole_outputs_or_none_and_the_next_clears_up(
             if name.endswith(".h5"):
                 assert all(finding.passed for finding in check(path))
             path.unlink()
+    # What may still belong to a process that lives is left for a minute.
+    before = time.time() - 120
+    for left in folder.glob(".memscal-*.tmp"):
+        os.utime(left, (before, before))
     process = start(folder, *COMMAND)
     process.communicate()
     assert process.returncode in (0, 1)
@@ -108,7 +112,8 @@ def test_a_run_that_is_told_to_end_says_so_and_leaves_nothing(
             count(f"runs that {sent.name} ended", f"exit {code}")
             # Before its first line of Python runs, the system ends it.
             assert code in (0, 1, expected, -sent), said
-            assert "Traceback" not in said
+            # Until the module is found, it is Python that says what interrupted it.
+            assert "Traceback" not in said or "_get_module_details" in said
             left = {*names(folder)} - {"scan.h5"}
             # All or none: the last moment of a run is after they are in their places.
             assert left == OUTPUTS or (code not in (0, 1) and left == set())

@@ -92,15 +92,7 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
     while True:
         edges = [contact.contact_radius for contact in coarse]
         fine = _solve(request, _rings(request, edges, reach, count))
-        changes = []
-        for contact, former in zip(fine, coarse, strict=True):
-            within = contact.contact_radius + 3 * request.film.thickness
-            if request.film_radius is not None:
-                # In the corner between the base and a free edge the stress is singular.
-                edge = request.film_radius
-                within = min(within, max(edge - request.film.thickness, edge / 2))
-            radii = np.linspace(0.0, within, _REQUEST_SAMPLES)
-            changes.append(relative_change(contact, former, radii))
+        changes = [_change(request, *pair) for pair in zip(fine, coarse, strict=True)]
         if max(changes) < _SETTLED or request.rings or 2 * count > _MOST_RINGS:
             break
         count = 2 * count
@@ -270,6 +262,16 @@ def _stick_radius(
     if last + 1 >= rings.size or not state.touching[last + 1]:
         return contact_radius
     return min(contact_radius, float(rings[last] + rings[last + 1]) / 2)
+
+
+def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
+    """Return the change of a contact from one on fewer rings."""
+    reach = fine.contact_radius + 3 * fine.film.thickness
+    radius = request.film_radius
+    if radius is not None:
+        # In the corner between the base and a free edge the stress is singular.
+        reach = min(reach, max(radius - fine.film.thickness, radius / 2))
+    return relative_change(fine, coarse, np.linspace(0.0, reach, _REQUEST_SAMPLES))
 
 
 def relative_change(fine: Contact, coarse: Contact, r: FloatArray) -> float:
