@@ -49,6 +49,7 @@ PUBLIC = {
         "Reconvolution",
         "TransferFunction",
     ],
+    "model.assumptions": ["Assumption"],
     "model.bayes_factor": ["BayesFactor"],
     "model.checks": ["Message", "QualityCheck"],
     "model.field_mesh": ["FieldMesh"],

@@ -62,6 +62,7 @@ from .model.apparatus import ApparatusRadial as ApparatusRadial
 from .model.apparatus import ParameterSet as ParameterSet
 from .model.apparatus import Reconvolution as Reconvolution
 from .model.apparatus import TransferFunction as TransferFunction
+from .model.assumptions import Assumption as Assumption
 from .model.bayes_factor import BayesFactor as BayesFactor
 from .model.checks import Message as Message
 from .model.checks import QualityCheck as QualityCheck

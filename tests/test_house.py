@@ -94,6 +94,7 @@ ONE_ROLE = {"cli", "extensions", "figures", "formats", "summaries"}
 
 NAMESAKES = {
     "apparatus": ["memscal.apparatus", "memscal.model.apparatus"],  # its methods, and its data
+    "assumptions": ["memscal.calibration.assumptions", "memscal.model.assumptions"],
     "checks": ["memscal.calibration.checks", "memscal.friction.checks", "memscal.model.checks"],
 }
 """One subject in several rooms: what is computed with the records of the model."""

@@ -10,7 +10,7 @@ from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import DivisionMap, Results, route_difference
-from memscal.estimation import assumptions
+from memscal.estimation import model_tests
 from memscal.estimation import residuals as unexplained
 from memscal.estimation.band import RESOLVED
 from memscal.estimation.bayesian import HYPOTHESES, Bayesian
@@ -348,7 +348,7 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     if estimate.points.planar:
-        uneven = assumptions.axisymmetry_test(estimate)
+        uneven = model_tests.axisymmetry_test(estimate)
         meaning = (
             f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then make "
             f"up {uneven.size:.2%} of the largest signal. It has no limit, for G over the plane "
@@ -356,7 +356,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
             "failure means that the ellipse could not be fitted."
         )
         return check("axisymmetry", uneven.fall, math.inf, meaning)
-    extra = assumptions.symmetry_test(estimate)
+    extra = model_tests.symmetry_test(estimate)
     parity = "odd"
     failure = ": a tilted rod, an uneven film, or a drifting load"
     if estimate.points.order:
@@ -375,7 +375,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
     """Test whether A, centre and baseline are the same at all loads, branches and repeats."""
     estimate = solution.estimate
     checks = []
-    linear = assumptions.linearity_test(estimate)
+    linear = model_tests.linearity_test(estimate)
     if linear is not None:
         meaning = (
             "Fall of chi-square by a conversion constant that changes with the load, here by "
@@ -384,7 +384,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
         )
         checks.append(_added("load_linearity", linear, meaning))
     owner = np.array(solution.owners)[estimate.points.scan]
-    branches = assumptions.hysteresis_test(estimate, owner)
+    branches = model_tests.hysteresis_test(estimate, owner)
     if branches is not None:
         reading = estimate.points.reading
         units = [("A", 1e-2, "%"), ("the centre's position", 1e-6, "um")]
@@ -414,7 +414,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
     return checks
 
 
-def _added(name: str, extra: assumptions.ExtraColumns, meaning: str) -> QualityCheck:
+def _added(name: str, extra: model_tests.ExtraColumns, meaning: str) -> QualityCheck:
     p_value = float(chdtrc(extra.count, extra.fall))
     return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
 
@@ -424,7 +424,7 @@ def _held_out(solution: Solution) -> list[QualityCheck | None]:
     estimate = solution.estimate
     groups = {
         "scan": np.array(solution.owners)[estimate.points.scan],
-        "load": assumptions.load_groups(estimate.points.load),
+        "load": model_tests.load_groups(estimate.points.load),
         "repeat": estimate.points.repeat,
     }
     checks = []
@@ -441,7 +441,7 @@ def _held_out(solution: Solution) -> list[QualityCheck | None]:
 
 
 def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> QualityCheck | None:
-    worst = assumptions.hold_out(estimate, group)
+    worst = model_tests.hold_out(estimate, group)
     if worst is None:
         return None
     causes = {
@@ -468,7 +468,7 @@ def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
     points = estimate.points
     if estimate.points.order:
         return None
-    clipped = np.flatnonzero(assumptions.clipped_points(estimate))
+    clipped = np.flatnonzero(model_tests.clipped_points(estimate))
     where = ""
     if clipped.size:
         axes = np.stack([points.x, points.y], axis=1)[:, points.free.any(axis=0)] * 1e3

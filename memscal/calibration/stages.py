@@ -21,10 +21,10 @@ from memscal.deconvolution.fourier_ratio import Field, Quotient
 from memscal.deconvolution.widths import fit_gaussian
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation import points
-from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.forward import ForwardModel
+from memscal.estimation.model_tests import CentresApart, repeat_centres_test
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile

@@ -9,23 +9,22 @@ Fourier Transforms, 1951), in place of what a bonded one does.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from memscal.axisymmetry.hankel import ACROSS
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference_spectra import (
-    RECTANGLE,
-    difference,
-    law_sensitivities,
-)
+from memscal.estimation.reference_spectra import difference, spectrum_difference
 from memscal.mechanics.film_response import base_normal, base_shear
-from memscal.mechanics.press_rod import is_tabulated
+from memscal.mechanics.press_rod import is_tabulated, press_rod, stick_and_slide
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN
+from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 
 #: Distance of a line from the centre, over the width of the Gaussian, at which its change is taken.
@@ -33,9 +32,8 @@ _OFF = 0.2
 #: Steps of the thickness, relative, and of Poisson's ratio.
 _STEP = 0.05
 _STEP_OF_RATIO = 0.015
-#: What two models of a film differ by: assumptions by lines of the budget, and half widths of the
-#: line's rectangle that they are apart.
-_LAW = {"model_form": ("film_law", 1.0), "rod_friction": ("rod_friction", -2.0)}
+#: Under this share of the load a film of any law is a linear one.
+_LIGHT = 1e-4
 #: Wavenumbers times thickness beyond which nothing reaches the base.
 _LARGEST_KH = 38.0
 
@@ -61,10 +59,11 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
         "gain_curvature": Influence(-signal * np.abs(signal) / largest),
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
-    if not estimate.points.order:
+    if estimate.points.order:
+        return found
+    if model.reference.order != ACROSS:
         found |= _of_lines(estimate)
-        found |= _of_film(scans, estimate)
-    return found
+    return found | _of_film(scans, estimate)
 
 
 def measured_by(points: ScanPoints) -> tuple[str, ...]:
@@ -148,11 +147,12 @@ def _film_changes(
             by_step = [difference(set_up, reference, more, set_up) / d for more, d in pairs]
             square = (by_step[1] - by_step[0]) / (steps[1] - steps[0])
             changes[name] = (by_step[0] - square * steps[0], square)
-    if not is_tabulated(*set_up.under(NEO_HOOKEAN)._replace(rod_friction=None)):
-        return changes
-    unstated = law_sensitivities(set_up.under("")._replace(rod_friction=None), reference)
-    for name, change in unstated.items():
-        if name == "model_form" or film.law != LINEAR:
-            assumption, widths = _LAW[name]
-            changes[assumption] = (widths * change / RECTANGLE, nothing)
+    rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    rod = set_up.indenter
+    if isinstance(rod, Rod) and is_tabulated(rubber, rod, set_up.load):
+        sticks, slides = stick_and_slide(rubber, rod, set_up.load)
+        light = press_rod(rubber, rod, _LIGHT * set_up.load, math.inf)
+        changes["film_law"] = (spectrum_difference(reference, sticks, light), nothing)
+        if film.law != LINEAR:
+            changes["rod_friction"] = (spectrum_difference(reference, slides, sticks), nothing)
     return changes

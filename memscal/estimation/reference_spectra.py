@@ -245,21 +245,26 @@ def law_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, 
     changes: dict[str, FloatArray] = {}
     if film.law == LINEAR or not isinstance(rod, Rod):
         return changes
-    k = reference.wavenumbers.k.tobytes()
-
-    def apart(first: Contact, second: Contact) -> FloatArray:
-        upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
-        return RECTANGLE * (upper - lower) * set_up.load / first.load
-
     if not film.law:
         own = press_rod(*set_up)
         if own.strain == "linear":
             return changes
-        changes["model_form"] = apart(press_rod(*set_up.under(LINEAR)), own)
+        linear = press_rod(*set_up.under(LINEAR))
+        changes["model_form"] = RECTANGLE * spectrum_difference(reference, linear, own)
     if set_up.rod_friction is None:
         with suppress(*UNSOLVED):
-            changes["rod_friction"] = apart(*stick_and_slide(film, rod, set_up.load)) / 2
+            ends = stick_and_slide(film, rod, set_up.load)
+            # Per newton the difference of rods that are solved at less load grows with the load.
+            half = RECTANGLE * set_up.load / ends[0].load / 2
+            changes["rod_friction"] = half * spectrum_difference(reference, *ends)
     return changes
+
+
+def spectrum_difference(reference: RadialSpectrum, first: Contact, second: Contact) -> FloatArray:
+    """Difference of the base stress of two contacts, per newton, at the nodes of a reference."""
+    k = reference.wavenumbers.k.tobytes()
+    upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
+    return np.asarray(upper - lower)
 
 
 #: Whose error each is: scans of one film share that of the film.

@@ -14,7 +14,7 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
 from memscal.estimation import points as scan_points
 from memscal.estimation import profile
-from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
+from memscal.estimation.model_tests import axisymmetry_test, symmetry_test
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.estimation.set_up import accepted_differences, file_in_words, stated_differences
 from memscal.formats.opened import opened_scan

@@ -78,6 +78,13 @@ class Assumption:
     sizes : mapping of str to float
         By parameter (``conversion_constant``, ``gaussian_sigma``, ``fwhm``) the size, in m of a
         length, that moves it by one standard uncertainty; infinite where none does.
+
+    Examples
+    --------
+    >>> from memscal import Assumption
+    >>> sizes = {"conversion_constant": 0.05, "gaussian_sigma": 0.03, "fwhm": float("inf")}
+    >>> Assumption("roundness", "assumed", sizes).to_dict()["size_for_one_u"]
+    {'value': 0.05, 'unit': '1'}
     """
 
     name: str

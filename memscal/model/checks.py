@@ -48,7 +48,7 @@ baseline_drift: change of the baseline across the scan over the largest signal
     let amplifier and film settle; scan faster
 reference_force: total force of the reference against its load
     check the reference's load and the reach of its table
-indentation: what a neo-Hookean film would change of A or sigma, over its uncertainty
+indentation: what a neo-Hookean film would change of A or of the width, over its uncertainty
     give the film's law (--film-law), leave it out, or calibrate at a lighter load
 outliers: share of points with less than half of their weight
     find out what disturbs these points

@@ -8,7 +8,7 @@ from helpers.bounds import FULL
 from helpers.scans import estimated, simulated
 from scipy.stats import binom, chi2
 
-from memscal.estimation.assumptions import hold_out, load_groups
+from memscal.estimation.model_tests import hold_out, load_groups
 from memscal.estimation.residuals import free_model
 
 

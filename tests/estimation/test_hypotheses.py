@@ -8,7 +8,7 @@ from helpers.bounds import FULL
 from helpers.scans import CENTRE, CONVERSION, as_points, estimated, simulated
 from scipy.stats import binom, chi2
 
-from memscal.estimation.assumptions import (
+from memscal.estimation.model_tests import (
     axisymmetry_test,
     hysteresis_test,
     linearity_test,
