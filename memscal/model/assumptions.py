@@ -8,10 +8,14 @@ from typing import Any
 ASSUMED = "assumed"
 STATED = "stated"
 MEASURED = "measured"
-STATES = (ASSUMED, STATED, MEASURED)
 
-#: Numbers that an assumption moves: A, the Gaussian's width, and the full width of G.
-MOVED = ("conversion_constant", "gaussian_sigma", "fwhm")
+#: Keys of the sizes, in files and in JSON, by the numbers that an assumption moves.
+SIZE_KEYS = {
+    "conversion_constant": "size_for_one_u",
+    "gaussian_sigma": "size_for_one_u_of_sigma",
+    "fwhm": "size_for_one_u_of_fwhm",
+}
+MOVED = tuple(SIZE_KEYS)
 
 #: By name: what is taken for granted, the word for its size, and whether that is a length.
 _KNOWN = {
@@ -94,7 +98,7 @@ class Assumption:
     @property
     def sentence(self) -> str:
         """What is taken for granted, in words."""
-        return _KNOWN[self.name][0] if self.name in _KNOWN else ""
+        return self._known[0]
 
     @property
     def words(self) -> str:
@@ -106,12 +110,16 @@ class Assumption:
     @property
     def measure(self) -> str:
         """What the size is of, in words."""
-        return _KNOWN[self.name][1] if self.name in _KNOWN else ""
+        return self._known[1]
 
     @property
     def is_length(self) -> bool:
         """Whether the size is a length."""
-        return self.name in _KNOWN and _KNOWN[self.name][2]
+        return self._known[2]
+
+    @property
+    def _known(self) -> tuple[str, str, bool]:
+        return _KNOWN.get(self.name, ("", "", False))
 
     @property
     def unit(self) -> str:
@@ -129,8 +137,7 @@ class Assumption:
             "sentence": self.sentence,
             "state": self.state,
         }
-        keys = ("size_for_one_u", "size_for_one_u_of_sigma", "size_for_one_u_of_fwhm")
-        for key, parameter in zip(keys, MOVED, strict=True):
+        for parameter, key in SIZE_KEYS.items():
             size = self.size(parameter)
             values[key] = {"value": size if size < float("inf") else None, "unit": self.unit}
         return values

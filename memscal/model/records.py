@@ -1,6 +1,9 @@
 """Records of memscal as tables of quantities, in the order in which files hold them."""
 
-from memscal.model.quantities import Quantity, Record, measured, record, required
+from dataclasses import replace
+
+from memscal.model.assumptions import SIZE_KEYS
+from memscal.model.quantities import ESTIMATED, Quantity, Record, measured, record, required
 
 _L = "length"
 _P = "stress"
@@ -98,11 +101,13 @@ EXPERIMENT = record(
     *TIMES.quantities,
     Quantity("notes", "note", "notes of the experiment", origin="notes"),
 )
+_POSITION_X = Quantity("x", _L, "position along x", "x", _X)
+_POSITION_Y = Quantity("y", _L, "position along y", "y", ("y",))
 # The axes of the signal are those of the scan: [x], [y], [repeat, x], [repeat, y] or [y, x].
 SCAN_DATA = record(
     "NXdata",
-    Quantity("x", _L, "position along x", "x", _X),
-    Quantity("y", _L, "position along y", "y", ("y",)),
+    _POSITION_X,
+    _POSITION_Y,
     Quantity("repeat", _ONE, "repeat", axes=("repeat",)),
     Quantity("branch", _ONE, "approach (1) or retreat (2) of the indenter", axes=_X),
     Quantity("x_errors", _L, "standard uncertainty of x", axes=_X),
@@ -144,8 +149,8 @@ REFERENCE_DATA = record(
     "NXdata",
     *PROFILE.quantities,
     *IDEAL_REFERENCE.quantities,
-    Quantity("x", _L, "position along x", "x", _X),
-    Quantity("y", _L, "position along y", "y", ("y",)),
+    _POSITION_X,
+    _POSITION_Y,
     Quantity("values", _ONE, "field", axes=_YX, stored="field"),
 )
 """What the group of a reference may hold: a profile, an ideal reference, or a field."""
@@ -172,8 +177,8 @@ PROFILE_NOTES = record("NXprocess", Quantity("notes", "note", "notes", origin="r
 FIELD = record(
     "NXdata",
     *required(
-        Quantity("x", _L, "position along x", "x", _X),
-        Quantity("y", _L, "position along y", "y", ("y",)),
+        _POSITION_X,
+        _POSITION_Y,
         Quantity("g", _PER_AREA, "apparatus function", "G", _YX),
         Quantity("g_errors", _PER_AREA, _OF_G, axes=_YX),
     ),
@@ -260,9 +265,8 @@ def assumption_record(*, is_length: bool) -> Record:
     """Return the record of the sizes at which an assumption moves each parameter by one u."""
     dimension = _L if is_length else _ONE
     sizes = (
-        Quantity("conversion_constant", dimension, "size for u(A)", stored="size_for_one_u"),
-        Quantity("gaussian_sigma", dimension, "size for u(σ)", stored="size_for_one_u_of_sigma"),
-        Quantity("fwhm", dimension, "size for u(FWHM)", stored="size_for_one_u_of_fwhm"),
+        Quantity(name, dimension, f"size for u({ESTIMATED[name].symbol})", stored=key)
+        for name, key in SIZE_KEYS.items()
     )
     state = Quantity("state", "text", "assumed, stated or measured", required=True)
     return record("NXcollection", state, *required(*sizes))
@@ -295,11 +299,13 @@ STRESS_PROFILE = record(
     ),
     signal="s_zz",
 )
+_LUBRICATION = Quantity("lubrication", "text", "dry or lubricated")
+_TOTAL_FORCE = measured(Quantity("force", "force", "total force", "F", required=True))
 STRESS_NUMBERS = record(
     "NXdata",
-    *measured(Quantity("load", "force", "load", "P", required=True)),
-    Quantity("lubrication", "text", "dry or lubricated"),
-    *measured(Quantity("force", "force", "total force", "F", required=True)),
+    *_LOAD,
+    _LUBRICATION,
+    *_TOTAL_FORCE,
     *measured(Quantity("maximum", _P, "maximum of S_zz", "S", required=True)),
     *measured(Quantity("centre", _L, "centre", "x₀", required=True), required=True),
     *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
@@ -357,12 +363,16 @@ FIT = (
     Quantity("degrees", _COUNT, "degrees of freedom", "ν"),
     Quantity("p_value", _COUNT, "chance of such a chi-square, or a larger one", "p"),
 )
+FRICTION = Quantity("friction", _ONE, "friction coefficient", "μ")
+_FRICTION_LAW = (
+    replace(FRICTION, label="friction_coefficient"),
+    Quantity("sticking", "truth", "whether nothing slips"),
+)
 SOLUTION = (
     *CONTACT.quantities[:4],
     Quantity("max_interface_stress", _P, "interface peak", shown="Pa"),
     Quantity("max_base_stress", _P, "base peak", shown="Pa"),
-    Quantity("friction", _ONE, "friction coefficient", "μ", label="friction_coefficient"),
-    Quantity("sticking", "truth", "whether nothing slips"),
+    *_FRICTION_LAW,
     CONTACT.quantities[5],
     Quantity("backend", "text", "method of solution"),
     Quantity("strain", "text", "linear or finite strain"),
@@ -372,7 +382,7 @@ SOLUTION = (
     Quantity("elastic_energy", "energy", "elastic energy of the film"),
     Quantity("work", "energy", "work of the indenter"),
     Quantity("dissipated_energy", "energy", "energy that friction has taken"),
-    Quantity("discretisation", "text", "mesh or quadrature"),
+    NUMERICS.quantities[1],
 )
 FORCE_BUDGET = Quantity("force_budget", "force", "uncertainty of it by source", axes=("source",))
 MAXIMUM_BUDGET = Quantity("maximum_budget", _P, "that of the maximum", axes=("source",))
@@ -381,12 +391,12 @@ APPLIED = (
     *measured(Quantity("force_over_load", _ONE, "total force over applied load")),
 )
 RESTORED = (
-    LOAD.quantities[0],
-    *measured(Quantity("force", "force", "total force", "F")),
+    _LOAD[0],
+    *_TOTAL_FORCE,
     *measured(Quantity("stress_on_axis", _P, "stress on the axis")),
-    *measured(Quantity("centre", _L, "centre of the scan", "x₀")),
-    *measured(Quantity("centre_y", _L, "centre of the scan along y", "y₀")),
-    *measured(Quantity("baseline", _U, "baseline", "U₀")),
+    *measured(ESTIMATED["centre"]),
+    *measured(ESTIMATED["centre_y"]),
+    *measured(ESTIMATED["baseline"]),
     FORCE_BUDGET,
     TRANSFER.quantities[-1],
 )
@@ -399,7 +409,6 @@ RESTORED_AGAINST = (
     Quantity("difference", _COUNT, "largest difference", label="largest_difference"),
     Quantity("within", _COUNT, "share of the radii", label="share_within_95_percent"),
 )
-FRICTION = Quantity("friction", _ONE, "friction coefficient", "μ")
 SLIP_LENGTH = Quantity("length", _L, "slip length", shown="um")
 
 ESTIMATE_FIT = (
@@ -408,8 +417,8 @@ ESTIMATE_FIT = (
     *FIT[1:],
 )
 COMPARED_LOAD = (
-    Quantity("lubrication", "text", "dry or lubricated"),
-    STRESS_NUMBERS.quantities[0],
+    _LUBRICATION,
+    _LOAD[0],
     *measured(Quantity("force", "force", "force", "F")),
 )
 COMPARED_MAXIMA = (
@@ -420,15 +429,14 @@ COMPARED_MAXIMA = (
 """What was measured at one load: the profile's force, maxima beside the frictionless ones."""
 
 CALCULATED = (
-    Quantity("friction", _ONE, "friction coefficient", "μ", label="friction_coefficient"),
-    Quantity("sticking", "truth", "whether nothing slips"),
+    *_FRICTION_LAW,
     Quantity("p_max", _P, "largest calculated stress"),
     FIT[0],
     FIT[2],
     Quantity("deviance", _COUNT, "twice the loss of the log likelihood", "-2 ln(p/p_max)"),
 )
 DRY_AGAINST_LUBRICATED = (
-    STRESS_NUMBERS.quantities[0],
+    _LOAD[0],
     *measured(Quantity("maximum", _P, "on the axis", label="on_axis")),
     *measured(Quantity("relative", _ONE, "of the lubricated")),
     *FIT,
