@@ -36,7 +36,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     require_unaltered(file, ARTIFACT_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter", defaults={"load": None})["load"]
     film, indenter = groups.read_stated(file)
-    process = groups.read_process(file, "/entry/process")
+    process = groups.read_process(file)
     u_zz = "/entry/reconvolution/u_zz"
     reading = reading_of(units_of(file, u_zz) or "V", file.where(u_zz))
     reading = replace(reading, per=str(process.configuration.get("reference_unit", "Pa")))
@@ -54,16 +54,15 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         ),
         parameters=groups.read_parameters(file, "/entry/parameters", reading),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
-        checks=groups.read_quality(file, "/entry/quality"),
+        checks=groups.read_quality(file),
         film=film,
         indenter=indenter,
-        **groups.read_instrument(file, "/entry/instrument"),
         **groups.read_circumstances(file),
         load=load,
         reference=groups.read_profile(file, load=load),
         process=process,
         kernel_changes=_read_changes(file),
-        assumptions=groups.read_assumptions(file, "/entry/assumptions"),
+        assumptions=groups.read_assumptions(file),
         other=_read_other(file, reading),
     )
 

@@ -257,15 +257,19 @@ def estimated_record(file: SafeFile, path: str) -> Record:
     return Record("NXcollection", tuple(map(estimated_quantity, text_list(file, f"{path}/names"))))
 
 
+def named_collection(children: Mapping[str, Node]) -> Group:
+    """Return nodes as an NXcollection; ``names`` keeps their order."""
+    return Group("NXcollection", {"names": to_json("names", list(children)), **children})
+
+
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
     """Return the uncertainty budget: one group per quantity, one number per source."""
-    children: dict[str, Node] = {"names": to_json("budget", list(budget))}
+    children: dict[str, Node] = {}
     for quantity, sources in budget.items():
         dimension = dimensions.get(quantity) or parameter_dimension(quantity)
-        group: dict[str, Node] = {"names": to_json(f"budget of {quantity}", list(sources))}
-        group |= {source: si(value, dimension) for source, value in sources.items()}
-        children[quantity] = Group("NXcollection", group)
-    return Group("NXcollection", children)
+        numbers = {source: si(value, dimension) for source, value in sources.items()}
+        children[quantity] = named_collection(numbers)
+    return named_collection(children)
 
 
 def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
@@ -365,16 +369,17 @@ def instrument_group(
     return Group("NXinstrument", children)
 
 
-def read_instrument(file: SafeFile, path: str) -> dict[str, Any]:
-    """Read sensor and load cell, by these names; what is not stated stays empty."""
-    sensor = read_record(records.SENSOR, file, f"{path}/stress_sensor")
-    load_cell = read_record(records.LOAD_CELL, file, f"{path}/load_cell")
-    return {"sensor": StressSensor(**sensor), "load_cell": LoadCell(**load_cell)}
-
-
-def read_stage(file: SafeFile, path: str) -> Equipment:
-    """Read the stage of an instrument; empty where it is not stated."""
-    return Equipment(**read_record(records.STAGE, file, f"{path}/stage"))
+def read_instrument(file: SafeFile, path: str = "/entry") -> dict[str, Any]:
+    """Read sensor, load cell and stage, by these names; what is not stated stays empty."""
+    return {
+        "sensor": StressSensor(
+            **read_record(records.SENSOR, file, f"{path}/instrument/stress_sensor")
+        ),
+        "load_cell": LoadCell(
+            **read_record(records.LOAD_CELL, file, f"{path}/instrument/load_cell")
+        ),
+        "stage": Equipment(**read_record(records.STAGE, file, f"{path}/instrument/stage")),
+    }
 
 
 def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
@@ -385,10 +390,10 @@ def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
 
 
 def read_circumstances(file: SafeFile) -> dict[str, Any]:
-    """Read when, by whom and with which stage a scan was made."""
+    """Read when, by whom and with which instruments a scan was made."""
     user = read_record(records.USER, file, "/entry/user")
     times = read_record(records.TIMES, file, "/entry")
-    return {"stage": read_stage(file, "/entry/instrument"), "user": User(**user), **times}
+    return {**read_instrument(file), "user": User(**user), **times}
 
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
@@ -449,14 +454,12 @@ def reference_groups(profile: StressProfile) -> dict[str, Node]:
 
 
 def read_profile(
-    file: SafeFile,
-    data: str = "/entry/reference",
-    parameters: str = "/entry/reference_parameters",
-    process: str = "/entry/reference_process",
-    *,
-    load: float | None = None,
+    file: SafeFile, prefix: str = "reference_", load: float | None = None
 ) -> StressProfile:
     """Read a stress profile; the load is the one given where it names none."""
+    data = "/entry/reference"
+    parameters = f"/entry/{prefix}parameters"
+    process = f"/entry/{prefix}process"
     film = f"{parameters}/film"
     indenter = f"{parameters}/indenter"
     defaults = {} if load is None else {"load": load}
@@ -478,27 +481,27 @@ def read_profile(
     )
 
 
-def read_process(file: SafeFile, path: str) -> Process:
+def read_process(file: SafeFile) -> Process:
     """Read what was done."""
     defaults = {"program": "", "version": "", "date": ""}
-    return Process(**read_record(records.PROCESS, file, path, defaults=defaults))
+    return Process(**read_record(records.PROCESS, file, "/entry/process", defaults=defaults))
 
 
 def assumption_group(assumptions: tuple[Assumption, ...]) -> Group:
-    """Return what was taken for granted, one NXcollection each; ``names`` keeps their order."""
+    """Return what was taken for granted, one NXcollection each."""
     children: dict[str, Node] = {}
     for assumption in assumptions:
         declared = records.assumption_record(is_length=assumption.is_length)
         stated = {"state": assumption.state, **assumption.sizes}
         children[assumption.name] = write_record(declared, stated)
-    return Group("NXcollection", {"names": to_json("assumptions", list(children)), **children})
+    return named_collection(children)
 
 
-def read_assumptions(file: SafeFile, path: str) -> tuple[Assumption, ...]:
+def read_assumptions(file: SafeFile) -> tuple[Assumption, ...]:
     """Read what was taken for granted, where a file states it."""
-    names = text_list(file, f"{path}/names") if file.has(f"{path}/names") else ()
+    path = "/entry/assumptions"
     assumptions = []
-    for name in names:
+    for name in text_list(file, f"{path}/names"):
         declared = records.assumption_record(is_length=Assumption(name, "").is_length)
         sizes = read_record(declared, file, f"{path}/{name}")
         assumptions.append(Assumption(name, sizes.pop("state"), sizes))
@@ -506,21 +509,21 @@ def read_assumptions(file: SafeFile, path: str) -> tuple[Assumption, ...]:
 
 
 def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
-    """Return the quality checks, one NXcollection each; ``names`` keeps their order."""
+    """Return the quality checks, one NXcollection each."""
     children: dict[str, Node] = {}
     for check in checks:
         name = re.sub(r"[^a-z0-9_]+", "_", check.name.lower()).strip("_")
         if not name or name in children:
             raise InputError(f'Two quality checks would be stored as "{name}".')
         children[name] = write_record(records.CHECK, check)
-    return Group("NXcollection", {"names": to_json("quality checks", list(children)), **children})
+    return named_collection(children)
 
 
-def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
+def read_quality(file: SafeFile) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
     checks = []
-    for name in text_list(file, f"{path}/names"):
+    for name in text_list(file, "/entry/quality/names"):
         defaults = {"name": name, "meaning": ""}
-        stated = read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults)
+        stated = read_record(records.CHECK, file, f"/entry/quality/{name}", defaults=defaults)
         checks.append(QualityCheck(**stated))
     return tuple(checks)

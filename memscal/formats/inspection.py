@@ -124,7 +124,7 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> dict[str, Any]:
                 "passed": check.passed,
                 "meaning": check.meaning,
             }
-            for check in read_quality(file, "/entry/quality")
+            for check in read_quality(file)
         ]
         content["provenance"] = origins(file, provenance)
         return content

@@ -150,7 +150,7 @@ def profile_from(file: SafeFile) -> StressProfile:
         return read_field(file, path).profile()
     require_schema(file, REFERENCE_SCHEMA)
     require_unaltered(file, REFERENCE_SCHEMA)
-    return read_profile(file, "/entry/reference", "/entry/parameters", "/entry/process")
+    return read_profile(file, prefix="")
 
 
 def write_reference(profile: StressProfile, path: FilePath, *, overwrite: bool = False) -> None:

@@ -121,7 +121,6 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
         film=film,
         unit=reading.si,
         **contact,
-        **groups.read_instrument(file, "/entry/instrument"),
         **groups.read_circumstances(file),
         title=optional_text(file, "/entry/title"),
         notes=optional_text(file, "/entry/notes/data"),

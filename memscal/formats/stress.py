@@ -70,8 +70,7 @@ def _read_scans(
             MeasuredScan(
                 film=groups.read_film(file, f"{path}/sample/film"),
                 indenter=groups.read_round_indenter(file, f"{path}/indenter"),
-                **groups.read_instrument(file, f"{path}/instrument"),
-                stage=groups.read_stage(file, f"{path}/instrument"),
+                **groups.read_instrument(file, path),
                 lubrication=lubrication,
                 source=source,
                 **numbers,
@@ -84,7 +83,6 @@ def _read_scans(
 _ROUNDING = 1e-9
 _BUDGET = {"force": "force", "maximum": "stress"}
 _MOST_SCANS = 10_000
-_PROCESS = "/entry/process"
 
 
 def read_stress(path: FilePath, *, accept_altered: bool = False) -> MeasuredStress:
@@ -139,12 +137,12 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         for path, number in zip(paths, numbers, strict=True)
     )
     accepted = accepted_alterations(file.source)
-    process = groups.read_process(file, _PROCESS)
+    process = groups.read_process(file)
     return MeasuredStress(
         profiles=profiles,
         scans=scans,
         **read_record(records.CONVERSION.read_in(scans[0].reading), file, "/entry/sensor"),
-        checks=groups.read_quality(file, "/entry/quality"),
+        checks=groups.read_quality(file),
         overridden=(*text_list(file, "/entry/overridden"), *accepted),
         process=replace(process, messages=(*override_messages(accepted), *process.messages)),
         artifact=sources.get("artifact"),
@@ -195,8 +193,8 @@ def _entry(measured: MeasuredStress) -> Group:
         "sample": groups.sample_group(first.film),
         "instrument": groups.instrument_group(first.sensor, first.load_cell),
         "indenter": groups.indenter_group(first.indenter),
-        "scans": Group("NXcollection", {"names": to_json("scans", list(scans)), **scans}),
-        "inputs": Group("NXcollection", {"names": to_json("inputs", list(inputs)), **inputs}),
+        "scans": groups.named_collection(scans),
+        "inputs": groups.named_collection(inputs),
         "process": write_record(records.PROCESS, measured.process),
     }
     return Group("NXentry", children, {"default": [*profiles][-1]})
