@@ -301,7 +301,7 @@ def _place_new(temporary: Path, target: Path) -> None:
 def _sync_folder(folder: Path) -> None:
     """Make the new name durable; some systems cannot, and the content is safe without it."""
     with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | getattr(os, "O_DIRECTORY", 0))
+        descriptor = os.open(folder, os.O_RDONLY | _flags("DIRECTORY"))
         try:
             os.fsync(descriptor)
         finally:

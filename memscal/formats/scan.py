@@ -6,7 +6,7 @@ from typing import Any
 from memscal.errors import FormatError, placed
 from memscal.formats import groups, values
 from memscal.formats.files import FilePath
-from memscal.formats.groups import read_record
+from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si
@@ -19,7 +19,6 @@ from memscal.model.quantities import by_name
 from memscal.model.scan import (
     BRANCHES,
     LIKE_SIGNAL,
-    STATED_ERRORS,
     Scan,
     branch_numbers,
     require_rod_friction,
@@ -133,13 +132,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
 def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
-    arrays: dict[str, Any] = {}
-    if file.has(f"{_DATA}/line_offset"):
-        arrays["line_offset"] = values.require_scalar(file, f"{_DATA}/line_offset", "length")
-    for name in STATED_ERRORS:
-        path = f"{_DATA}/{name}_errors"
-        if file.has(path):
-            arrays[f"{name}_uncertainty"] = values.require_scalar(file, path, _dimension(name))
+    arrays = read_record(records.TAKEN_FOR_GRANTED, file, _DATA)
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
@@ -147,11 +140,6 @@ def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]
             dimension = quantity.read_in(reading).dimension
             arrays[name] = values.require_array(file, path, dimension, ndim=ndim)
     return arrays
-
-
-def _dimension(name: str) -> str:
-    """Dimension of what a scan takes for granted."""
-    return "length" if name == "line_offset" else "dimensionless"
 
 
 def write_scan(scan: Scan, path: FilePath, *, overwrite: bool = False) -> None:
@@ -218,12 +206,8 @@ def _data_group(scan: Scan) -> Group:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, positions, axes if points else (along,))
-    if scan.line_offset:
-        data["line_offset"] = si(scan.line_offset, "length")
-    for name in STATED_ERRORS:
-        stated = getattr(scan, f"{name}_uncertainty")
-        if stated is not None:
-            data[f"{name}_errors"] = si(stated, _dimension(name))
+    stated = vars(scan) | {"line_offset": scan.line_offset or None}
+    data |= write_record(records.TAKEN_FOR_GRANTED, stated).children
     data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:
         pairs = zip(_PAIRS, scan.u_zz_correlation.shape, strict=True)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from memscal.model.assumptions import SIZE_KEYS
 from memscal.model.quantities import ESTIMATED, Quantity, Record, measured, record, required
+from memscal.model.scan import STATED_ERRORS
 
 _L = "length"
 _P = "stress"
@@ -123,6 +124,17 @@ SCAN_DATA = record(
     Quantity("u_yz_errors", _U, "noise of the channel yz", axes=_X),
     signal="u_zz",
 )
+TAKEN_FOR_GRANTED = record(
+    "NXdata",
+    Quantity("line_offset", _L, "distance of the line from the sensor"),
+    *(
+        Quantity(
+            f"{name}_uncertainty", _L if name == "line_offset" else _ONE, stored=f"{name}_errors"
+        )
+        for name in STATED_ERRORS
+    ),
+)
+"""What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(
     "NXcollection",
     Quantity("description", "text", "what is synthetic", origin="synthetic"),

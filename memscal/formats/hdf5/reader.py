@@ -47,6 +47,9 @@ def damage_named(
 
 _MAX_ATTRIBUTE_BYTES = 2**16
 _MAX_ATTRIBUTE_ITEMS = 64
+StoredAttribute = str | int | float | tuple[str, ...] | None
+"""Text, a number, a few texts, or nothing."""
+
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -88,7 +91,7 @@ class SafeFile:
         self._texts: dict[str, str] = {}
         self._listed: frozenset[str] | None = None
         self._heaps: set[int] = set()  # addresses of those that are sound
-        self._attributes: dict[tuple[str, str], str | int | float | tuple[str, ...] | None] = {}
+        self._attributes: dict[tuple[str, str], StoredAttribute] = {}
 
     def where(self, path: str) -> str:
         """Return file and path as messages name them."""
@@ -168,7 +171,7 @@ class SafeFile:
         with damage_named(f"{self.where(path)} cannot be read"):
             return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
 
-    def attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
+    def attribute(self, path: str, name: str) -> StoredAttribute:
         """Return an attribute: text, a number, a few texts, or ``None`` where there is none."""
         if (path, name) not in self._attributes:
             with damage_named(f"{self.where(path)}@{name} cannot be read"):
@@ -220,7 +223,7 @@ class SafeFile:
             raise refuse(self.where(path), f"claims a text of {length:,} bytes", why)
         self._spend(path, length)
 
-    def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
+    def _read_attribute(self, path: str, name: str) -> StoredAttribute:
         item = self._existing(path)
         key = name.encode("ascii")
         if not h5py.h5a.exists(item, key):
