@@ -377,21 +377,27 @@ class Scan:
 
     def only_passes(self, numbers: ArrayLike) -> Scan:
         """Return the passes with these numbers (of ``passes``), as a scan of the same kind."""
-        changes: dict[str, Any] = {}
         if self.kind in ("line", "raster"):
             return self  # one pass
         if self.kind == "repeats":
-            keep = np.atleast_1d(numbers)
-        else:
-            keep = np.flatnonzero(np.isin(self.passes, numbers))
-            for name in ("x", "y", "repeat", "x_errors"):
-                changes[name] = getattr(self, name)
-        changes |= {name: getattr(self, name) for name in ("branch", "u_zz", *LIKE_SIGNAL)}
-        chosen = {name: values[keep] for name, values in changes.items() if values is not None}
-        channels = {name: values[keep] for name, values in self.channels.items()}
-        if self.kind == "points" and self.u_zz_correlation is not None:
+            return replace(self, **self._rows(np.atleast_1d(numbers)))
+        return self.only_points(np.flatnonzero(np.isin(self.passes, numbers)))
+
+    def only_points(self, keep: IndexArray, **changes: Any) -> Scan:
+        """Return some of the points of a scan of this kind, with changes of other fields."""
+        chosen = self._rows(keep, "x", "y", "repeat", "x_errors")
+        if self.u_zz_correlation is not None:
             chosen["u_zz_correlation"] = of_points(self.u_zz_correlation, keep)
-        return replace(self, **chosen, channels=channels)
+        return replace(self, **(chosen | changes))
+
+    def _rows(self, keep: IndexArray, *names: str) -> dict[str, Any]:
+        """Return some rows of the readings, of what is stated like them, and of further arrays."""
+        stated = {name: getattr(self, name) for name in (*names, "branch", "u_zz", *LIKE_SIGNAL)}
+        rows: dict[str, Any] = {
+            n: values[keep] for n, values in stated.items() if values is not None
+        }
+        rows["channels"] = {name: values[keep] for name, values in self.channels.items()}
+        return rows
 
     def _freeze_positions(self) -> None:
         for name in ("x", "y"):

@@ -1,13 +1,9 @@
 """Points in a plane that are two crossed lines, as a scan of each line."""
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 
-from memscal.model.arrays import BoolArray, FloatArray
-from memscal.model.correlation import of_points
-from memscal.model.scan import LIKE_SIGNAL, Scan
+from memscal.model.arrays import FloatArray
+from memscal.model.scan import Scan
 
 #: Points within this share of the lines' length from a line are on it.
 _ON_LINE = 1e-3
@@ -26,25 +22,14 @@ def crossed_lines(scan: Scan) -> tuple[Scan, ...]:
     if not (along_x | along_y).all() or min(along_x.sum(), along_y.sum()) < _FEWEST:
         return (scan,)
     along_y &= ~along_x
+    x = scan.x[along_x] - middles[0]
+    y = scan.y[along_y] - middles[1]
     return (
-        _line(scan, along_x, scan.x - middles[0], "x"),
-        _line(scan, along_y, scan.y - middles[1], "y"),
+        scan.only_points(np.flatnonzero(along_x), x=x, y=None),
+        scan.only_points(np.flatnonzero(along_y), x=y, y=None, direction="y"),
     )
 
 
 def _most_frequent(places: FloatArray) -> float:
     values, counts = np.unique(np.round(places, 7), return_counts=True)
     return float(values[np.argmax(counts)])
-
-
-def _line(scan: Scan, chosen: BoolArray, positions: FloatArray, direction: str) -> Scan:
-    """Return the chosen points as a line."""
-    arrays: dict[str, Any] = {"x": positions[chosen], "u_zz": scan.u_zz[chosen]}
-    for name in ("repeat", "branch", "x_errors", *LIKE_SIGNAL):
-        values = getattr(scan, name)
-        if values is not None:
-            arrays[name] = values[chosen]
-    if scan.u_zz_correlation is not None:
-        arrays["u_zz_correlation"] = of_points(scan.u_zz_correlation, np.flatnonzero(chosen))
-    channels = {name: values[chosen] for name, values in scan.channels.items()}
-    return replace(scan, y=None, direction=direction, channels=channels, **arrays)
