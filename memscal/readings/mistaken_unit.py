@@ -50,6 +50,7 @@ def mistaken_unit(factor: float) -> str:
 _SHORT = "So short a scan shows neither the flanks of the stress nor the baseline."
 _WIDE = "The stress at the base of a film is little wider than the film is thick: "
 _LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
+_WIDER = f"{_WIDE}no sensor is so much wider."
 
 
 def require_span(scan: Scan) -> None:
@@ -92,18 +93,15 @@ def require_plausible(scan: Scan) -> None:
     steps = places_of(x, y, scan.passes.ravel()).steps
     lengths["step"] = min((step for step in steps if step > 0), default=0.0)
     lengths["width"] = _voltage_width(x, y, scan.u_zz.ravel())
-    if lengths["step"] > _LONGEST_STEP * h:
-        why = f"{_WIDE}the scan misses it."
-        raise _implausible(scan, h, lengths, "The positions' step is", lengths["step"], why)
-    if span > _LONGEST_SPAN * h:
-        raise _implausible(scan, h, lengths, "The positions span", span, _LONG)
-    if rod_width > h:
-        why = "Under such a rod the stress depends on friction."
-        raise _implausible(scan, h, lengths, "The rod's width is", rod_width, why)
-    if lengths["width"] > _WIDEST_VOLTAGE * h:
-        words = "The voltage's width at half height is"
-        why = f"{_WIDE}no sensor is so much wider."
-        raise _implausible(scan, h, lengths, words, lengths["width"], why)
+    width = lengths["width"]
+    for length, most, words, why in (
+        (lengths["step"], _LONGEST_STEP, "The positions' step is", f"{_WIDE}the scan misses it."),
+        (span, _LONGEST_SPAN, "The positions span", _LONG),
+        (rod_width, 1.0, "The rod's width is", "Under such a rod the stress depends on friction."),
+        (width, _WIDEST_VOLTAGE, "The voltage's width at half height is", _WIDER),
+    ):
+        if length > most * h:
+            raise _implausible(scan, h, lengths, words, length, why)
 
 
 def _lengths(scan: Scan, h: float) -> dict[str, float]:
