@@ -16,7 +16,7 @@ import click
 from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, Quantity, option, options_of
+from memscal.cli.options import FILE, NonNegative, option, options_of
 from memscal.formats.files import together
 
 if TYPE_CHECKING:
@@ -140,9 +140,7 @@ calibration_options = options_of(
         "or reference state; else neo-hookean, and its difference from linear is counted "
         "(model_form)."
     ),
-    option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
-        "C2/C1 of --film-law mooney-rivlin."
-    ),
+    option("--mooney-rivlin-ratio", NonNegative("ratio"))("C2/C1 of --film-law mooney-rivlin."),
     common.rod_friction_option(
         "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite"
         " strain. By default as the scan states it; else midway, and the rest is counted."

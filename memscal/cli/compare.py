@@ -13,7 +13,7 @@ import click
 from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
-    Quantity,
+    NonNegative,
     figure_option,
     option,
     report_options,
@@ -56,7 +56,7 @@ def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
     return user_cache_folder() if cache is None else cache
 
 
-_COEFFICIENT = Quantity("ratio", open_low=False, infinite=True)
+_COEFFICIENT = NonNegative("ratio", infinite=True)
 _FORMATS = [suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]
 
 EXAMPLES = """\b
@@ -92,11 +92,11 @@ Examples:
     "Fit lubricated loads with no friction (--lubricated-friction 0) together with the dry ones, "
     "or each kind by itself.  [default: together]"
 )
-@option("--lubricated-friction", Quantity("ratio", open_low=False), 0.015, metavar="MU")(
+@option("--lubricated-friction", NonNegative("ratio"), 0.015, metavar="MU")(
     "Width of the half-normal distribution of the friction coefficient of lubricated loads; 0 "
     "holds it at none."
 )
-@option("--between-scan-gain", Quantity("percent", open_low=False), 0.5)(
+@option("--between-scan-gain", NonNegative("percent"), 0.5)(
     "Standard uncertainty of the gain of each scan that the others do not share, in percent."
 )
 @option("--shear", FILE, metavar="ARTIFACT")(
@@ -106,7 +106,7 @@ Examples:
 @option("--macroscopic", _COEFFICIENT, metavar="MU")(
     "Friction coefficient measured in sliding, to compare with."
 )
-@option("--macroscopic-uncertainty", Quantity("ratio", open_low=False), metavar="U")(
+@option("--macroscopic-uncertainty", NonNegative("ratio"), metavar="U")(
     "Standard uncertainty (k = 1) of --macroscopic."
 )
 @option("--channel", click.Choice(["zz", "xz", "yz"]), "zz")(

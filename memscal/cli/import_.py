@@ -11,7 +11,7 @@ import click
 from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, Quantity, option, output_options, si
+from memscal.cli.options import FILE, NonNegative, Quantity, option, output_options, si
 from memscal.cli.output import emit, emit_json, message, show_messages
 from memscal.extensions import hook
 from memscal.formats.files import together
@@ -156,35 +156,35 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--load", Quantity("N"))("Normal load, in N.")
 @option("--load-column", metavar="COLUMN")("Scan: column of the load at each point.")
 @option("--load-unit", metavar="UNIT")("Scan: unit of the column of loads.  [default: N]")
-@option("--load-uncertainty", Quantity("N", open_low=False))(
+@option("--load-uncertainty", NonNegative("N"))(
     "Scan: standard uncertainty of the load common to all points, in N."
 )
-@option("--load-scatter", Quantity("percent", open_low=False))(
+@option("--load-scatter", NonNegative("percent"))(
     "Scan: standard uncertainty of each point's own load, independent from point to point, "
     "in percent, such as of weights set down by hand."
 )
-@option("--position-error", Quantity("um", open_low=False))(
+@option("--position-error", NonNegative("um"))(
     "Scan: standard uncertainty of each position, independent from point to point, in um."
 )
-@option("--position-scale-uncertainty", Quantity("percent", open_low=False))(
+@option("--position-scale-uncertainty", NonNegative("percent"))(
     "Scan: standard uncertainty of the stage's scale, common to all positions, in percent."
 )
-@option("--gain-uncertainty", Quantity("percent", open_low=False))(
+@option("--gain-uncertainty", NonNegative("percent"))(
     "Scan: standard uncertainty of the gain of the sensor's chain, in percent."
 )
-@option("--gain-curvature-uncertainty", Quantity("ratio", open_low=False))(
+@option("--gain-curvature-uncertainty", NonNegative("ratio"))(
     "Scan: standard uncertainty of b, where a reading is U (1 - b U/Umax)."
 )
-@option("--roundness-uncertainty", Quantity("ratio", open_low=False))(
+@option("--roundness-uncertainty", NonNegative("ratio"))(
     "Scan: standard uncertainty of the sensor's axis ratio, which is taken to be one."
 )
-@option("--line-offset-uncertainty", Quantity("mm", open_low=False))(
+@option("--line-offset-uncertainty", NonNegative("mm"))(
     "Scan: standard uncertainty of the distance at which the line passes the sensor, in mm."
 )
-@option("--base-slip-uncertainty", Quantity("ratio", high=1.0, open_low=False))(
+@option("--base-slip-uncertainty", NonNegative("ratio", high=1.0))(
     "Scan: standard uncertainty of the film's slip on its base: 0 bonded, 1 free."
 )
-@option("--baseline-curvature-uncertainty", Quantity("ratio", open_low=False))(
+@option("--baseline-curvature-uncertainty", NonNegative("ratio"))(
     "Scan: standard uncertainty of the baseline from edge to centre, over the largest signal."
 )
 @option("--lubrication", click.Choice(["dry", "lubricated"]))(

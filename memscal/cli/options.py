@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +90,10 @@ class Quantity(_Number):
         if self.high < math.inf:
             bounds.append(f"at most {self.high:g}")
         return f"a number {' and '.join(bounds)}" if bounds else "a finite number"
+
+
+NonNegative = partial(Quantity, open_low=False)
+"""A quantity that may be zero, such as an uncertainty."""
 
 
 def option(
@@ -184,7 +189,7 @@ def film_options(
     *, defaults: Mapping[str, float | str | None] | None = None, uncertainties: bool = True
 ) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
-    ratio = Quantity("ratio", high=0.5, open_low=False)
+    ratio = NonNegative("ratio", high=0.5)
     modulus_text = "Young's modulus of the film, in MPa."
     ratio_text = "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."
     entries = (
@@ -194,7 +199,7 @@ def film_options(
     )
     values = defaults or {}
     law = option("--film-law", click.Choice(FILM_LAWS), values.get("film-law"))
-    constants = option("--mooney-rivlin-ratio", Quantity("ratio", open_low=False))
+    constants = option("--mooney-rivlin-ratio", NonNegative("ratio"))
     return options_of(
         _measured(entries, values, uncertainties),
         law("Law of the film's stress: small strain, or rubber."),
@@ -232,7 +237,7 @@ def _measured(
     """Return the options of quantities, then those of their uncertainties (the last texts)."""
     options = [(name, kind, about) for name, kind, about, _ in entries]
     for name, kind, _, of in entries if uncertainties else ():
-        spread = Quantity(kind.name, open_low=False)
+        spread = NonNegative(kind.name)
         options.append((f"{name}-uncertainty", spread, _UNCERTAINTY + of))
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)

@@ -15,6 +15,7 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     PAPER_FILM,
+    NonNegative,
     Quantity,
     figure_option,
     indenter_from,
@@ -45,7 +46,7 @@ _DESCRIBED_BY = {
 _ASPERITIES = (Quantity("um"), Quantity("1/mm^2"), Quantity("um"))
 
 interface_options = options_of(
-    option("--slip-length", Quantity("um", open_low=False), 0.0, show_default=False)(
+    option("--slip-length", NonNegative("um"), 0.0, show_default=False)(
         "Elastic tangential displacement of the interface before it slips, in um.  "
         "[default: 0, rigid]"
     ),
@@ -131,7 +132,7 @@ Examples:
 )
 @option("--r-unit", default="mm")("Profile: unit of the radii.")
 @option("--z-unit", default="um")("Profile: unit of the heights.")
-@option("--friction", Quantity("ratio", open_low=False, infinite=True), metavar="MU")(
+@option("--friction", NonNegative("ratio", infinite=True), metavar="MU")(
     "Friction coefficient between indenter and film; inf: it sticks wherever it touches.  "
     "[default: 0; inf of a rod on a film that is not linear]"
 )
