@@ -14,7 +14,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self
 
-from memscal.errors import InputError, OutputError, UnsafeFileError
+from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnsafeFileError
+from memscal.model.notation import printable
 from memscal.model.sizes import MOST_FILE_BYTES, too_large
 
 FilePath = str | os.PathLike[str]
@@ -349,3 +350,22 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
         raise InputError(f"{shown} cannot be read: {error.strerror}.") from error
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def damage_named(
+    problem: str,
+    *,
+    why: str = "The file is damaged or incomplete",
+    cure: str = "Get the file again from where it came from.",
+) -> Iterator[None]:
+    """Turn what a library raises on damaged bytes into a FormatError; add its words to ``why``."""
+    try:
+        yield
+    except MemscalError:
+        raise
+    except MemoryError as error:
+        raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
+    except Exception as error:
+        reason = printable(" ".join(str(error).split()), 200) or type(error).__name__
+        raise FormatError(f"{problem}.", why=f"{why} ({reason}).", cure=cure) from error

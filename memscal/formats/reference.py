@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError, placed
-from memscal.formats.files import FilePath, read_bytes
+from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.groups import profile_groups, read_field, read_profile
 from memscal.formats.hdf5 import writer
-from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.units import to_si
 from memscal.formats.values import require_schema, require_unaltered

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
-from memscal.formats.files import FilePath, atomic_write_bytes, read_bytes
-from memscal.formats.hdf5.reader import SafeFile, damage_named, open_hdf5
+from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.units import from_si
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh

@@ -17,33 +17,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from memscal.errors import FormatError, MemscalError, UnsafeFileError, placed
-from memscal.formats.files import FilePath, read_bytes
+from memscal.errors import FormatError, UnsafeFileError, placed
+from memscal.formats.files import FilePath, damage_named, read_bytes
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_HDF5_BYTES
-
-
-@contextlib.contextmanager
-def damage_named(
-    problem: str,
-    *,
-    why: str = "The file is damaged or incomplete",
-    cure: str = "Get the file again from where it came from.",
-) -> Iterator[None]:
-    """Turn what a library raises on damaged bytes into a FormatError; add its words to ``why``."""
-    try:
-        yield
-    except MemscalError:
-        raise
-    except MemoryError as error:
-        raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
-    except Exception as error:
-        reason = printable(" ".join(str(error).split()), 200) or type(error).__name__
-        raise FormatError(f"{problem}.", why=f"{why} ({reason}).", cure=cure) from error
-
 
 _MAX_ATTRIBUTE_BYTES = 2**16
 _MAX_ATTRIBUTE_ITEMS = 64

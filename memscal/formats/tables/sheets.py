@@ -9,14 +9,15 @@ import io
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import PurePath
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from memscal.errors import FormatError, InputError, UnsafeFileError, placed
-from memscal.formats.files import read_bytes
+from memscal.formats.files import damage_named, read_bytes
 from memscal.formats.tables.text_table import (
     Lines,
     NamedColumns,
@@ -35,10 +36,8 @@ _KINDS = {".xlsx": "workbook", ".xlsm": "workbook", ".parquet": "Parquet", ".pq"
 _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 #: Options of reading by the kinds of tables that have a use for them.
 _USES = {"delimiter": ("text",), "skip_rows": ("text", "workbook"), "sheet": ("workbook",)}
-_Read = TypeVar("_Read")
 _PIECE = 2**16
 _MAX_NAME = 80
-_MAX_REASON = 300
 
 
 def open_table(source: Any, **reading: Any) -> NamedColumns:
@@ -68,18 +67,11 @@ def open_table(source: Any, **reading: Any) -> NamedColumns:
         cure = 'Install it with the extra "tables": pip install "memscal[tables]"'
         raise InputError(problem, cure=cure) from error
     read: Callable[..., NamedColumns] = _sheet_table if kind == "workbook" else _parquet_table
-    return _guarded(name, lambda: read(reader, name, data, **reading))
+    with _reading(f"{name} cannot be read"):
+        return read(reader, name, data, **reading)
 
 
-def _guarded(name: str, read: Callable[[], _Read]) -> _Read:
-    """Return what a library reads; say of which file it was if it cannot."""
-    try:
-        return read()
-    except InputError:
-        raise
-    except Exception as error:  # a library raises what it happens to meet
-        why = f"Its reader says: {type(error).__name__}: {printable(error, _MAX_REASON)}."
-        raise FormatError(f"{name} cannot be read.", why=why, cure="Save it as CSV.") from error
+_reading = partial(damage_named, why="Its reader gave no table back", cure="Save it as CSV.")
 
 
 def _sheet_table(
@@ -187,7 +179,8 @@ class FrameTable(NamedColumns):
 
     def _converted(self, item: Wanted, lines: Lines) -> FloatArray:
         index = self._index(item.column)
-        values = _guarded(self._name, lambda: np.asarray(self._column(index)))
+        with _reading(f"{self._name} cannot be read"):
+            values = np.asarray(self._column(index))
         if values.shape != (self._rows,):
             problem = f"{self.where(item.column)} has shape {values.shape} in {self._rows} rows."
             raise InputError(problem, cure="Give one value for each row.")
