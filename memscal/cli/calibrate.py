@@ -122,16 +122,16 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 
 
 calibration_options = options_of(
-    option("--reference", FILE, metavar="FILE")(
+    option("--reference", FILE)(
         "Stress at the base of the film (memscal-reference); or a source, for which film and rod "
         "are not used: disc:R, slit:W, gaussian:S (radius, width, standard deviation: disc:0.5mm),"
         " point. Or a field: HDF5, .npy, PNG, TIFF. By default the one in the scan, or else the "
         "rod is solved on the film. With one that states no film the scan needs none."
     ),
-    option("--pixel-size", metavar="LENGTH")(
+    option("--pixel-size", "LENGTH")(
         "Size of the pixels of a reference that is an array or image, such as 5um."
     ),
-    option("--alternative", FILE, metavar="FILE")(
+    option("--alternative", FILE)(
         "The same stress by another model of the film (memscal-reference): its difference is "
         "counted as an uncertainty of the model's form, in place of the linear film's."
     ),
@@ -152,7 +152,7 @@ calibration_options = options_of(
         "Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
         "SCAN.xz.apparatus.h5."
     ),
-    option("--method", metavar="NAME", shell_complete=_complete_method)(
+    option("--method", "NAME", shell_complete=_complete_method)(
         "Whose A and G are written: bayesian (from the scan's points: the more precise, for "
         "friction), or a division of the smoothed voltages by the stress: white-noise (the "
         "paper's, as its exact expectation), white-noise-draw (one seeded draw, as published), "

@@ -84,7 +84,7 @@ Examples:
     "A point sticks where it first touched (incremental), or as if loaded in one step "
     "(total). May be repeated.  [default: both]"
 )
-@option("--reference references", FILE, multiple=True, metavar="FILE")(
+@option("--reference references", FILE, multiple=True)(
     "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
     "each load and friction coefficient. Repeated."
 )

@@ -120,19 +120,19 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--format kind", click.Choice(["scan", "reference"]), "scan")(
     "What it holds: measured points, or the base stress of a FEM calculation."
 )
-@option("--x", metavar="COLUMN")("Scan: column of the position.")
-@option("--x-unit", metavar="UNIT")(
+@option("--x", "COLUMN")("Scan: column of the position.")
+@option("--x-unit", "UNIT")(
     "Scan: unit of the positions, such as mm.  [default: that of the column's head, x/mm]"
 )
-@option("--u", metavar="COLUMN")("Scan: column of the normal channel's voltage or reading.")
-@option("--u-unit --unit u_unit", metavar="UNIT")(
+@option("--u", "COLUMN")("Scan: column of the normal channel's voltage or reading.")
+@option("--u-unit --unit u_unit", "UNIT")(
     "Scan: unit of the readings, of any kind, such as mV, pA, uT, Pa, or 1 of counts.  [default: "
     "that of the column's head]"
 )
-@option("--y", metavar="COLUMN")(
+@option("--y", "COLUMN")(
     "Scan: column of the second position, of points in a plane, or of a line along y."
 )
-@option("--u-errors", metavar="COLUMN")("Scan: column of each reading's standard uncertainty.")
+@option("--u-errors", "COLUMN")("Scan: column of each reading's standard uncertainty.")
 @option("--noise", Quantity("unit of u"))(
     "Scan: standard uncertainty of each reading, one number, in the unit of u."
 )
@@ -143,19 +143,19 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Scan: the log with the holds that were found."
 )
-@option("--repeat", metavar="COLUMN", multiple=True)(
+@option("--repeat", "COLUMN", multiple=True)(
     "Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
     "line, such as of the load that was set and of the pass."
 )
-@option("--branch", metavar="COLUMN")(
+@option("--branch", "COLUMN")(
     "Scan: column that says approach (or 1) where the indenter was loaded, retreat (or 2) where "
     "it was unloaded."
 )
-@option("--u-xz", metavar="COLUMN")("Scan: column of the channel xz.")
-@option("--u-yz", metavar="COLUMN")("Scan: column of the channel yz.")
+@option("--u-xz", "COLUMN")("Scan: column of the channel xz.")
+@option("--u-yz", "COLUMN")("Scan: column of the channel yz.")
 @option("--load", Quantity("N"))("Normal load, in N.")
-@option("--load-column", metavar="COLUMN")("Scan: column of the load at each point.")
-@option("--load-unit", metavar="UNIT")("Scan: unit of the column of loads.  [default: N]")
+@option("--load-column", "COLUMN")("Scan: column of the load at each point.")
+@option("--load-unit", "UNIT")("Scan: unit of the column of loads.  [default: N]")
 @option("--load-uncertainty", NonNegative("N"))(
     "Scan: standard uncertainty of the load common to all points, in N."
 )
@@ -190,30 +190,30 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--lubrication", click.Choice(["dry", "lubricated"]))(
     "Scan: what was between indenter and film."
 )
-@option("--lubricant", metavar="TEXT")("Scan: name of the lubricant.")
+@option("--lubricant", "TEXT")("Scan: name of the lubricant.")
 @option("--u-sign", _SIGN)(
     "Scan: -1 where the voltage falls when the indenter presses.  [default: 1]"
 )
-@option("--sensor-name", metavar="TEXT")("Scan: name of the sensor.")
-@option("--sensor-model", metavar="TEXT")("Scan: model of the sensor.")
-@option("--channel", metavar="TEXT")("Scan: name of the channel.  [default: zz]")
-@option("--load-cell", metavar="TEXT")(
+@option("--sensor-name", "TEXT")("Scan: name of the sensor.")
+@option("--sensor-model", "TEXT")("Scan: model of the sensor.")
+@option("--channel", "TEXT")("Scan: name of the channel.  [default: zz]")
+@option("--load-cell", "TEXT")(
     "Scan: name of the load cell or balance; its common error counts once where calibration and "
     "contacts name the same one."
 )
-@option("--load-cell-serial", metavar="TEXT")("Scan: serial number of the load cell.")
-@option("--title", metavar="TEXT")("Scan: title.")
+@option("--load-cell-serial", "TEXT")("Scan: serial number of the load cell.")
+@option("--title", "TEXT")("Scan: title.")
 @common.laboratory_option("Scan: ")
-@option("--r", metavar="COLUMN")("Reference: column of the radius.")
-@option("--r-unit", metavar="UNIT")(
+@option("--r", "COLUMN")("Reference: column of the radius.")
+@option("--r-unit", "UNIT")(
     "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
 )
-@option("--sigma", metavar="COLUMN|FIELD")(
+@option("--sigma", "COLUMN|FIELD")(
     "Reference: column of the normal stress at the base; in a mesh the field of it, "
     "or of the stress tensor, and FIELD:2 is its component 2."
 )
-@option("--sigma-unit", metavar="UNIT")("Reference: unit of the stresses, such as MPa.")
-@option("--shear", metavar="COLUMN|FIELD")(
+@option("--sigma-unit", "UNIT")("Reference: unit of the stresses, such as MPa.")
+@option("--shear", "COLUMN|FIELD")(
     "Reference: the radial shear stress; in a mesh a stress tensor's own by default."
 )
 @option("--sign", _SIGN)(
@@ -224,7 +224,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
     "base to the surface; 1 where it is the base's traction on the film, positive outward."
     "  [default: 1 for a table; for a mesh S13, whichever way its axis points]"
 )
-@option("--solver", metavar="TEXT")("Reference: the program that calculated it.")
+@option("--solver", "TEXT")("Reference: the program that calculated it.")
 @option("--vertical", click.Choice(["x", "y", "z"]))(
     "Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]"
 )
@@ -238,14 +238,14 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
 @common.rod_friction_option(common.FREE_OR_STUCK)
-@option("--sheet", metavar="NAME")("Sheet of a workbook.  [default: the first]")
+@option("--sheet", "NAME")("Sheet of a workbook.  [default: the first]")
 @option("--skip-rows", click.IntRange(1), metavar="N")(
     "Lines before the header.  [default: found from the table]"
 )
-@option("--missing", metavar="WORD", multiple=True)(
+@option("--missing", "WORD", multiple=True)(
     "A word, or a number such as -9999, that means a missing value, besides those below."
 )
-@option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
+@option("--delimiter", "CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
 def command(

@@ -100,9 +100,11 @@ def option(
     names: str, kind: Any = None, default: Any = None, *, show_default: bool = True, **settings: Any
 ) -> Callable[[str], _Adder]:
     """Return what makes an option of its help text; blanks part its names."""
+    # A kind that is a text is the name of the value, which is then any text.
+    settings |= {"metavar": kind} if isinstance(kind, str) else {"type": kind}
     if default is not None:
         settings |= {"default": default, "show_default": show_default}
-    return lambda about: click.option(*names.split(), type=kind, help=about, **settings)
+    return lambda about: click.option(*names.split(), help=about, **settings)
 
 
 def options_of(*options: _Adder) -> _Adder:

@@ -38,7 +38,7 @@ Examples:
 @option("-o --output", FILE, metavar="OUT")(
     "Reference file to write (memscal-reference): the restored stress with its uncertainty."
 )
-@option("--expected", FILE, metavar="FILE")(
+@option("--expected", FILE)(
     "A calculated stress at the base (memscal-reference), such as memscal reference writes: "
     "adds the check expected_stress. By default the scan's indenter is pressed on its film without "
     "friction, to be shown beside the result."

@@ -45,7 +45,7 @@ Examples:
 @option("--workers", click.IntRange(1, 512), metavar="N")(
     "Processes on this machine.  [default: one for each core]"
 )
-@option("--scheduler", metavar="ADDRESS")(
+@option("--scheduler", "ADDRESS")(
     "Scheduler of a Dask cluster, such as tcp://node1:8786, whose workers see the same files."
 )
 @option("--shard-size", click.IntRange(min=2), metavar="SCANS")(
