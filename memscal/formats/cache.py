@@ -90,19 +90,15 @@ def _path(folder: FilePath, key: str) -> Path:
     return Path(folder) / f"{key}.h5"
 
 
-def _entries(folder: FilePath) -> list[tuple[Path, os.stat_result]]:
-    """Return the tables of a folder, the one used longest ago first."""
+def _prune(folder: FilePath) -> None:
+    """Remove the tables of a folder that were used longest ago, until it is small enough."""
     entries = []
     with contextlib.suppress(OSError), os.scandir(folder) as items:
         for item in items:
             with contextlib.suppress(OSError):
                 if _ENTRY.fullmatch(item.name) and item.is_file(follow_symlinks=False):
                     entries.append((Path(item.path), item.stat(follow_symlinks=False)))
-    return sorted(entries, key=lambda entry: (entry[1].st_mtime_ns, entry[0].name))
-
-
-def _prune(folder: FilePath) -> None:
-    entries = _entries(folder)
+    entries.sort(key=lambda entry: (entry[1].st_mtime_ns, entry[0].name))
     size = sum(status.st_size for _, status in entries)
     # What was written last stays, however large it is.
     for number, (path, status) in enumerate(entries[:-1]):

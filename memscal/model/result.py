@@ -52,8 +52,7 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them."""
-        mapping: dict[str, Any] = self._shown_as("mapping")
-        return mapping
+        return dict(self._shown_as("mapping"))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the arrays on their axes, each with its unit, in SI units (needs xarray)."""
@@ -66,8 +65,7 @@ class Result:
 
     def ufloats(self) -> dict[str, Any]:
         """Return the parameters as correlated numbers of the package uncertainties, in SI units."""
-        numbers: dict[str, Any] = self._shown_as("correlated")
-        return numbers
+        return dict(self._shown_as("correlated"))
 
     def plot(self, **options: Any) -> Figure:
         """Draw the result; the figure is returned, and nothing is shown or written."""

@@ -48,8 +48,7 @@ def certificate_xml(certificate: Certificate) -> bytes:
         _grow(place, tree)
     _prune(root)
     ET.indent(root)
-    made: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
-    return made
+    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _texts(certificate: Certificate) -> dict[str, str]:

@@ -285,9 +285,9 @@ def certificate_pdf(certificate: Certificate, page: str, xml: bytes) -> bytes:
     digest = hashlib.sha256(page.encode() + xml).digest()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)  # it leaves its colour profile open
-        made: bytes = document.write_pdf(
+        made = document.write_pdf(
             pdf_variant="pdf/a-3a",
             pdf_identifier=base64.b16encode(digest[:16]),
             attachments=[attachment],
         )
-    return made
+    return bytes(made)
