@@ -44,6 +44,8 @@ _ROUTES_LIMIT = 3.2
 _HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
 #: At this share of the thickness the base stress of a neo-Hookean film differs by a tenth.
 _DEEP = 0.1
+#: Of 1000 curvatures as their prior has them one is beyond.
+_CURVED = 3.3
 _BEYOND = 1.5
 _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
@@ -230,11 +232,23 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     checks.append(check("tail_share", solution.tail_share, most, meaning))
     meaning = (
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
-        "as a straight line; a failure means that what is left of it may bias A."
+        "as a line that is straight or a little curved; a failure means that what is left of it "
+        "may bias A."
     )
     last = 1 + int(estimate.points.free[0].sum())
     change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     checks.append(check("baseline_drift", change, 0.05, meaning))
+    points = estimate.points
+    curvatures = estimate.drifts[estimate.drifts.size - points.curved.size :]
+    if curvatures.size:
+        meaning = (
+            "Fitted curvature of the baseline, edge to centre, over the standard deviation of its "
+            "prior. A failure means that the baseline bends by more than was allowed for, or that "
+            "something else looks like it: a tail of G, the amplifier. State "
+            "baseline_curvature_uncertainty, or let amplifier and film settle."
+        )
+        share = np.abs(curvatures / points.curvature[points.curved]).max()
+        checks.append(check("baseline_curvature", share, _CURVED, meaning))
     if not source:
         meaning = (
             "Relative difference of the reference's total force from the load. A failure means "

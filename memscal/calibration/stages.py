@@ -97,7 +97,7 @@ def require_profile(
     scans: Sequence[Scan], stresses: Sequence[BaseStress], channel: str
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
-    measured = [points.measured_points(scan, channel) for scan in scans]
+    measured = [points.calibration_points(scan, channel) for scan in scans]
     references = expected_spectra(scans, stresses, reference_spectra(stresses, measured))
     outcome: ProfileEstimate | Exception
     try:
@@ -273,7 +273,8 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     """Compare a prediction with the scan, outliers at their reduced weight."""
     residual = estimate.points.u - predicted
     weight = estimate.outlier_weight
-    degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
+    curvatures = estimate.points.curved.size
+    degrees = float(weight.sum()) + curvatures - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.
     noise = estimate.noise_scale if estimate.points.u_errors is None else 1.0

@@ -30,6 +30,7 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
 from memscal.estimation.influences import influences, measured_by
+from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
     RECTANGLE,
@@ -41,7 +42,7 @@ from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.arrays import FloatArray
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
 
@@ -66,6 +67,7 @@ _GAUSSIAN_PARAMETERS = (
     "ellipticity",
     "ellipticity_diagonal",
 )
+_CURVATURE = "baseline_curvature"
 #: Other scans of one sensor reach from this share of a scan's reach on.
 _LEAST_REACH = 0.5
 #: Sources that are the same error in every scan at the same positions.
@@ -113,7 +115,7 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
     stated = {}
     for name in STATED_ERRORS:
         u = np.array([getattr(scan, f"{name}_uncertainty") or 0.0 for scan in scans])
-        if u.any() and name not in ("gain", *measured_by(estimate.points)):
+        if u.any() and name not in ("gain", _CURVATURE, *measured_by(estimate.points)):
             stated[name] = u[estimate.points.scan]
     found = influences(scans, estimate) if stated else {}
     effects = {}
@@ -254,8 +256,9 @@ def propagate(
     by_voltage = derivatives.by_voltage
     columns = {
         "noise": estimate.scattered(by_voltage),
-        "regularisation": derivatives.by_state @ estimate.fixed_root,
+        "regularisation": derivatives.by_state @ estimate.hidden_root,
         "window": derivatives.hidden,
+        "baseline_curvature": _curvature_columns(estimate, names, by_voltage),
     }
     rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -295,6 +298,18 @@ def propagate(
         kernel_changes=kernel_changes,
         division=division,
     )
+
+
+def _curvature_columns(
+    estimate: ProfileEstimate, names: Sequence[str], by_voltage: VoltageMap
+) -> FloatArray:
+    """Errors (m, c) where the baseline of a scan is curved by its standard deviation."""
+    points = estimate.points
+    deviations = points.curvature[points.curved]
+    errors = by_voltage @ (estimate.model.curvature_columns * deviations)
+    for i, deviation in enumerate(deviations.tolist()):
+        errors[names.index(_CURVATURE + _suffix(points.curved[i])), i] -= deviation
+    return errors
 
 
 def changes_by(
@@ -402,7 +417,7 @@ def _parameters(
     # A round departure beside an ellipse would be read as less of width and ellipticity.
     gain = fit.gain(estimate.weights)
     ellipse = estimate.points.ellipse
-    nuisances, scale = _nuisances(estimate.points.free)
+    nuisances, scale = _nuisances(estimate.points)
     count = len(scale)
     shape = [1, *range(len(gain) - ellipse, len(gain))]
     nuisance = _fitted(kernel, estimate.weighed.gain[2 : 2 + count] * scale)
@@ -449,9 +464,15 @@ def _corrected_full_width(
     return replace(widths, by_voltage=by_voltage, hidden=hidden)
 
 
-def _nuisances(free: BoolArray) -> tuple[list[str], FloatArray]:
-    """Names of centre, baseline and drift of each scan (of the second ``_2``), and their scale."""
-    suffixes = [f"_{i + 1}" if i else "" for i in range(len(free))]
+def _suffix(scan: int) -> str:
+    """Ending of the names of a scan's parameters: of the second ``_2``."""
+    return f"_{scan + 1}" if scan else ""
+
+
+def _nuisances(points: ScanPoints) -> tuple[list[str], FloatArray]:
+    """Names of centre, baseline, drift and curvature of each scan, and their scale."""
+    free = points.free
+    suffixes = [_suffix(i) for i in range(len(free))]
     names = [("centre", "centre_y")[axis] + suffixes[i] for i, axis in np.argwhere(free)]
     scales = [1.0] * len(names)
     for directions, suffix in zip(free, suffixes, strict=True):
@@ -459,7 +480,8 @@ def _nuisances(free: BoolArray) -> tuple[list[str], FloatArray]:
         along = [("drift", "drift_y")[axis] + suffix for axis in np.flatnonzero(directions)]
         names += ["baseline" + suffix, *along]
         scales += [1.0, *(2.0 for _ in along)]
-    return names, np.array(scales)
+    names += [_CURVATURE + _suffix(i) for i in points.curved]
+    return names, np.array(scales + [1.0] * points.curved.size)
 
 
 def _kernel_derivatives(

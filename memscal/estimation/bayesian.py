@@ -325,12 +325,16 @@ def weigh_departures(
     # ``least_noise`` the least that there is, as stated.
     columns = basis.columns(reduced)
     data = reduced.data
-    size = basis.angular.count if basis.angular else 0
-    if size:
-        # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
-        prior = least_noise * np.eye(size, columns.shape[1], basis.flat - size)
-        columns = np.vstack([columns, prior])
-        data = np.append(data, np.zeros(size))
+    # A prior is a further reading: of the curvatures, and of each amplitude of unit variance zero,
+    # with the noise.
+    curvatures, left = reduced.fit.prior
+    count = basis.angular.count if basis.angular else 0
+    prior = least_noise * np.eye(count + left.size, columns.shape[1], basis.flat - count)
+    prior[count:] = 0.0
+    prior[count:, : curvatures.shape[1]] = curvatures
+    columns = np.vstack([columns, prior])
+    data = np.concatenate([data, np.zeros(count), left])
+    size = len(prior)
     noise = _Noise(effective_count + size - basis.flat, expected_noise**2, least_noise**2)
     sizes = tuple(ring.radius.size for ring in basis.rings)
     choice = _choice(basis.flat, sizes, tuple(fitted.family for fitted in basis.families))

@@ -343,14 +343,16 @@ def _fitted_families(reduced: ReducedScan, start: float) -> Iterator[FamilyFit]:
     fit = reduced.fit
     k = reduced.model.k
     step = _RELATIVE_STEP
-    others = np.linalg.qr(reduced.flat[:, 2:])[0]
+    rows, left = fit.prior
+    others = np.linalg.qr(np.vstack([reduced.flat, rows])[:, 2:])[0]
     gaussian = fit.conversion_constant * kernels.gaussian_transfer(k, fit.sigma)
     data = reduced.data + reduced.signal(gaussian)
+    data = np.append(data, left)
     data = data - others @ (others.T @ data)
     widths = np.full(len(FAMILIES), start)
     for _ in range(_FAMILY_ROUNDS):
         both = _sensors(2 * FAMILIES, np.append(widths, (1 + step) * widths), k, _TRANSFORMS)
-        voltages = reduced.signal(both)
+        voltages = np.pad(reduced.signal(both), ((0, left.size), (0, 0)))
         signal, wider = np.hsplit(voltages - others @ (others.T @ voltages), 2)
         # Least squares in A and A d ln(width), of all families at once.
         slope = (wider - signal) / step

@@ -161,6 +161,29 @@ class ForwardModel:
 
     @cached_property
     def drift_columns(self) -> FloatArray:
+        """Baseline and drift along each scan, then curvatures of the baselines that may have one."""
+        return np.hstack([self.straight_columns, self.curvature_columns])
+
+    @cached_property
+    def curvature_columns(self) -> FloatArray:
+        """Parabola of each scan whose baseline may be curved, shape (n, c)."""
+        inside = np.equal.outer(self.points.scan, self.points.curved)
+        return self.parabola[:, None] * inside
+
+    @cached_property
+    def parabola(self) -> FloatArray:
+        """Square of the distance from the middle of each scan over its half range, (n,)."""
+        column = np.zeros_like(self.points.u)
+        for scan in range(self.points.scans):
+            inside = self.points.scan == scan
+            for position in (self.points.x[inside], self.points.y[inside]):
+                half = np.ptp(position) / 2
+                if half > 0:
+                    column[inside] += ((position - position.min() - half) / half) ** 2
+        return column
+
+    @cached_property
+    def straight_columns(self) -> FloatArray:
         """Baseline and drift (from -1 to 1) along each scan, shape (n, 2 or 3 a scan)."""
         columns = []
         for scan, free in enumerate(self.points.free):

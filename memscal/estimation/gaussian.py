@@ -120,7 +120,8 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
         centres.append(start[2:last])
         drifts.append(start[last:])
     shape = np.median(shapes, axis=0)
-    return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
+    others = np.zeros(points.curved.size + points.ellipse)
+    return np.concatenate([shape, *centres, *drifts, others])
 
 
 def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
@@ -141,7 +142,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     tables = wavenumbers.synthesise(spectra, radii, order=model.reference.order).T
     root = np.sqrt(weights)
     data = root * points.u
-    drift = root[:, None] * model.drift_columns
+    drift = root[:, None] * model.straight_columns
     best = np.zeros(0)
     best_cost = np.inf
     odd: list[FloatArray] = []
@@ -229,12 +230,20 @@ class GaussianFit:
     conversion_constant: float  # A, in V/Pa
     sigma: float  # standard deviation of the Gaussian, in m
     centre: FloatArray  # (scans, 2): of the sensor, in m; zero across a line
-    drift: FloatArray  # baseline, and its change over half the range along x (and y), scan by scan
+    # Baseline, and its change over half the range along x (and y), scan by scan; curvatures.
+    drift: FloatArray
     ellipticity: FloatArray  # (2,): e1 (along x against y) and e2 (along the diagonals)
     points: ScanPoints
     geometry: Geometry
     jacobian: FloatArray  # (n, p): voltages by A, sigma, centre, drift and ellipticity
     predicted: FloatArray  # (n,): voltages of the fit, in V
+
+    @property
+    def prior(self) -> tuple[FloatArray, FloatArray]:
+        """Further rows (c, p) of the jacobian by the curvatures' prior, and what they leave over."""
+        rows = self.points.prior_rows(self.jacobian.shape[1])
+        curvature = self.drift[self.drift.size - len(rows) :]
+        return rows, -rows.sum(axis=1) * curvature
 
     def has_width(self, weights: FloatArray, noise: float) -> bool:
         """Whether the width is distinct from zero, where its slopes vanish."""
@@ -247,7 +256,8 @@ class GaussianFit:
     def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
         """Covariance of the parameters for a noise (V) and relative weights."""
         standardised = self.points.standardised(self.jacobian, weights)
-        information = standardised.T @ standardised
+        prior = self.points.prior_rows(self.jacobian.shape[1])
+        information = standardised.T @ standardised + prior.T @ prior
         scale = np.sqrt(np.diag(information))
         inverse = np.linalg.inv(information / np.outer(scale, scale))
         return np.asarray(noise**2 * inverse / np.outer(scale, scale))
@@ -299,6 +309,7 @@ def _solve(
     noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + np.finfo(float).tiny)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
+    prior = points.prior_rows(start.size)
     # Of many points there is room for one.
     del fit
 
@@ -307,8 +318,9 @@ def _solve(
         if key not in last:
             last.clear()
             last[key] = linearise(model, scaled * scale)
-        residual = points.standardised(last[key].predicted - points.u, weights) / noise
-        return residual, points.standardised(last[key].jacobian, weights) * scale / noise
+        residual = points.standardised(last[key].predicted - points.u, weights)
+        slope = np.vstack([points.standardised(last[key].jacobian, weights), prior])
+        return np.append(residual, prior @ (scaled * scale)) / noise, slope * scale / noise
 
     # A robust fit is the start of the next one: a low accuracy is enough.
     knee = _KNEE if robust else np.inf

@@ -55,7 +55,7 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
     slope = model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
     found = {
         "stage_scale": Influence(slope * estimate.distance),
-        "baseline_curvature": Influence(largest * _parabolas(estimate)),
+        "baseline_curvature": Influence(largest * model.parabola),
         "gain_curvature": Influence(-signal * np.abs(signal) / largest),
         "load_scale": Influence(np.zeros_like(signal), scaling=1.0),
     }
@@ -69,18 +69,6 @@ def influences(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, In
 def measured_by(points: ScanPoints) -> tuple[str, ...]:
     """Return what points show by themselves: planes and crossed lines an ellipse and its centre."""
     return ("roundness", "line_offset") if points.ellipse else ()
-
-
-def _parabolas(estimate: ProfileEstimate) -> FloatArray:
-    """Square of the distance from the middle of each scan over its half range, (n,)."""
-    columns = np.zeros_like(estimate.points.u)
-    for scan in range(estimate.points.scans):
-        inside = estimate.points.scan == scan
-        for position in (estimate.points.x[inside], estimate.points.y[inside]):
-            half = np.ptp(position) / 2
-            if half > 0:
-                columns[inside] += ((position - position.min() - half) / half) ** 2
-    return columns
 
 
 def _of_lines(estimate: ProfileEstimate) -> dict[str, Influence]:

@@ -9,7 +9,7 @@ the voltage falls where the indenter stands at larger x than the sensor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -104,6 +104,9 @@ class ScanPoints:
     decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
     channel: str = "zz"
     reading: Reading = VOLTS  # the unit in which voltages are shown
+    # (scans,): standard deviation of each baseline's curvature, edge to centre, in V; 0: straight
+    curvature: FloatArray = field(default_factory=lambda: np.zeros(0))
+    unit: float = 1.0  # noise of a point of weight one, by which that prior is weighed
 
     @property
     def order(self) -> int:
@@ -131,6 +134,22 @@ class ScanPoints:
         if self.order:
             return 0
         return 2 if self.planar else int(self.free.any(axis=0).all())
+
+    @property
+    def curved(self) -> IndexArray:
+        """Numbers of the scans whose baselines may be curved."""
+        return np.flatnonzero(self.curvature)
+
+    def curvatures(self, parameters: int) -> slice:
+        """Places of the curvatures among the parameters of a Gaussian fit."""
+        last = parameters - self.ellipse
+        return slice(last - self.curved.size, last)
+
+    def prior_rows(self, parameters: int) -> FloatArray:
+        """Further rows (c, p): readings of the curvatures, zero, with noise as that of a point."""
+        rows = np.zeros((self.curved.size, parameters))
+        rows[:, self.curvatures(parameters)] = np.diag(self.unit / self.curvature[self.curved])
+        return rows
 
     @cached_property
     def places(self) -> tuple[Places, ...]:
@@ -167,13 +186,19 @@ class ScanPoints:
         if self.scans == 1:
             return self
         single = self.selected(np.flatnonzero(self.scan == scan))
-        return replace(single, scan=np.zeros_like(single.scan), free=self.free[scan : scan + 1])
+        own = slice(scan, scan + 1)
+        return replace(
+            single,
+            scan=np.zeros_like(single.scan),
+            free=self.free[own],
+            curvature=self.curvature[own],
+        )
 
     def selected(self, chosen: IndexArray) -> ScanPoints:
         """Return some of the points, without their correlations."""
         columns: dict[str, Any] = {}
         for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and name != "free":
+            if isinstance(value, np.ndarray) and name not in ("free", "curvature"):
                 columns[name] = value[chosen]
         return replace(self, **columns, decorrelation=None)
 
@@ -240,6 +265,24 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     )
     _require_usable(points)
     return points
+
+
+#: Standard deviation of a baseline's curvature, edge to centre, over the largest signal, where none
+#: is stated.
+CURVATURE = 0.005
+
+
+def calibration_points(scan: Scan, channel: str = "zz") -> ScanPoints:
+    """Flatten a scan whose baseline may be curved: as it states, or a little."""
+    points = measured_points(scan, channel)
+    relative = scan.baseline_curvature_uncertainty
+    # The median of three points does not follow a single outlier.
+    rise = np.sort(np.abs(rise_of(points.x, points.y, points.u)))
+    largest = float(np.median(rise[-3:]))
+    deviation = largest * (CURVATURE if relative is None else relative)
+    # Noise that is not stated is found together with the profile.
+    unit = 1.0 if points.u_errors is not None else deviation
+    return replace(points, curvature=np.array([deviation]), unit=unit)
 
 
 def measured_mask(scan: Scan, channel: str = "zz") -> BoolArray:
@@ -341,7 +384,7 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
         repeats.append(points.repeat + first)
         numbers.append(np.full_like(points.scan, number))
         first += int(points.repeat.max()) + 1
-    names = ("x", "y", "u", "load", "x_errors", "branch", "free")
+    names = ("x", "y", "u", "load", "x_errors", "branch", "free", "curvature")
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     return ScanPoints(
         **columns,
@@ -352,6 +395,7 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
         decorrelation=_joined_decorrelation(scans),
         channel=scans[0].channel,
         reading=scans[0].reading,
+        unit=scans[0].unit,
     )
 
 

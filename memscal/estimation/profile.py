@@ -30,6 +30,8 @@ NUMERICAL_FLOOR = 1e-6
 #: A conversion constant must exceed this many of its standard uncertainties.
 LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
+#: Noise that is not stated is found to this share.
+_SAME_NOISE = 0.1
 #: Relative step of the derivatives of an ellipse.
 _STEP = 1e-4
 
@@ -79,9 +81,23 @@ class ProfileEstimate:
     @cached_property
     def fixed_root(self) -> FloatArray:
         """Square root of what of the posterior's covariance does not scatter between scans."""
-        random = self.scattered(self.weighed.gain)
+        return np.hstack([self.hidden_root, self.curving])
+
+    @cached_property
+    def curving(self) -> FloatArray:
+        """Errors (p, c) of the posterior's mean where a baseline is curved by its deviation."""
+        deviation = self.points.curvature[self.points.curved]
+        errors = self.weighed.gain @ (self.model.curvature_columns * deviation)
+        own = self.points.curvatures(self.gaussian.jacobian.shape[1])
+        errors[own] -= np.diag(deviation)
+        return errors
+
+    @cached_property
+    def hidden_root(self) -> FloatArray:
+        """Square root of what of the covariance neither noise nor a curved baseline makes."""
+        known = np.hstack([self.scattered(self.weighed.gain), self.curving])
         covariance = self.weighed.covariance
-        return square_root(covariance - random @ random.T, np.diag(covariance))
+        return square_root(covariance - known @ known.T, np.diag(covariance))
 
     @cached_property
     def noise_scale(self) -> float:
@@ -132,7 +148,7 @@ class ProfileEstimate:
 
     @property
     def drifts(self) -> FloatArray:
-        """Each scan's baseline and its change over half the range along x (and y), in V."""
+        """Each scan's baseline, its change over half the range along x (and y); curvatures, in V."""
         first = 2 + int(self.points.free.sum())
         last = self.gaussian.jacobian.shape[1] - self.points.ellipse
         return self.gaussian.drift + self.weighed.mean[first:last]
@@ -197,7 +213,7 @@ class ProfileEstimate:
 
     @cached_property
     def background(self) -> FloatArray:
-        """Baseline and drift at each point, shape (n,), in V."""
+        """Baseline, drift and curvature at each point, shape (n,), in V."""
         return self.model.drift_columns @ self.drifts
 
     @property
@@ -245,9 +261,15 @@ def estimate_profile(
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
+        unit = points.unit
+        if points.u_errors is None and points.curved.size:
+            unit = max(weighed.noise, noise)
         # A residual counts by the root of its weight.
-        if rounds_left and not np.allclose(updated**0.5, outlier**0.5, atol=0.02):
+        settled = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
+        if rounds_left and not (settled and np.isclose(unit, points.unit, rtol=_SAME_NOISE)):
             outlier = updated
+            points = replace(points, unit=unit)
+            model = replace(model, points=points)
             # Of many points there is room for one.
             del weighed
             continue

@@ -310,7 +310,7 @@ def _baseline(data: ApparatusData) -> float:
 
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
-    """Return baseline and drift, its change from end to end, at positions x, in V."""
+    """Return baseline, drift from end to end and curvature at positions x, in V."""
     along = data.reconvolution.x
     stated = data.reconvolution.background
     if stated is not None:
@@ -320,6 +320,8 @@ def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
         middle = (np.max(along) + np.min(along)) / 2
         level += data.parameters["drift"] * (x - middle) / np.ptp(along)
+        if "baseline_curvature" in data.parameters:
+            level += data.parameters["baseline_curvature"] * (2 * (x - middle) / np.ptp(along)) ** 2
     return level
 
 

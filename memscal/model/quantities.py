@@ -203,6 +203,7 @@ _ESTIMATED = (
     Quantity("centre", _L, "centre of the scan", "x₀"),
     Quantity("centre_y", _L, "centre of the scan along y", "y₀"),
     Quantity("baseline", _U, "baseline", "U₀"),
+    Quantity("baseline_curvature", _U, "curvature of the baseline, edge to centre"),
     Quantity("baseline_slope", "voltage per length", "baseline slope"),
     Quantity("drift", _U, "drift of the baseline across the scan", "ΔU"),
     Quantity("drift_y", _U, "drift of the baseline along y", "ΔU"),

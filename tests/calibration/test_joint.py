@@ -71,12 +71,21 @@ def assert_a_is_as_stated(parameters: ParameterSet, bounds: list[dict[str, float
 
 
 def test_the_division_joins_scans_of_other_loads_rods_and_films():
-    scans = several(0.005)
     name = "conversion_constant"
-    together, *alone = (joint(s, "white-noise").parameters for s in (scans, *([s] for s in scans)))
-    sizes = [{"film": s.film, "rod": s.indenter, "load": s.load, "points": s.x.size} for s in scans]
-    assert_a_is_as_stated(together, [cramer_rao(0.005, **size) for size in sizes])
-    assert together.uncertainty(name) < min(parameters.uncertainty(name) for parameters in alone)
+    rows = []
+    # An uncertainty varies with the draw, by which shapes of G a scan leaves open.
+    for seed in (0, 10, 20):
+        scans = several(0.005, seed=seed)
+        groups = [scans, *([scan] for scan in scans)]
+        found = [joint(group, "white-noise").parameters for group in groups]
+        bounds = []
+        for scan in scans:
+            size = {"film": scan.film, "rod": scan.indenter, "load": scan.load}
+            bounds.append(cramer_rao(0.005, points=scan.x.size, **size))
+        assert_a_is_as_stated(found[0], bounds)
+        rows.append([parameters.uncertainty(name) for parameters in found])
+    together, *alone = np.mean(rows, axis=0)
+    assert together < min(alone)
 
 
 def test_lines_and_a_raster_are_fitted_together():
@@ -101,6 +110,9 @@ def test_scans_of_other_sensors_or_of_films_that_contradict_are_refused():
         joint([])
 
 
+SOURCES = ("noise", "regularisation", "window", "baseline_curvature", "misfit")
+
+
 def moved_repeats() -> Scan:
     """Three passes over a sensor that moves between them."""
     points = as_points(simulate(repeats=3, points=33, noise=0.003, seed=4))
@@ -113,7 +125,7 @@ def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draw
     own, common = (memscal.calibrate(path, centre=centre) for centre in (None, "common"))
     for apparatus in (own.apparatus, common.apparatus):
         budget = apparatus.budget["conversion_constant"]
-        assert set(budget) == {"noise", "regularisation", "window", "misfit", *common.effects}
+        assert set(budget) == {*SOURCES, *common.effects}
         # At finite strain a share of the load is a little more of A, and a little of the width.
         assert 0.01 < budget["load"] / apparatus.conversion_constant < 0.011
         assert 0 < apparatus.budget["gaussian_sigma"]["load"] < 0.002 * apparatus.gaussian_sigma

@@ -12,7 +12,7 @@ import memscal
 import memscal.extensions.simulation.contact_scan as contacts
 from memscal import Contact, MeasuredStress, Process, RadialKernel, Scan, StressSensor
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
-from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.points import ScanPoints, calibration_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
@@ -66,7 +66,7 @@ def simulated(branch: Any = None, **options: Any) -> Scan:
 
 def estimated(scan: Scan, *, angular: bool = False) -> ProfileEstimate:
     """Estimate the profile of a scan with the rod's own solution as reference."""
-    points: ScanPoints = measured_points(scan)
+    points: ScanPoints = calibration_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     return estimate_profile(points, reference_spectrum(contact, points), angular=angular)
 

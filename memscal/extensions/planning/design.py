@@ -24,7 +24,7 @@ from memscal.estimation.bayesian import supported, weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
-from memscal.estimation.points import measured_points
+from memscal.estimation.points import calibration_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.estimation.set_up import reference_profile
@@ -168,7 +168,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
     stress = reference_profile(scan, None)
-    points = measured_points(scan)
+    points = calibration_points(scan)
     model = ForwardModel(points, reference_spectra([stress], [points]))
     assert points.u_errors is not None  # the plan's: the voltages themselves have none
     weights = 1 / points.u_errors**2
