@@ -161,7 +161,7 @@ class ForwardModel:
 
     @cached_property
     def drift_columns(self) -> FloatArray:
-        """Baseline and drift along each scan, then curvatures of the baselines that may have one."""
+        """Baseline and drift along each scan, then curvatures of baselines that may be curved."""
         return np.hstack([self.straight_columns, self.curvature_columns])
 
     @cached_property

@@ -240,7 +240,7 @@ class GaussianFit:
 
     @property
     def prior(self) -> tuple[FloatArray, FloatArray]:
-        """Further rows (c, p) of the jacobian by the curvatures' prior, and what they leave over."""
+        """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
         rows = self.points.prior_rows(self.jacobian.shape[1])
         curvature = self.drift[self.drift.size - len(rows) :]
         return rows, -rows.sum(axis=1) * curvature

@@ -55,9 +55,8 @@ def hold_out(estimate: ProfileEstimate, group: IndexArray) -> HeldOut | None:
     # Clipped: many outliers in one group count together, and a single one counts little.
     model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
-    nuisances = slice(
-        2, 2 + int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
-    )
+    straight = estimate.model.straight_columns.shape[1]
+    nuisances = slice(2, 2 + int(estimate.points.free.sum()) + straight)
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]

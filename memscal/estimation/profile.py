@@ -148,7 +148,7 @@ class ProfileEstimate:
 
     @property
     def drifts(self) -> FloatArray:
-        """Each scan's baseline, its change over half the range along x (and y); curvatures, in V."""
+        """Each scan's baseline and change over half the range along x (and y); curvatures (V)."""
         first = 2 + int(self.points.free.sum())
         last = self.gaussian.jacobian.shape[1] - self.points.ellipse
         return self.gaussian.drift + self.weighed.mean[first:last]
@@ -261,12 +261,12 @@ def estimate_profile(
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
-        unit = points.unit
-        if points.u_errors is None and points.curved.size:
-            unit = max(weighed.noise, noise)
+        unit = max(weighed.noise, noise)
         # A residual counts by the root of its weight.
         settled = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
-        if rounds_left and not (settled and np.isclose(unit, points.unit, rtol=_SAME_NOISE)):
+        if points.curved.size:
+            settled &= np.isclose(unit, points.unit, rtol=_SAME_NOISE)
+        if rounds_left and not settled:
             outlier = updated
             points = replace(points, unit=unit)
             model = replace(model, points=points)
@@ -391,7 +391,7 @@ _LEFT = 0.1
 
 def _why_undetermined(estimate: ProfileEstimate) -> str:
     """Say what keeps A from being determined: the noise, or the parameter it is confused with."""
-    base = np.linalg.qr(estimate.model.drift_columns)[0]
+    base = np.linalg.qr(estimate.model.straight_columns)[0]
     rise = np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted))
     ratio = rise / float(np.median(estimate.noise))
     varied = estimate.points.reading.text(rise)

@@ -55,6 +55,7 @@ def test_what_is_stated_is_in_the_budget_by_its_size_for_one_uncertainty(name: s
 def test_a_curved_baseline_is_fitted_with_a_prior_and_counts() -> None:
     name = "baseline_curvature"
     lines = []
+    uncertainties = []
     for size in (None, 0.002, 0.0):
         found = memscal.calibrate(stated(baseline_curvature=size)).apparatus
         states = {assumption.name: assumption.state for assumption in found.assumptions}
@@ -62,7 +63,9 @@ def test_a_curved_baseline_is_fitted_with_a_prior_and_counts() -> None:
         # Held straight, there is nothing to fit.
         assert (name in found.parameters.names) == (size != 0)
         lines.append(found.budget["conversion_constant"][name])
-    assert lines[0] > lines[1] > lines[2] == 0
+        uncertainties.append(found.parameters.uncertainty("conversion_constant"))
+    assert min(lines[:2]) > lines[2] == 0
+    assert uncertainties[0] > uncertainties[1] > uncertainties[2]
 
 
 def test_a_true_curvature_of_one_deviation_moves_a_result_by_its_line() -> None:

@@ -38,11 +38,16 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
     voltages = root * model.signal(fit.geometry, kernels)
     voltages[:, 2 : basis.flat] = root * fit.jacobian[:, 2:]
     blocks = dict(zip([*SHAPES, *(f.family for f in basis.families)], basis.blocks, strict=True))
+    curvature = estimate.points.curvatures(fit.jacobian.shape[1])
+    curved = voltages[:, curvature]
+    straight = np.delete(voltages[:, 2 : basis.flat], np.arange(basis.flat - 2)[-1], axis=1)
+    deviation = estimate.points.curvature
     likely = np.flatnonzero(estimate.weighed.probability > 1e-3)
     assert len({HYPOTHESES[i].kind for i in likely}) > 2
     logs = []
     for h in (HYPOTHESES[i] for i in likely):
-        data = root[:, 0] * (estimate.points.u - fit.predicted)
+        # The curvature of the baseline has a prior about zero, not about the fit.
+        data = root[:, 0] * (estimate.points.u - fit.predicted) + curved @ fit.drift[-1:]
         of_a = voltages[:, 0] * basis.conversion_constant
         of_width = voltages[:, 1] * basis.sigma
         spread = np.zeros((data.size, 0))
@@ -51,16 +56,16 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
             data = data - off
             of_a = of_a + off
             spread = last[:, None]
-        flat = np.column_stack([of_a, of_width, voltages[:, 2 : basis.flat]])
-        covariance = np.eye(data.size) + spread @ spread.T
+        flat = np.column_stack([of_a, of_width, straight])
+        covariance = np.eye(data.size) + spread @ spread.T + deviation**2 * (curved @ curved.T)
         if h.shape is not None:
             columns = h.strength * voltages[:, blocks[h.shape]]
             covariance += columns @ columns.T
         # A flat prior integrates the parameters out of the density of the data.
         q, r = np.linalg.qr(flat, mode="complete")
-        null = q[:, basis.flat :]
+        null = q[:, basis.flat - 1 :]
         density = multivariate_normal.logpdf(null.T @ data, cov=null.T @ covariance @ null)
-        size = np.abs(np.diag(r[: basis.flat])).prod()
+        size = np.abs(np.diag(r[: basis.flat - 1])).prod()
         logs.append(density - np.log(size) + np.log(h.estimate))
     found = np.log(estimate.weighed.probability[likely])
     np.testing.assert_allclose(found - found.max(), logs - np.max(logs), atol=1e-6)

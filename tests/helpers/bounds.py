@@ -37,7 +37,8 @@ def cramer_rao(
 ) -> dict[str, float]:
     """Cramer-Rao bounds of A, sigma, centre and baseline, all unknown, in SI units.
 
-    The baseline may be curved by half a percent of the largest signal, edge to centre.  By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.
+    The baseline may be curved by half a percent of the largest signal, edge to centre.  By finite
+    differences of simulated, noise-free scans: not by the estimator's own Jacobian.
     ``inexact``: with what the uncertainties of the paper's film and of a load known to 1 % add.
     """
     width = kernel.sigmas[0]

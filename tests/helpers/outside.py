@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy.special import j1
 
@@ -27,6 +28,7 @@ PERIOD = 64e-3
 LARGEST = 12.5e3
 DEEP = 25.0
 """Wavenumbers times thickness from which on nothing reaches the base."""
+_DEPTHS = 401
 
 
 @dataclass(frozen=True)
@@ -95,25 +97,26 @@ class World:
         """Transforms of normal stress and shear at the base per newton, at wavenumbers (n,)."""
         ka = np.maximum(k * self.radius, 1e-12)
         punch = np.sin(ka) / ka
-        bonded = layer(self.poisson_ratio, self.thickness, tuple(k), slides=False)
-        parts = (1 - self.base_slip) * bonded
-        if self.base_slip:
-            slides = layer(self.poisson_ratio, self.thickness, tuple(k), slides=True)
-            parts = parts + self.base_slip * slides
-        return punch * parts[0], punch * parts[1]
+        q = k * self.thickness
+        inside = np.where(q < DEEP, punch, 0.0)
+        parts = np.zeros((k.size, 2))
+        for share, slides in ((1 - self.base_slip, False), (self.base_slip, True)):
+            if share:
+                parts += share * layer(self.poisson_ratio, slides=slides)(np.minimum(q, DEEP))
+        return inside * parts[:, 0], inside * parts[:, 1]
 
 
-@lru_cache(maxsize=64)
-def layer(nu: float, thickness: float, k: tuple[float, ...], *, slides: bool) -> FloatArray:
-    """Normal stress and shear at the base of a film, per surface pressure, (2, n)."""
-    at_base = np.zeros((2, len(k)))
-    for i, wavenumber in enumerate(k):
+@lru_cache
+def layer(nu: float, *, slides: bool) -> CubicSpline:
+    """Normal stress and shear at the base of a film, per surface pressure, by k times thickness."""
+    depths = np.linspace(0.0, DEEP, _DEPTHS)
+    at_base = np.zeros((_DEPTHS, 2))
+    # Lengths in thicknesses, stresses in shear moduli: y' = matrix y from base to surface.
+    stiffness = nu / (1 - nu)
+    free = [0, 3] if slides else [2, 3]
+    for i, q in enumerate(depths):
         # At rest a film that slides may be moved as a whole.
-        q = max(wavenumber * thickness, 1e-4)
-        if q > DEEP:
-            continue
-        # Lengths in thicknesses, stresses in shear moduli: y' = matrix y from base to surface.
-        stiffness = nu / (1 - nu)
+        q = max(q, 1e-4)
         strain = np.array([stiffness * q, 0.0, 0.0, (1 - 2 * nu) / (2 * (1 - nu))])
         matrix = np.zeros((4, 4))
         matrix[0] = [0.0, -q, 1.0, 0.0]
@@ -121,11 +124,9 @@ def layer(nu: float, thickness: float, k: tuple[float, ...], *, slides: bool) ->
         matrix[2] = q * (np.array([2 * q, 0.0, 0.0, -1.0]) + 2 * strain)
         matrix[3] = [0.0, 0.0, q, 0.0]
         carried = expm(matrix)
-        free = [0, 3] if slides else [2, 3]
         unknown = np.linalg.solve(carried[2:][:, free], [0.0, 1.0])
-        at_base[1, i] = 0.0 if slides else unknown[0]
-        at_base[0, i] = unknown[1]
-    return at_base
+        at_base[i] = unknown[1], 0.0 if slides else unknown[0]
+    return CubicSpline(depths, at_base)
 
 
 def line(half_range: float = HALF_RANGE, step: float = 0.25e-3) -> FloatArray:

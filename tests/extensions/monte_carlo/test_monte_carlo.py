@@ -124,7 +124,9 @@ def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str):
     ],
 )
 def test_a_budget_of_noise_is_that_of_draws_where_the_estimate_is_linear(method, number):
-    calibration = memscal.calibrate(simulated(noise=0.001, seed=3), method=method)
+    # A curved baseline lets some draws be read as tails of G, by a jump.
+    scan = replace(simulated(noise=0.001, seed=3), baseline_curvature_uncertainty=0.0)
+    calibration = memscal.calibrate(scan, method=method)
     found = memscal.monte_carlo(calibration, draws=DRAWS)
     for name in ("conversion_constant", "gaussian_sigma", number):
         assert found[name].agrees, found[name].reason

@@ -1,0 +1,264 @@
+"""The study outside the model: what scans do not state, one thing at a time, and what tells it.
+
+Each row makes scans by the calculation of helpers.outside with one thing other than stated. The
+size at which A (or sigma) is wrong by two standard uncertainties is found without noise; at three a
+row is alarmed if checks fail; where a scan states the size as a standard uncertainty, sizes drawn
+from it are counted; where a calibration names a size, it is compared.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from helpers.bounds import FULL
+from helpers.outside import ROUND, SIGMA, A, World, elliptic, lobe, tail
+from helpers.outside import scan as perturbed_scan
+
+import memscal
+from memscal import ApparatusFunction, Scan
+
+RUNS = 30 if FULL else 10
+DRAWS = 60 if FULL else 12
+TRUTHS = {"conversion_constant": A, "gaussian_sigma": SIGMA}
+SYMBOLS = {"conversion_constant": "A", "gaussian_sigma": "σ"}
+#: Sizes are tried up to this factor of the first one, each larger by this ratio.
+_FARTHEST = 32.0
+_RATIO = 1.25
+
+Stated = Callable[[Scan, float], Scan]
+
+
+def states(name: str) -> Stated:
+    """Say how a scan states the size as a standard uncertainty of its own."""
+    return lambda scan, size: replace(scan, **{f"{name}_uncertainty": size})
+
+
+def states_of_film(name: str) -> Stated:
+    """Say how a scan states the size as a standard uncertainty of its film."""
+
+    def stated(scan: Scan, size: float) -> Scan:
+        return replace(scan, film=replace(scan.film, **{f"{name}_uncertainty": size}))
+
+    return stated
+
+
+@dataclass(frozen=True)
+class Row:
+    """One thing that a scan does not state."""
+
+    name: str
+    world: Callable[[float], World]
+    first: float  # a size of which less than two uncertainties come, in SI units
+    unit: str = ""
+    per_unit: float = 1.0  # of what the table shows
+    stated: Stated | None = None
+    assumption: str = ""  # that names the size
+    named: Callable[[float], float] = float  # the size as the assumption has it
+    shown_by: str = ""  # what measurement would show it, where a line cannot
+    parameter: str = "conversion_constant"
+    signs: tuple[float, ...] = (-1.0, 1.0)
+
+    def calibrated(self, size: float, seed: int | None = None) -> ApparatusFunction:
+        """Calibrate a scan of a size, without noise or with that of a seed."""
+        world = self.world(size)
+        scan = perturbed_scan(world, seed or 0)
+        if seed is None:
+            scan = replace(scan, u_zz=world.voltages(scan.x))
+        return memscal.calibrate(scan, other=False).apparatus
+
+    def deviation(self, apparatus: ApparatusFunction) -> float:
+        """Error of the parameter over its standard uncertainty."""
+        p = apparatus.parameters
+        return (p[self.parameter] - TRUTHS[self.parameter]) / p.uncertainty(self.parameter)
+
+    def size_at(self, deviation: float) -> float:
+        """Size at which the mean error is so many uncertainties; infinite if none is."""
+        exact = self.deviation(self.calibrated(0.0))
+        tried = [0.0]
+        found = [0.0]
+        size = self.first
+        while size < _FARTHEST * self.first:
+            tried.append(size)
+            found.append(abs(self.deviation(self.calibrated(size)) - exact))
+            if found[-1] >= deviation:
+                return float(np.interp(deviation, found[-2:], tried[-2:]))
+            size *= _RATIO
+        return math.inf
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What tells a row: sizes at two and three uncertainties, and what happens there."""
+
+    row: Row
+    two: float
+    three: float
+    alarmed: float  # share of runs at the latter with a failed check
+    counted: float | None  # rms of error over uncertainty, where the scan states the size
+    named: float | None  # the size of two uncertainties as named, over that found
+
+
+@lru_cache
+def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
+    """Run one row of the study."""
+    two = row.size_at(2.0)
+    three = row.size_at(3.0)
+    failed = []
+    if math.isfinite(three):
+        failed = [not row.calibrated(three, seed).passed for seed in range(runs)]
+    counted = None
+    if row.stated is not None and math.isfinite(two):
+        z = []
+        for seed in range(draws):
+            size = two * abs(np.random.default_rng([35, seed]).normal())
+            sign = row.signs[seed % len(row.signs)]
+            scan = row.stated(perturbed_scan(row.world(sign * size), seed), two)
+            z.append(row.deviation(memscal.calibrate(scan, other=False).apparatus))
+        counted = float(np.sqrt(np.mean(np.square(z))))
+    named = None
+    if row.assumption and math.isfinite(two):
+        assumptions = {each.name: each for each in row.calibrated(0.0).assumptions}
+        size = assumptions[row.assumption].sizes[row.parameter]
+        # Of an offset the error grows with the square.
+        factor = math.sqrt(2) if row.assumption == "line_offset" else 2.0
+        named = factor * size / row.named(two)
+    return Outcome(row, two, three, float(np.mean(failed)) if failed else math.nan, counted, named)
+
+
+def _ratio_of_lobe(distance: float) -> float:
+    """Axis ratio, less one, of a sensor with a fifth of its sensitivity beside the line."""
+    return math.sqrt(1 + 0.16 * (distance / SIGMA) ** 2) - 1
+
+
+ROWS = {
+    row.name: row
+    for row in (
+        Row(
+            "long axis along the line",
+            lambda size: elliptic(1 + size),
+            0.05,
+            stated=states("roundness"),
+            assumption="roundness",
+            shown_by="a second line across, or a raster",
+        ),
+        Row(
+            "long axis across the line",
+            lambda size: elliptic(1 / (1 + size)),
+            0.05,
+            stated=states("roundness"),
+            assumption="roundness",
+            shown_by="a second line across, or a raster",
+        ),
+        Row(
+            "a fifth of the sensitivity beside the line",
+            lobe,
+            0.3e-3,
+            "mm",
+            1e3,
+            assumption="roundness",
+            named=_ratio_of_lobe,
+            shown_by="a raster",
+        ),
+        Row(
+            "line beside the sensor",
+            lambda size: replace(ROUND, line_offset=size),
+            0.1e-3,
+            "mm",
+            1e3,
+            states("line_offset"),
+            "line_offset",
+            shown_by="a second line across, or a raster",
+        ),
+        Row(
+            "scale of the stage",
+            lambda size: replace(ROUND, stage_scale=1 + size),
+            0.006,
+            "%",
+            100.0,
+            states("position_scale"),
+            "stage_scale",
+            shown_by="a calibrated scale beside the stage",
+        ),
+        Row(
+            "scale of the load",
+            lambda size: replace(ROUND, load_scale=1 + size),
+            0.01,
+            "%",
+            100.0,
+            lambda scan, size: replace(scan, load_uncertainty=size * scan.load),
+            shown_by="a calibrated load cell",
+        ),
+        Row(
+            "slip at the base",
+            lambda size: replace(ROUND, base_slip=size),
+            0.05,
+            "",
+            1.0,
+            states("base_slip"),
+            "base_slip",
+            shown_by="a film of another thickness",
+            signs=(1.0,),
+        ),
+        Row("tail of G of 3 mm", tail, 0.02, "%", 100.0),
+        Row(
+            "baseline, one cosine",
+            lambda size: replace(ROUND, cosine=size),
+            0.002,
+            "%",
+            100.0,
+        ),
+        Row(
+            "baseline, parabola",
+            lambda size: replace(ROUND, parabola=size),
+            0.005,
+            "%",
+            100.0,
+            states("baseline_curvature"),
+            "baseline_curvature",
+        ),
+        Row("baseline, step", lambda size: replace(ROUND, step=size), 0.005, "%", 100.0),
+        Row(
+            "amplifier, b",
+            lambda size: replace(ROUND, gain_curvature=size),
+            0.02,
+            "%",
+            100.0,
+            states("gain_curvature"),
+            "gain_curvature",
+        ),
+        Row(
+            "response to shear",
+            lambda size: replace(ROUND, shear_sensitivity=size),
+            0.03e-3,
+            "mm",
+            1e3,
+            assumption="shear_sensitivity",
+        ),
+        Row(
+            "Poisson's ratio below a half",
+            lambda size: replace(ROUND, poisson_ratio=0.5 - abs(size)),
+            0.02,
+            stated=states_of_film("poisson_ratio"),
+        ),
+        Row(
+            "thickness",
+            lambda size: replace(ROUND, thickness=2e-3 + size),
+            0.03e-3,
+            "mm",
+            1e3,
+            states_of_film("thickness"),
+            parameter="gaussian_sigma",
+        ),
+        Row(
+            "lag along the line",
+            lambda size: replace(ROUND, lag=size),
+            0.05e-3,
+            "mm",
+            1e3,
+            parameter="gaussian_sigma",
+        ),
+    )
+}
+"""What a scan may be made with that it does not state."""
