@@ -263,10 +263,10 @@ def estimate_profile(
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
         unit = max(weighed.noise, noise)
         # A residual counts by the root of its weight.
-        settled = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
-        if points.curved.size:
-            settled &= np.isclose(unit, points.unit, rtol=_SAME_NOISE)
-        if rounds_left and not settled:
+        weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
+        # By the noise the prior of a curvature is weighed.
+        same_noise = not points.curved.size or np.isclose(unit, points.unit, rtol=_SAME_NOISE)
+        if rounds_left and not (weighed_alike and same_noise):
             outlier = updated
             points = replace(points, unit=unit)
             model = replace(model, points=points)
