@@ -26,6 +26,7 @@ _STATEMENTS = {
     "base_slip": "base_slip_uncertainty",
     "baseline_curvature": "baseline_curvature_uncertainty",
     "gain_curvature": "gain_curvature_uncertainty",
+    "shear_sensitivity": "shear_sensitivity_uncertainty",
     "load_scale": "load_uncertainty",
     "noise_correlation": "u_zz_correlation",
     "rod_friction": "rod_friction",

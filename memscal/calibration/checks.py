@@ -44,8 +44,9 @@ _ROUTES_LIMIT = 3.2
 _HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
 #: At this share of the thickness the base stress of a neo-Hookean film differs by a tenth.
 _DEEP = 0.1
-#: Of 1000 curvatures as their prior has them one is beyond.
+#: Of 1000 curvatures as their prior has them one is beyond; the noise hides less of it than all.
 _CURVED = 3.3
+_LEAST_FOUND = 1e-3
 _BEYOND = 1.5
 _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
@@ -238,17 +239,20 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     last = 1 + int(estimate.points.free[0].sum())
     change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     checks.append(check("baseline_drift", change, 0.05, meaning))
-    points = estimate.points
-    curvatures = estimate.drifts[estimate.drifts.size - points.curved.size :]
+    own = estimate.points.curvatures(estimate.gaussian.jacobian.shape[1])
+    curvatures = estimate.drifts[estimate.drifts.size - (own.stop - own.start) :]
     if curvatures.size:
         meaning = (
-            "Fitted curvature of the baseline, edge to centre, over the standard deviation of its "
-            "prior. A failure means that the baseline bends by more than was allowed for, or that "
-            "something else looks like it: a tail of G, the amplifier. State "
+            "Fitted curvature of the baseline, edge to centre, over what its prior and the noise "
+            "make of it. A failure means that the baseline bends by more than was allowed for, or "
+            "that something else looks like it: a tail of G, the amplifier. State "
             "baseline_curvature_uncertainty, or let amplifier and film settle."
         )
-        share = np.abs(curvatures / points.curvature[points.curved]).max()
-        checks.append(check("baseline_curvature", share, _CURVED, meaning))
+        prior = estimate.points.curvature[estimate.points.curved] ** 2
+        # What a mean has of the prior's variance the posterior has not.
+        found = prior - np.diag(estimate.weighed.covariance)[own]
+        share = np.abs(curvatures) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
+        checks.append(check("baseline_curvature", share.max(), _CURVED, meaning))
     if not source:
         meaning = (
             "Relative difference of the reference's total force from the load. A failure means "

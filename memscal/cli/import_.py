@@ -90,6 +90,7 @@ _TAKEN_FOR_GRANTED = {
     "line_offset_uncertainty": -3,
     "base_slip_uncertainty": 0,
     "baseline_curvature_uncertainty": 0,
+    "shear_sensitivity_uncertainty": -3,
 }
 _CELL_NAMES = {"name": "load_cell", "serial_number": "load_cell_serial"}
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
@@ -186,6 +187,9 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 )
 @option("--baseline-curvature-uncertainty", NonNegative("ratio"))(
     "Scan: standard uncertainty of the baseline from edge to centre, over the largest signal."
+)
+@option("--shear-sensitivity-uncertainty", NonNegative("mm"))(
+    "Scan: standard uncertainty of the length by which the sensor responds to shear, in mm."
 )
 @option("--lubrication", click.Choice(["dry", "lubricated"]))(
     "Scan: what was between indenter and film."

@@ -46,7 +46,7 @@ tail_share: share of the voltage's integral beyond the scan
     scan farther
 baseline_drift: change of the baseline across the scan over the largest signal
     let amplifier and film settle; scan faster
-baseline_curvature: fitted curvature of the baseline over the deviation of its prior
+baseline_curvature: fitted curvature of the baseline over what its prior and noise make
     let amplifier and film settle, or state baseline_curvature_uncertainty
 reference_force: total force of the reference against its load
     check the reference's load and the reach of its table

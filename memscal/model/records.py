@@ -7,6 +7,7 @@ from memscal.model.quantities import ESTIMATED, Quantity, Record, measured, reco
 from memscal.model.scan import STATED_ERRORS
 
 _L = "length"
+_LENGTHS = ("line_offset", "shear_sensitivity")
 _P = "stress"
 _U = "voltage"
 _ONE = "dimensionless"
@@ -128,9 +129,7 @@ TAKEN_FOR_GRANTED = record(
     "NXdata",
     Quantity("line_offset", _L, "distance of the line from the sensor"),
     *(
-        Quantity(
-            f"{name}_uncertainty", _L if name == "line_offset" else _ONE, stored=f"{name}_errors"
-        )
+        Quantity(f"{name}_uncertainty", _L if name in _LENGTHS else _ONE, stored=f"{name}_errors")
         for name in STATED_ERRORS
     ),
 )

@@ -38,6 +38,7 @@ STATED_ERRORS = (
     "line_offset",
     "base_slip",
     "baseline_curvature",
+    "shear_sensitivity",
 )
 """What a scan takes for granted unless it states a standard uncertainty, by its budget's names."""
 
@@ -202,6 +203,8 @@ class Scan:
     base_slip_uncertainty, baseline_curvature_uncertainty : float, optional
         That of the share of the difference to a base on which the film slides freely; and of the
         baseline from the edge of the scan to its centre, over the largest signal.
+    shear_sensitivity_uncertainty : float, optional
+        That of the length, in m, by which the sensor responds to the divergence of the shear.
     channels : mapping of str to ndarray, shape of ``u_zz``
         Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
         (``u_xz_errors``, ``u_yz_errors``).
@@ -256,6 +259,7 @@ class Scan:
     line_offset_uncertainty: float | None = None
     base_slip_uncertainty: float | None = None
     baseline_curvature_uncertainty: float | None = None
+    shear_sensitivity_uncertainty: float | None = None
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
     rod_friction: float | None = None

@@ -21,6 +21,7 @@ SIZES = {
     "line_offset": 0.1e-3,
     "base_slip": 0.05,
     "baseline_curvature": 0.002,
+    "shear_sensitivity": 0.03e-3,
 }
 
 
@@ -137,7 +138,7 @@ def test_options_of_import_state_them(run: Run, tmp_path: Path) -> None:
     given = ["--position-scale-uncertainty", "0.2", "--line-offset-uncertainty", "0.1"]
     given += ["--roundness-uncertainty", "0.05", "--gain-uncertainty", "0.5"]
     given += ["--base-slip-uncertainty", "0.1", "--baseline-curvature-uncertainty", "0"]
-    given += ["--gain-curvature-uncertainty", "0.01"]
+    given += ["--gain-curvature-uncertainty", "0.01", "--shear-sensitivity-uncertainty", "0.05"]
     columns = ["--x", "x", "--u", "U"]
     run("import", tmp_path / "t.csv", "-o", tmp_path / "s.h5", *columns, *given)
     read = memscal.read_scan(tmp_path / "s.h5")
@@ -150,6 +151,7 @@ def test_options_of_import_state_them(run: Run, tmp_path: Path) -> None:
         "line_offset": 1e-4,
         "base_slip": 0.1,
         "baseline_curvature": 0.0,
+        "shear_sensitivity": 5e-5,
     }
 
 

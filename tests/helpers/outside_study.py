@@ -208,6 +208,8 @@ ROWS = {
             0.002,
             "%",
             100.0,
+            # From edge to centre it is twice its amplitude.
+            lambda scan, size: replace(scan, baseline_curvature_uncertainty=2 * size),
         ),
         Row(
             "baseline, parabola",
@@ -218,7 +220,14 @@ ROWS = {
             states("baseline_curvature"),
             "baseline_curvature",
         ),
-        Row("baseline, step", lambda size: replace(ROUND, step=size), 0.005, "%", 100.0),
+        Row(
+            "baseline, step",
+            lambda size: replace(ROUND, step=size),
+            0.005,
+            "%",
+            100.0,
+            states("baseline_curvature"),
+        ),
         Row(
             "amplifier, b",
             lambda size: replace(ROUND, gain_curvature=size),
@@ -230,10 +239,11 @@ ROWS = {
         ),
         Row(
             "response to shear",
-            lambda size: replace(ROUND, shear_sensitivity=size),
+            lambda size: replace(ROUND, shear_sensitivity=-size),
             0.03e-3,
             "mm",
             1e3,
+            stated=states("shear_sensitivity"),
             assumption="shear_sensitivity",
         ),
         Row(

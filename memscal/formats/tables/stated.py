@@ -116,9 +116,11 @@ class ScanUncertainties:
     x_error, position_scale_uncertainty : float, optional
         Of each position, independent from point to point, in m; and of the stage's scale, relative.
     gain_uncertainty, gain_curvature_uncertainty, roundness_uncertainty : float, optional
-        As in :class:`memscal.Scan`, with the next three; relative, or a share.
-    line_offset_uncertainty, base_slip_uncertainty, baseline_curvature_uncertainty : float, optional
-        The first in m.
+        As in :class:`memscal.Scan`, with the next four; relative, or a share.
+    line_offset_uncertainty, shear_sensitivity_uncertainty : float, optional
+        In m.
+    base_slip_uncertainty, baseline_curvature_uncertainty : float, optional
+        A share.
     u_zz_correlation : ndarray, optional
         Correlation of the noise between points, as in :class:`memscal.Scan`.
 
@@ -142,4 +144,5 @@ class ScanUncertainties:
     line_offset_uncertainty: float | None = None
     base_slip_uncertainty: float | None = None
     baseline_curvature_uncertainty: float | None = None
+    shear_sensitivity_uncertainty: float | None = None
     u_zz_correlation: FloatArray | None = None
