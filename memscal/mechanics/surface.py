@@ -24,10 +24,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ellipe, ellipkm1
 
-from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,7 @@ class FilmField(Protocol):
         """Return the displacement of the surface in m: into the film, or outward."""
 
 
-def anticlockwise(points: FloatArray, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+def anticlockwise(points: FloatArray, triangles: IndexArray) -> IndexArray:
     """Return quadratic triangles (m, 6) of points (n, 2) with their nodes anticlockwise."""
     first, second, third = np.moveaxis(points[triangles[:, :3]], 1, 0)
     (x, y) = (second - first).T

@@ -23,10 +23,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
@@ -198,8 +197,6 @@ def _tensor(even: FloatArray, side: float, reach: float, size: FilmSize) -> Any:
     return skfem.MeshTri.init_tensor(np.concatenate([even, r[1:]]), heights)
 
 
-IntArray = NDArray[np.int64]
-
 # Exact for the square of a quadratic, times its radius and its Jacobian.
 _QUADRATURE = 5
 
@@ -240,27 +237,27 @@ class FilmElements:
         return float(self.nodes[1].max())
 
     @cached_property
-    def surface(self) -> IntArray:
+    def surface(self) -> IndexArray:
         """Nodes of the surface, from the axis outward."""
         return self._line(self.nodes[1] > self.thickness * (1 - 1e-9))
 
     @cached_property
-    def base(self) -> IntArray:
+    def base(self) -> IndexArray:
         """Nodes of the base, from the axis outward."""
         return self._line(self.nodes[1] < self.thickness * 1e-9)
 
     @cached_property
-    def held(self) -> IntArray:
+    def held(self) -> IndexArray:
         """Unknowns that stay zero: the base is bonded, and the axis stays where it is."""
         axis = np.flatnonzero(self.nodes[0] < 1e-9 * self.thickness)
         return np.unique(np.concatenate([self.base, self.base + self.n, axis]))
 
-    def _line(self, chosen: BoolArray) -> IntArray:
+    def _line(self, chosen: BoolArray) -> IndexArray:
         nodes = np.flatnonzero(chosen)
         return nodes[np.argsort(self.nodes[0][nodes], kind="stable")]
 
     @cached_property
-    def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
+    def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray, IndexArray, IndexArray]:
         """Return gradients (cells, points, 5, 12), pressures, volumes and numbers of unknowns."""
         displacement, pressure = self.bases
         radius = np.asarray(displacement.global_coordinates())[0]
@@ -324,7 +321,7 @@ class FilmElements:
         return sparse.csr_array((values, indices, starts), shape=(self.size, self.size))
 
     @cached_property
-    def _pattern(self) -> tuple[IntArray, IntArray, IntArray]:
+    def _pattern(self) -> tuple[IndexArray, IndexArray, IndexArray]:
         """Return where an entry of the cells' matrices goes, and columns and row starts there."""
         dofs = np.concatenate(self._shape[3:], axis=1).astype(np.int64)
         entries = dofs[:, :, None] * self.size + dofs[:, None, :]

@@ -18,9 +18,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from memscal.errors import ConvergenceError
-from memscal.extensions.finite_strain.film_elements import FilmElements, IntArray
+from memscal.extensions.finite_strain.film_elements import FilmElements
 from memscal.mechanics.solver.step import Load, Target
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Pressed:
 
     x: FloatArray  # the unknowns of FilmElements
     depth: float  # mm
-    touching: IntArray  # nodes, from the axis outward
+    touching: IndexArray  # nodes, from the axis outward
     place: FloatArray  # their places on the contour, in mm of arc length
     load: float = 0.0  # N
 
@@ -268,7 +268,7 @@ class Pressing:
                 break
         return ahead, moved, tangent if share == 1 else None
 
-    def _free(self, state: Pressed) -> IntArray:
+    def _free(self, state: Pressed) -> IndexArray:
         """Return the unknowns that are free; those of sliding nodes are radial."""
         free = np.ones(self.elements.size, dtype=bool)
         free[np.append(self.elements.held, state.touching + self.elements.n)] = False

@@ -27,7 +27,7 @@ from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.units import from_si
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
@@ -71,9 +71,7 @@ def with_drawn_in(path: Path) -> list[Path]:
     return [path, *(path.parent / name for name in sorted(names))]
 
 
-def heavy_arrays(
-    data: bytes, path: str
-) -> tuple[dict[str, np.ndarray[Any, Any]], list[SourceFile]]:
+def heavy_arrays(data: bytes, path: str) -> tuple[dict[str, NDArray[Any]], list[SourceFile]]:
     """Return the arrays that an XDMF file has in the HDF5 file beside it, by their addresses."""
     folder, name = os.path.split(path)
     stem = os.path.splitext(name)[0]
@@ -98,8 +96,8 @@ def heavy_arrays(
 
 
 def run_meshio(
-    data: bytes, kind: str, name: str, heavy: Mapping[str, np.ndarray[Any, Any]]
-) -> tuple[dict[str, Any], list[np.ndarray[Any, Any]]]:
+    data: bytes, kind: str, name: str, heavy: Mapping[str, NDArray[Any]]
+) -> tuple[dict[str, Any], list[NDArray[Any]]]:
     """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
     seconds = _SECONDS + size / _BYTES_PER_SECOND
@@ -186,7 +184,7 @@ class Cells:
     """Cells of one kind: their nodes, by rows, and the fields given for each of them."""
 
     dimension: int
-    nodes: NDArray[np.int64]
+    nodes: IndexArray
     data: dict[str, FloatArray]
 
 
@@ -213,7 +211,7 @@ class Mesh:
         return tuple(block for block in self.cells if block.dimension == highest)
 
     @property
-    def used(self) -> NDArray[np.int64]:
+    def used(self) -> IndexArray:
         """The nodes that belong to the body."""
         return np.unique(np.concatenate([block.nodes.ravel() for block in self.solid]))
 
@@ -235,7 +233,7 @@ def read_mesh(path: FilePath) -> Mesh:
     if not data:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
     sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
-    heavy: dict[str, np.ndarray[Any, Any]] = {}
+    heavy: dict[str, NDArray[Any]] = {}
     if _KINDS[ending] == "xdmf":
         heavy, drawn = heavy_arrays(data, shown)
         sources += drawn
@@ -252,7 +250,7 @@ def _require_meshio() -> None:
 
 def _checked(
     header: dict[str, Any],
-    arrays: list[np.ndarray[Any, Any]],
+    arrays: list[NDArray[Any]],
     sources: tuple[SourceFile, ...],
     *,
     tensor_order: bool,
@@ -280,7 +278,7 @@ def _checked(
 
 def _cells(
     blocks: list[dict[str, Any]],
-    arrays: list[np.ndarray[Any, Any]],
+    arrays: list[NDArray[Any]],
     points: int,
     source: SourceFile,
 ) -> Iterator[Cells]:
@@ -301,7 +299,7 @@ def _cells(
         yield Cells(block["dimension"], nodes, _fields(fields, len(nodes)))
 
 
-def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, FloatArray]:
+def _fields(fields: dict[str, NDArray[Any]], count: int) -> dict[str, FloatArray]:
     """Return fields of numbers with one row each; a name is stripped of what does not print."""
     return {
         printable(name, _MAX_NAME): numbers.reshape(count, -1).astype(np.float64)

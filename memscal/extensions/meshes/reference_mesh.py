@@ -4,14 +4,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
 from memscal.formats.files import FilePath
 from memscal.formats.tables import reference
 from memscal.formats.units import to_si
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.checks import Message, import_notes
 from memscal.model.notation import printable
 
@@ -43,8 +42,8 @@ class Frame:
 class Base:
     """Nodes on the base, cells with a side there and that side's middle; 1 or -1 is outward."""
 
-    nodes: NDArray[np.int64]
-    cells: tuple[tuple[Cells, NDArray[np.int64], FloatArray], ...]
+    nodes: IndexArray
+    cells: tuple[tuple[Cells, IndexArray, FloatArray], ...]
     outward: int
     note: str
 

@@ -27,14 +27,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_array, csc_array, csr_array
 
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.progress import Task
@@ -85,7 +84,7 @@ class QuarticLine:
         return csr_array(self.at(nodes).T @ hats.multiply((weights * nodes)[:, None]))
 
 
-def _sparse(values: FloatArray, columns: NDArray[np.int64], count: int) -> csr_array:
+def _sparse(values: FloatArray, columns: IndexArray, count: int) -> csr_array:
     """Return the matrix of ``count`` columns that has a row of ``values`` at ``columns`` a row."""
     rows = np.arange(0, columns.size + 1, columns.shape[1])
     return csr_array((values.ravel(), columns.ravel(), rows), shape=(len(values), count))
@@ -169,18 +168,18 @@ class MixedSystem:
         return csr_array(block_array([[stiff, coupled.T], [coupled, soft]]))
 
     @cached_property
-    def free(self) -> NDArray[np.int64]:
+    def free(self) -> IndexArray:
         """What is solved for: all unknowns but those that are held."""
         return np.setdiff1d(np.arange(self.matrix.shape[0]), self._held)
 
     @cached_property
-    def _held(self) -> NDArray[np.int64]:
+    def _held(self) -> IndexArray:
         """Nothing moves at the base, and nothing outward on the axis."""
         deepest = self.mesh.points[:, 1].max()
         base = self.displacement.get_dofs(lambda x: x[1] == deepest).all()
         return np.union1d(base, self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"]))
 
-    def side(self, depth: float) -> tuple[QuarticLine, NDArray[np.int64], NDArray[np.int64]]:
+    def side(self, depth: float) -> tuple[QuarticLine, IndexArray, IndexArray]:
         """Return the side of the mesh at a depth, with its outward and inward unknowns."""
         on_side = self.displacement.get_dofs(lambda x: x[1] == depth)
         outward = on_side.all(["u^1"])
@@ -198,7 +197,7 @@ class MixedSystem:
         # zero where the film is incompressible: it fills four times as much, for 10 times as long.
         return splu(csc_array(self.matrix[self.free][:, self.free]))
 
-    def solve(self, unknowns: NDArray[np.int64], loads: FloatArray) -> FloatArray:
+    def solve(self, unknowns: IndexArray, loads: FloatArray) -> FloatArray:
         """Return all unknowns, shape (all, n), under loads, shape (unknowns.size, n), on some."""
         right = np.zeros((self.matrix.shape[0], loads.shape[1]))
         right[unknowns] = loads
@@ -258,7 +257,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     )
 
 
-def _quadratic_triangles(index: NDArray[np.int64], local: FloatArray) -> NDArray[np.int64]:
+def _quadratic_triangles(index: IndexArray, local: FloatArray) -> IndexArray:
     """Return four quadratic triangles for each quartic one."""
     place = {tuple(np.rint(_QUARTERS * point).astype(int)): i for i, point in enumerate(local)}
     quarters = []

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
@@ -45,7 +45,7 @@ class TriangleMesh:
     """Nodes (radius and depth, shape (n, 2)) and the corners of triangles (shape (m, 3))."""
 
     points: FloatArray
-    triangles: NDArray[np.int64]
+    triangles: IndexArray
 
 
 def film_triangles(
@@ -160,7 +160,7 @@ class _Front:
             kept[i] = not kept[i - 1]
         return kept
 
-    def _fill(self, node: NDArray[np.int64], kept: NDArray[np.int64]) -> None:
+    def _fill(self, node: IndexArray, kept: IndexArray) -> None:
         """Add the triangles between this row and the next."""
         for left, right in pairwise(kept):
             a = self.node[left]

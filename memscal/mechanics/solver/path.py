@@ -164,8 +164,7 @@ def _step_by_step(
     nothing = np.zeros_like(problem.heights)
     lowest = float(problem.heights.min())
     touching = problem.heights <= lowest
-    slip = np.zeros_like(touching, dtype=np.int8)
-    first = ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
+    first = ContactState(nothing, nothing, lowest, 0.0, touching, nothing, nothing, nothing)
     walk = _Walk(problem, first)
     # The last state of the path that a target interrupted, and the way it went.
     resume = walk

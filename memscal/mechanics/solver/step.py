@@ -28,7 +28,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.errors import ConvergenceError
 from memscal.mechanics.interface import Interface, NormalLaw
@@ -67,7 +66,7 @@ class ContactState:
     depth: float  # m
     load: float  # N
     touching: BoolArray
-    slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
+    slip: FloatArray  # sign of the shear where a ring slips, 0 where it sticks
     anchor: FloatArray  # outward displacement at which a sticking ring bears no shear, in m
     outward: FloatArray  # outward displacement in m
 
@@ -102,7 +101,7 @@ class _Status:
     """Status and trial values of the n rings while the equations are solved."""
 
     pressing: BoolArray  # rings that bear a pressure
-    slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
+    slip: FloatArray  # sign of the shear where a ring slips, 0 where it sticks
     anchor: FloatArray  # outward displacement (m) at which a sticking ring bears no shear
     # Trials for a compliant interface: separation (m), pressure (Pa) and elastic stretch (m).
     separation: FloatArray
@@ -251,7 +250,7 @@ def take_step(
             cure="Try another number of rings, or a friction coefficient nearby.",
         )
     p, q, depth, _, u = trial
-    slip = np.where(status.pressing, status.slip, 0).astype(np.int8)
+    slip = np.where(status.pressing, status.slip, 0.0)
     # What slips drags its anchor along, a slip length behind; what is free has none.
     moving = ~status.pressing | (slip != 0)
     anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
@@ -307,7 +306,7 @@ def _revised_contact(
 
 def _revised_slip(
     problem: ContactProblem, status: _Status, trial: _Trial, careful: bool
-) -> tuple[NDArray[np.int8], bool]:
+) -> tuple[FloatArray, bool]:
     """Let rings slip whose shear is too large, and stick that would be pushed on by friction."""
     mu = problem.friction
     if mu == 0 or np.isinf(mu):
@@ -335,7 +334,7 @@ def _revised_slip(
     turns = np.abs(stretch) > np.maximum(turn, length)
     turned = np.where(turns, -np.sign(stretch), 0)
     slip = np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
-    return slip.astype(np.int8), True
+    return slip, True
 
 
 def _revised_separation(
