@@ -53,7 +53,7 @@ class EvenGrid:
     @cached_property
     def radius(self) -> FloatArray:
         """Distance of each point from the axis, shape (count, count), in m."""
-        return np.asarray(np.hypot.outer(self.axis, self.axis), dtype=np.float64)
+        return np.hypot.outer(self.axis, self.axis)
 
     @cached_property
     def wavenumber(self) -> FloatArray:

@@ -38,7 +38,7 @@ def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
 
 def disc_transfer(k: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
     """Transforms of discs of unit integral, blurred by Gaussians, at ``k`` (rad/m)."""
-    phase = np.asarray(k, dtype=np.float64) * radius
+    phase = k * radius
     disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
     return disc * np.exp(-0.5 * (sigma * k) ** 2)
 

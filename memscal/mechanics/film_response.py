@@ -101,7 +101,7 @@ def base_shear(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
 
 def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return x, exp(-2x), 2 exp(-2x) D and kappa."""
-    x = np.minimum(np.asarray(x, dtype=np.float64), _LARGEST_X)
+    x = np.minimum(x, _LARGEST_X)
     kappa = 3 - 4 * nu
     decay = np.exp(-2 * x)
     return x, decay, kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1), kappa
@@ -308,7 +308,7 @@ class HankelField:
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""
-        x = np.ravel(np.asarray(r, dtype=np.float64))
+        x = np.ravel(r)
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
         transforms = traction.pressure_transform(k), traction.shear_transform(k)

@@ -183,14 +183,10 @@ def indent(
 
 def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
     """Return contacts with more and less of each uncertain input, and u over its difference."""
-    film = contact.film
-    indenter = contact.indenter
-    load = contact.load
-    loading = contact.loading
-    names = ("friction", "backend", "interface", "strain")
+    names = ("film", "indenter", "load", "friction", "backend", "interface", "strain")
     settings: dict[str, Any] = {name: getattr(contact, name) for name in names}
-    again = partial(indent, load=load, loading=loading or "incremental", **settings)
-    if abs(again(film, indenter).depth / contact.depth - 1) > max(_SAME, 2 * contact.convergence):
+    again = partial(indent, loading=contact.loading or "incremental", **settings)
+    if abs(again().depth / contact.depth - 1) > max(_SAME, 2 * contact.convergence):
         raise InputError(
             "The contact was not reached by loading alone, or in a film of its own radius.",
             why="Its depth is not that of one loading to its load, which is what can be repeated "
@@ -199,15 +195,11 @@ def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
         )
     varied = []
     for name in ("young_modulus", "poisson_ratio", "thickness", "radius"):
-        holder: Any = indenter if name == "radius" else film
-        ends = more_and_less(holder, name)
-        if not ends:
-            continue
-        more, less, share = ends
-        if name == "radius":
-            varied.append((again(film, more), again(film, less), share))
-        else:
-            varied.append((again(more, indenter), again(less, indenter), share))
+        holder = "indenter" if name == "radius" else "film"
+        ends = more_and_less(settings[holder], name)
+        if ends:
+            more, less, share = ends
+            varied.append((again(**{holder: more}), again(**{holder: less}), share))
     return varied
 
 

@@ -175,7 +175,7 @@ class RodTraction:
 
     def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, float]:
         """Return r/a, m, whether ``r`` is under the rod, and half the mean pressure in Pa."""
-        ratio = np.asarray(r, dtype=np.float64) / self.radius
+        ratio = r / self.radius
         under = ratio < 1
         m = np.sqrt(np.where(under, (1 - ratio) * (1 + ratio), 1.0))
         return ratio, m, under, self.load / (2 * np.pi * self.radius**2)

@@ -42,9 +42,9 @@ class SurfaceCompliance:
     @cached_property
     def whole(self) -> FloatArray:
         """Depressions, then outward displacements, by pressures, then shears: (2 n, 2 n)."""
-        normal = (self.normal, self.normal_by_shear)
-        radial = (self.radial_by_pressure, self.radial)
-        return np.block([[*normal], [*radial]])
+        return np.block(
+            [[self.normal, self.normal_by_shear], [self.radial_by_pressure, self.radial]]
+        )
 
     @cached_property
     def products(self) -> FloatArray:
@@ -53,8 +53,7 @@ class SurfaceCompliance:
         right = self.r[1:]
         width = np.diff(self.r) * np.pi / 6
         inner, outer, across = (width * (a * left + b * right) for a, b in ((3, 1), (1, 3), (1, 1)))
-        diagonal = np.append(inner, 0.0) + np.append(0.0, outer)
-        return np.diag(diagonal) + np.diag(across, 1) + np.diag(across, -1)
+        return np.diag(on_hats(inner, outer)) + np.diag(across, 1) + np.diag(across, -1)
 
     @cached_property
     def areas(self) -> FloatArray:
@@ -137,7 +136,8 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
 
 def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:
     """Add the integrals of elements (last axis) with their falling and rising hats up to rings."""
-    return np.pad(left, ((0, 0), (0, 1))) + np.pad(right, ((0, 0), (1, 0)))
+    nothing = np.zeros_like(left[..., :1])
+    return np.append(left, nothing, axis=-1) + np.append(nothing, right, axis=-1)
 
 
 def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatArray, FloatArray]:

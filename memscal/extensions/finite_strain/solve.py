@@ -11,9 +11,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from memscal.axisymmetry.hankel import gauss_between, hankel_transform
+from memscal.axisymmetry.hankel import gauss_between, hankel_transform, radial_spline
 from memscal.errors import ConvergenceError, DomainError
 from memscal.extensions.finite_strain import film_elements
 from memscal.extensions.finite_strain.film_elements import FilmSize, Finer
@@ -30,7 +29,7 @@ from memscal.mechanics.contact import Contact
 from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
-from memscal.mechanics.surface import anticlockwise
+from memscal.mechanics.surface import anticlockwise, on_hats
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
@@ -320,8 +319,8 @@ class FiniteStrainField:
         r = elements.nodes[0][nodes][::2]
         # The hat on the axis has hardly any area: its force is added to that of the next one.
         normal, shear = (
-            np.linalg.solve(_spline_masses(r, parity), _without_axis(_on_corners(forces[which])))
-            for parity, which in ((1, nodes + elements.n), (-1, nodes))
+            np.linalg.solve(_spline_masses(r, order), _without_axis(_on_corners(forces[which])))
+            for order, which in enumerate((nodes + elements.n, nodes))
         )
         return np.asarray(r[1:]) / _MM, np.asarray(normal * _MPA), np.asarray(shear * _MPA)
 
@@ -335,9 +334,9 @@ class FiniteStrainField:
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
-        return _interpolated(
-            self.tractions[0], self.tractions[1 + order], r, parity=-1 if order else 1
-        )
+        nodes = self.tractions[0]
+        spline = radial_spline(nodes, self.tractions[1 + order], order=order)
+        return _within(nodes[-1], spline, r)
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:
         """Return the transform of normal stress or traction at ``k`` (rad/m), in N."""
@@ -347,7 +346,11 @@ class FiniteStrainField:
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement in m at radii before the deformation."""
-        return _interpolated(self.displacements[0], self.displacements[1 + order], r, parity=0)
+        from scipy.interpolate import PchipInterpolator
+
+        nodes = self.displacements[0]
+        # Without overshoot.
+        return _within(nodes[-1], PchipInterpolator(nodes, self.displacements[1 + order]), r)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
@@ -388,9 +391,7 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
     side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
     left = r[:-2:2]
     right = r[2::2]
-    falling = side * (2 * left + right)
-    rising = side * (left + 2 * right)
-    area = np.pi / 3 * (np.append(falling, 0.0) + np.append(0.0, rising))
+    area = np.pi / 3 * on_hats(side * (2 * left + right), side * (left + 2 * right))
 
     chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
     chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
@@ -402,7 +403,7 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
 def _on_corners(forces: FloatArray) -> FloatArray:
     """Return the forces on hats between corners; nodes are corners and middles by turns."""
     halves = forces[1::2] / 2
-    return np.asarray(forces[::2] + np.append(halves, 0.0) + np.append(0.0, halves))
+    return forces[::2] + on_hats(halves, halves)
 
 
 def _without_axis(rows: FloatArray) -> FloatArray:
@@ -410,27 +411,15 @@ def _without_axis(rows: FloatArray) -> FloatArray:
     return np.concatenate([rows[:1] + rows[1:2], rows[2:]])
 
 
-def _spline(r: FloatArray, values: FloatArray, parity: int) -> Callable[[FloatArray], FloatArray]:
-    """Return an even (1) or odd (-1) cubic spline through a table that begins off the axis."""
-    from scipy.interpolate import CubicSpline
-
-    mirrored = np.concatenate([parity * values[3::-1], values])
-    return CubicSpline(np.concatenate([-r[3::-1], r]), mirrored)
-
-
-def _spline_masses(r: FloatArray, parity: int) -> FloatArray:
+def _spline_masses(r: FloatArray, order: int) -> FloatArray:
     """Return integrals around the axis of hats times splines that are 1 at one corner off it."""
     nodes, weights = gauss_between(r, order=6)
-    splines = _spline(r[1:], np.eye(r.size - 1), parity)(nodes)
+    splines = radial_spline(r[1:], np.eye(r.size - 1), order=order)(nodes)
     corner = np.arange(r.size)
     hats = np.maximum(0.0, 1 - np.abs(np.interp(nodes, r, corner) - corner[:, None]))
     return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
 
 
-def _interpolated(nodes: FloatArray, values: FloatArray, r: ArrayLike, parity: int) -> FloatArray:
-    """Return a table's values at ``r``: by an even or odd spline, or without overshoot (0)."""
-    from scipy.interpolate import PchipInterpolator
-
-    radii = np.asarray(r, dtype=np.float64)
-    spline = _spline(nodes, values, parity) if parity else PchipInterpolator(nodes, values)
-    return np.where(radii <= nodes[-1], spline(np.minimum(radii, nodes[-1])), 0.0)
+def _within(end: float, spline: Callable[[FloatArray], FloatArray], r: FloatArray) -> FloatArray:
+    """Return a spline's values at ``r``, zero beyond its end."""
+    return np.where(r <= end, spline(np.minimum(r, end)), 0.0)

@@ -375,13 +375,13 @@ class ElementField:
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
-        flat = np.ravel(np.asarray(r, dtype=np.float64))
+        flat = np.ravel(r)
         values = self._tractions[order](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
     def surface(self, r: FloatArray, order: int) -> FloatArray:
         """Return depression or outward displacement of the surface in m."""
-        flat = np.ravel(np.asarray(r, dtype=np.float64))
+        flat = np.ravel(r)
         if np.any(flat > self.radius):
             raise DomainError(
                 f"There is no surface at {flat.max():g} m: the film ends at {self.radius:g} m.",

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 
@@ -67,9 +66,9 @@ class _Sizes:
     thickness: float
     refinement: int
 
-    def widest(self, r: ArrayLike) -> FloatArray:
+    def widest(self, r: FloatArray | float) -> FloatArray:
         """Return the longest side allowed at ``r``."""
-        away = (np.asarray(r) - self.contact) / self.thickness
+        away = (r - self.contact) / self.thickness
         widest = np.interp(away, _DISTANCES, _WIDEST)
         widest += _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
         return widest * self.thickness / self.refinement
