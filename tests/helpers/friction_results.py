@@ -203,7 +203,7 @@ def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: A
     chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0
     inside = lengths[chi_square - 120.0 <= _LIMIT]
     laws = tuple(
-        InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
+        InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120)
         for name, value in zip(names, evidence, strict=True)
     )
     better, worse = sorted((-1, 0), key=lambda i: -evidence[i])

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc, logsumexp
+from scipy.special import logsumexp
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
@@ -108,8 +108,7 @@ def weigh_normal_compliance(channel: Channel) -> LawComparison:
     top = float(along.log_likelihood[0])
     least = float(along.chi_square[0])
     degrees = sum(points.degrees for points in channel.points)
-    p_value = _p_value(degrees, least)
-    rigid = InterfaceLaw("rigid, frictionless", (), top, top, 0.0, least, degrees, p_value)
+    rigid = InterfaceLaw("rigid, frictionless", (), top, top, 0.0, least, degrees)
     yielding = one_of_all("normal compliance, length", along, prior, degrees)
     return LawComparison(
         lubrication="lubricated",
@@ -291,7 +290,6 @@ def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> Interf
         numerical_error=0.0,
         least=chi_square,
         degrees=degrees - 1,
-        p_value=_p_value(degrees - 1, chi_square),
     )
 
 
@@ -305,7 +303,6 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
     log_evidence, error = evidence_of_each(loads, weights)
     chosen, top, chi_square = _best_of_each(loads)
     pairs = zip(curves, chosen, strict=True)
-    left = degrees - len(curves)
     return InterfaceLaw(
         name=name,
         best=tuple(float(along.values[along.near][node]) for along, node in pairs),
@@ -313,14 +310,8 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
         log_likelihood=top,
         numerical_error=error,
         least=chi_square,
-        degrees=left,
-        p_value=_p_value(left, chi_square),
+        degrees=degrees - len(curves),
     )
-
-
-def _p_value(degrees: int, least: float) -> float:
-    """Return the chance of a larger chi-square."""
-    return float(chdtrc(degrees, least)) if degrees > 0 else 1.0
 
 
 def _best_of_each(loads: Sequence[Statistics]) -> tuple[list[int], float, float]:

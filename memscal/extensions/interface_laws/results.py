@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from scipy.special import chdtrc
+
 from memscal.friction.results import BoundedEstimate
 from memscal.model.arrays import FloatArray
 from memscal.model.bayes_factor import POSITIVE, BayesFactor
@@ -19,7 +21,7 @@ class InterfaceLaw:
     are several, or a length in m).  ``log_evidence``,
     :math:`\ln \int p(u | \theta)\,\pi(\theta)\,d\theta`, and ``log_likelihood``, the largest
     :math:`\ln p(u | \theta)`, share a constant of the scans; ``numerical_error`` is the standard
-    uncertainty of the integral.  ``least``, ``degrees`` and ``p_value`` are of chi-square at best.
+    uncertainty of the integral.  ``least`` and ``degrees`` are of chi-square at best.
     """
 
     name: str
@@ -29,7 +31,11 @@ class InterfaceLaw:
     numerical_error: float
     least: float
     degrees: int
-    p_value: float
+
+    @property
+    def p_value(self) -> float:
+        """Chance of a larger chi-square."""
+        return float(chdtrc(self.degrees, self.least)) if self.degrees > 0 else 1.0
 
 
 @dataclass(frozen=True, eq=False)

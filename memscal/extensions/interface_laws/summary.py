@@ -106,9 +106,7 @@ def _length_table(direction: str, compared: results.LawComparison) -> Table:
 def _implied_table(implied: results.ImpliedFriction) -> Table:
     """Return what the slip length means at each load."""
     rows = []
-    for load, friction, pressure, stiffness in zip(
-        implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
-    ):
+    for load, friction, pressure, stiffness in zip(*vars(implied).values(), strict=True):
         stiff = _between(stiffness / _STIFFNESS.scale)
         rows.append([f"{load:.4g}", _between(friction), f"{pressure / KPA:.4g}", stiff])
     head = [quantity.heading for quantity in IMPLIED]
@@ -139,5 +137,5 @@ def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
 
 def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:
     names = [quantity.name for quantity in IMPLIED]
-    rows = zip(implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True)
+    rows = zip(*vars(implied).values(), strict=True)
     return [members(IMPLIED, implied, **dict(zip(names, row, strict=True))) for row in rows]
