@@ -156,9 +156,14 @@ class Lattice:
     @cached_property
     def wavenumber(self) -> FloatArray:
         """Modulus of each wave vector, shape (m, n // 2 + 1), in rad/m."""
+        return np.hypot.outer(*self._wavenumber_axes)
+
+    @property
+    def _wavenumber_axes(self) -> tuple[FloatArray, FloatArray]:
+        """Wavenumbers along y and x, in rad/m."""
         dy, dx = self.spacing
         ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
-        return np.hypot.outer(ky, 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx))
+        return ky, 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
 
     @property
     def cell_area(self) -> float:
@@ -176,9 +181,7 @@ class Lattice:
 
     def sampled(self, plane: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
         """Return a field by its transform (ky, kx) about the axis, as far as this samples it."""
-        dy, dx = self.spacing
-        ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
-        kx = 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
+        ky, kx = self._wavenumber_axes
         spectrum = plane(ky, kx) * np.exp(1j * np.add.outer(ky * self.y[0], kx * self.x[0]))
         return scipy.fft.irfft2(spectrum, s=(self.y.size, self.x.size)) / self.cell_area
 
@@ -189,7 +192,7 @@ class Lattice:
     @property
     def wavenumber_axis(self) -> FloatArray:
         """Wavenumbers along x, in rad/m."""
-        return np.asarray(self.wavenumber[0])
+        return self._wavenumber_axes[1]
 
     def axis_transfer(self, field: FloatArray) -> tuple[FloatArray, NDArray[np.complex128]]:
         """Return wavenumbers along x and the Fourier transform about the central point there."""

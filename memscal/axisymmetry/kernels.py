@@ -16,7 +16,7 @@ from memscal.model.arrays import FloatArray, require_positive
 _FARTHEST = 9.0
 
 
-def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
+def gaussian_transfer(k: FloatArray, sigma: FloatArray | float) -> FloatArray:
     r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""
     return np.exp(-0.5 * (sigma * k) ** 2)
 
@@ -36,14 +36,18 @@ def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
     return unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma
 
 
-def disc_transfer(k: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
+def disc_transfer(
+    k: FloatArray, radius: FloatArray | float, sigma: FloatArray | float
+) -> FloatArray:
     """Transforms of discs of unit integral, blurred by Gaussians, at ``k`` (rad/m)."""
     phase = k * radius
     disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
-    return disc * np.exp(-0.5 * (sigma * k) ** 2)
+    return disc * gaussian_transfer(k, sigma)
 
 
-def blurred_disc(r: FloatArray, radius: FloatArray, sigma: FloatArray) -> FloatArray:
+def blurred_disc(
+    r: FloatArray, radius: FloatArray | float, sigma: FloatArray | float
+) -> FloatArray:
     """Discs of unit integral, blurred by Gaussians, at radii ``r`` (m), in 1/m^2."""
     # A point blurred from r falls into the disc: a non-central chi-square probability.
     place, edge = np.broadcast_arrays(r / sigma, radius / sigma)
@@ -166,11 +170,11 @@ class SmoothedDisc:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
-        return disc_transfer(k, *np.array([self.radius, self.sigma]))
+        return disc_transfer(k, self.radius, self.sigma)
 
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""
-        return blurred_disc(r, *np.array([self.radius, self.sigma]))
+        return blurred_disc(r, self.radius, self.sigma)
 
     def describe(self) -> dict[str, float | str]:
         """Radius and blur, as text."""

@@ -12,7 +12,7 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from memscal.axisymmetry.kernels import unit_gaussian
+from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.figures import style
 from memscal.figures.calibration_scan import (
     MOST_PANELS,
@@ -89,7 +89,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     modulus, band, window = style.on_axis(transfer.k, samples, k * PER_MM)
     style.draw_band(axes, k, np.maximum(modulus - band, 0.0), modulus + band, _BAND)
     axes.plot(k, np.maximum(modulus, 0.0), color=COLOURS["deconvolved"], label="modulus for G")
-    gaussian = np.exp(-0.5 * (data.gaussian_sigma * k * PER_MM) ** 2)
+    gaussian = gaussian_transfer(k * PER_MM, data.gaussian_sigma)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
     axes.plot(k, window, ":", color=COLOURS["window"], label="window")
     if limit < end:
@@ -131,8 +131,7 @@ def _shown_radius(radial: ApparatusRadial) -> float:
 
 
 def _largest(values: FloatArray, floor: float = 1e-300) -> float:
-    finite = values[np.isfinite(values)]
-    return max(np.max(finite), floor) if finite.size else floor
+    return float(np.max(values, initial=floor, where=np.isfinite(values)))
 
 
 _RESIDUALS = (-3.5, 3.5)

@@ -1,7 +1,6 @@
 """Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -38,13 +37,15 @@ def friction_position(friction: ArrayLike) -> FloatArray:
     return bounded(friction, FRICTION_SCALE)
 
 
-def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
-    """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_ticks(friction_position(_TICKS), [friction_name(mu) for mu in _TICKS])
-    set_limits = axes.set_xlim if which == "x" else axes.set_ylim
-    set_limits(-0.02, 1.02)
-    axis.set_label_text(r"effective friction coefficient $\mu_e$")
+def friction_axis(axes: Axes, which: str) -> None:
+    """Give an axis, x or y, the ticks of effective friction coefficients from 0 to infinity."""
+    look = {
+        "ticks": friction_position(_TICKS),
+        "ticklabels": [friction_name(mu) for mu in _TICKS],
+        "lim": (-0.02, 1.02),
+        "label": r"effective friction coefficient $\mu_e$",
+    }
+    axes.set(**{which + name: value for name, value in look.items()})
 
 
 def friction_name(friction: float) -> str:

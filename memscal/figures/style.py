@@ -191,10 +191,9 @@ def draw_band(
     low: FloatArray,
     high: FloatArray,
     label: str | None = None,
-    colour: str = COLOURS["deconvolved"],
 ) -> None:
     """Draw the band of a curve's expanded uncertainty."""
-    axes.fill_between(x, low, high, color=colour, alpha=0.25, lw=0, label=label)
+    axes.fill_between(x, low, high, color=COLOURS["deconvolved"], alpha=0.25, lw=0, label=label)
 
 
 def draw_residual_band(axes: Axes) -> None:

@@ -46,9 +46,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import j0, j1
 
-from memscal.axisymmetry.hankel import gauss_between, gauss_panels
+from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
 from memscal.mechanics import surface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
@@ -190,7 +189,7 @@ def base_stress(
         # The integrand turns at the rate r (Bessel function) + radius (transform of the traction).
         k, weights = _wavenumbers(film, flat[chunk[-1]] + traction.radius)
         density = weights * k * base_spectrum(film, traction, k, order=order)
-        stress[chunk] = (j0, j1)[order](np.outer(flat[chunk], k)) @ density
+        stress[chunk] = bessel(order, np.outer(flat[chunk], k)) @ density
     return stress.reshape(np.shape(r))
 
 
@@ -258,7 +257,7 @@ def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     count = 4 + math.ceil(0.7 * float(k.max() * widths.max()))
     s, weights = gauss_between(rings, count)
     rising = ((s.reshape(widths.size, count) - rings[:-1, None]) / widths[:, None]).ravel()
-    waves = (j0, j1)[order](np.multiply.outer(k, s)) * (weights * s)
+    waves = bessel(order, np.multiply.outer(k, s)) * (weights * s)
     starts = np.arange(0, s.size, count)
     right = np.add.reduceat(waves * rising, starts, axis=1)
     return surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
@@ -342,8 +341,7 @@ def _displacements(
     scale = (1 - nu) / film.shear_modulus
     beta = half_space_coupling(nu)
     by_normal, coupling, by_radial = corrections(k * film.thickness, nu)
-    normal = j0(np.multiply.outer(x, k)) * weights
-    radial = j1(np.multiply.outer(x, k)) * weights
+    normal, radial = (bessel(order, np.multiply.outer(x, k)) * weights for order in (0, 1))
     return (
         scale * (half_space[0] + (normal * by_normal) @ p),
         scale * (beta * half_space[1] + (normal * coupling) @ q),

@@ -57,9 +57,7 @@ class QuarticLine:
 
     def at(self, r: FloatArray) -> csr_array:
         """Return the matrix, shape (r.size, nodes), from nodal values to values at ``r``."""
-        corners = self.corners
-        side = np.clip(np.searchsorted(corners, r, side="right") - 1, 0, corners.size - 2)
-        along = (r - corners[side]) / (corners[side + 1] - corners[side])
+        side, along = _within(self.corners, r)
         columns = _DEGREE * side[:, None] + np.arange(_DEGREE + 1)
         # The five Lagrange quartics of a side.
         nodes = np.arange(_DEGREE + 1) / _DEGREE
@@ -77,11 +75,16 @@ class QuarticLine:
         r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
         knots = np.union1d(rings, self.corners[self.corners < rings[-1]])
         nodes, weights = gauss_between(knots, _ORDER)
-        element = np.clip(np.searchsorted(rings, nodes, side="right") - 1, 0, rings.size - 2)
-        rising = (nodes - rings[element]) / (rings[element + 1] - rings[element])
+        element, rising = _within(rings, nodes)
         columns = np.stack([element, element + 1], axis=1)
         hats = _sparse(np.stack([1 - rising, rising], axis=1), columns, rings.size)
         return csr_array(self.at(nodes).T @ hats.multiply((weights * nodes)[:, None]))
+
+
+def _within(edges: FloatArray, r: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """Return the intervals that radii lie in, and the share of each that they have passed."""
+    i = np.clip(np.searchsorted(edges, r, side="right") - 1, 0, edges.size - 2)
+    return i, (r - edges[i]) / (edges[i + 1] - edges[i])
 
 
 def _sparse(values: FloatArray, columns: IndexArray, count: int) -> csr_array:
@@ -208,7 +211,6 @@ class MixedSystem:
 
 # A quartic triangle has 15 nodes, at quarters of its sides and of the lines between them: they
 # are the nodes of four quadratic triangles.
-_QUARTERS = 4
 _CORNERS = (((0, 0), (2, 0), (0, 2)), ((2, 0), (4, 0), (2, 2)), ((0, 2), (2, 2), (0, 4)),
             ((2, 2), (0, 2), (2, 0)))  # fmt: skip
 
@@ -259,7 +261,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
 
 def _quadratic_triangles(index: IndexArray, local: FloatArray) -> IndexArray:
     """Return four quadratic triangles for each quartic one."""
-    place = {tuple(np.rint(_QUARTERS * point).astype(int)): i for i, point in enumerate(local)}
+    place = {tuple(np.rint(_DEGREE * point).astype(int)): i for i, point in enumerate(local)}
     quarters = []
     for corners in _CORNERS:
         around = [*corners, corners[0]]
