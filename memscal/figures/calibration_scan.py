@@ -117,7 +117,7 @@ def _signal_and_limit(data: ApparatusData) -> tuple[FloatArray, FloatArray]:
     """Return voltages less baseline, and of those below 2u the upper limit; else NaN, each."""
     scan = data.reconvolution
     signal = _turned(data, scan.x) * (scan.u_zz - _background(data, scan.x))
-    errors = EXPANDED * _finite_errors(scan.u_zz_errors)
+    errors = _bars(data)
     limit = np.maximum(signal, 0.0) + errors
     clear = (signal > errors) & (signal > 0)
     limited = ~clear & (limit > 0)
@@ -126,19 +126,16 @@ def _signal_and_limit(data: ApparatusData) -> tuple[FloatArray, FloatArray]:
 
 def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, label: str) -> Any:
     """Draw voltages (V) at the scan's points, with their expanded uncertainties; return them."""
-    scan = data.reconvolution
-    x = scan.x / MM
-    u = u / data.reading.scale
+    x = data.reconvolution.x / MM
     colour, marker = look
-    if x.size > style.SCATTER_THRESHOLD:
-        (points,) = axes.plot(x, u, ".", color=colour, ms=1.5, mew=0, label=label)
-        points.set_rasterized(True)
-        return points
-    return axes.errorbar(
+    return style.draw_measured(
+        axes,
         x,
-        u,
-        EXPANDED * _finite_errors(scan.u_zz_errors) / data.reading.scale,
-        fmt=marker,
+        u / data.reading.scale,
+        _bars(data) / data.reading.scale,
+        many=x.size > style.SCATTER_THRESHOLD,
+        ls="none",
+        marker=marker,
         ms=style.marker_size(x.size),
         mfc="white",
         mew=0.7,
@@ -325,8 +322,9 @@ def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     return level
 
 
-def _finite_errors(errors: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(errors), errors, 0.0)
+def _bars(data: ApparatusData) -> FloatArray:
+    """Return the expanded uncertainties of the voltages, 0 where they are not stated."""
+    return EXPANDED * np.nan_to_num(data.reconvolution.u_zz_errors, posinf=0.0)
 
 
 def _limit_to_scan(axes: Axes, x: FloatArray) -> None:

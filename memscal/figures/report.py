@@ -23,17 +23,17 @@ from memscal.measurement.restoration import Restoration
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData
 from memscal.model.checks import Message, QualityCheck, marked_texts
-from memscal.model.indenter import RoundIndenter
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import KPA, MM, PER_MM, Quantity, Record, by_name, estimated_quantity
+from memscal.model.quantities import KPA, PER_MM, Quantity, Record, by_name, estimated_quantity
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
 from memscal.summaries.calibration import apparatus_of, assumptions_table, sensor_title
 from memscal.summaries.declared import total_of
+from memscal.summaries.stress import contact_words
 from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
 from memscal.version import __version__
 
@@ -214,7 +214,7 @@ def _stress_report(stress: MeasuredStress) -> Report:
         budgets.append((quantities["force"], p.force_budget, p.force, label))
         budgets.append((quantities["maximum"], p.maximum_budget, p.maximum, label))
     return Report(
-        title=f"Stress measured at the base of {_contact_words(stress.scans[0])}",
+        title=f"Stress measured at the base of {contact_words(stress.scans[0])}",
         pictures=[Picture(stress.plot, alt, caption)],
         checks=stress.checks,
         messages=stress.messages,
@@ -238,7 +238,7 @@ def _restoration_report(restored: Restoration) -> Report:
     )
     force = by_name(records.RESTORED)["force"]
     return Report(
-        title=f"Stress restored at the base of {_contact_words(restored.scan)}",
+        title=f"Stress restored at the base of {contact_words(restored.scan)}",
         pictures=[Picture(restored.plot, alt, caption)],
         checks=restored.checks,
         messages=restored.messages,
@@ -270,7 +270,7 @@ _DETAILS = {
 @report_of.register
 def _comparison_report(compared: FrictionComparison) -> Report:
     return Report(
-        title=f"Friction of {_contact_words(compared.measured.scans[0])}",
+        title=f"Friction of {contact_words(compared.measured.scans[0])}",
         leading=1 + len(compared.loadings),
         pictures=list(_compared_pictures(compared)),
         checks=compared.checks,
@@ -287,15 +287,6 @@ def _compared_pictures(compared: FrictionComparison) -> Iterator[Picture]:
                 shown = subject.format(stem.removeprefix(name).replace("-", ", "))
                 alt = f"{shown}. All loads together: {joint}."
                 yield Picture(draw, alt, f"{shown}.{_DETAILS.get(name, '')}")
-
-
-def _contact_words(scan: Scan | MeasuredScan) -> str:
-    film = scan.film
-    indenter = scan.indenter
-    if film is None or not isinstance(indenter, RoundIndenter):
-        return "the film"
-    pressed = f"a {indenter.shape} of radius {indenter.radius / MM:.4g} mm"
-    return f"a {film.thickness / MM:.4g} mm film under {pressed}"
 
 
 def _measured_on(measured: MeasuredStress) -> dict[str, Any]:

@@ -174,15 +174,15 @@ def mark(lubrication: str, colour: str) -> dict[str, Any]:
 
 def draw_measured(
     axes: Axes, x: FloatArray, y: FloatArray, bars: FloatArray | None, *, many: bool, **look: Any
-) -> None:
-    """Draw measured points, with bars if there are any; of many, dots alone."""
+) -> Any:
+    """Draw measured points, with bars if there are any; of many, dots alone; return them."""
     if bars is not None and not many:
-        axes.errorbar(x, y, bars, **look)
-        return
-    look.pop("elinewidth", None)
+        return axes.errorbar(x, y, bars, **look)
+    for name in ("elinewidth", "capsize"):
+        look.pop(name, None)
     if many:
-        look |= {"marker": ".", "mfc": look["color"], "ms": 1.5, "mew": 0, "zorder": 1}
-    axes.plot(x, y, rasterized=many, **look)
+        look = {"zorder": 1} | look | {"marker": ".", "mfc": look["color"], "ms": 1.5, "mew": 0}
+    return axes.plot(x, y, rasterized=many, **look)[0]
 
 
 def draw_band(

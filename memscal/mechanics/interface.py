@@ -216,18 +216,18 @@ def _splines() -> tuple[Any, Any]:
     from scipy.interpolate import CubicSpline
 
     heights = np.linspace(_CLOSEST, _FARTHEST, _ENTRIES)
-    logarithms = np.log(_gaussian_moment(1.5, heights))
+    logarithms = np.log(_gaussian_moment(heights))
     return CubicSpline(heights, logarithms), CubicSpline(logarithms[::-1], heights[::-1])
 
 
-def _gaussian_moment(order: float, t: FloatArray) -> FloatArray:
-    r"""Return :math:`F_n(t)`; with a parabolic cylinder function (Gradshteyn 3.462.1)."""
+def _gaussian_moment(t: FloatArray) -> FloatArray:
+    r"""Return :math:`F_{3/2}(t)`; with a parabolic cylinder function (Gradshteyn 3.462.1)."""
     shallow = np.clip(t, _DEEP, _FARTHEST)
-    cylinder, _ = pbdv(-order - 1, shallow)
-    closed = gamma(order + 1) / np.sqrt(2 * np.pi) * np.exp(-(shallow**2) / 4) * cylinder
+    cylinder, _ = pbdv(-2.5, shallow)
+    closed = gamma(2.5) / np.sqrt(2 * np.pi) * np.exp(-(shallow**2) / 4) * cylinder
     # Deep in the surface every asperity touches: the moment of a Gaussian far above its mean,
     # where the cylinder function overflows.
     deep = np.minimum(t, _DEEP)
-    first = order * (order - 1) / (2 * deep**2)
-    second = first * (order - 2) * (order - 3) / (4 * deep**2)
-    return np.asarray(np.where(t < _DEEP, (-deep) ** order * (1 + first + second), closed))
+    first = 3 / 8 / deep**2  # n (n - 1)/2
+    second = first * 3 / 16 / deep**2  # (n - 2) (n - 3)/4
+    return np.asarray(np.where(t < _DEEP, (-deep) ** 1.5 * (1 + first + second), closed))

@@ -6,12 +6,12 @@ import numpy as np
 
 from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
 from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
 from memscal.summaries import declared
 from memscal.summaries.declared import DataFrame, Dataset, members
+from memscal.summaries.stress import contact_words
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
 _SHOWN_RADII = 9
@@ -51,10 +51,6 @@ def _determined(restored: Restoration) -> dict[str, Quantity]:
     return shown
 
 
-def _errors(restored: Restoration) -> FloatArray:
-    return np.sqrt(np.maximum(np.diag(restored.covariance), 0.0))
-
-
 def mapping(restored: Restoration) -> dict[str, Any]:
     """Return the object of ``restore --json`` without its file; the contract fixes its form."""
     comparison = restored.comparison
@@ -68,7 +64,7 @@ def mapping(restored: Restoration) -> dict[str, Any]:
             "chi2_reduced": finite(restored.chi_square / restored.degrees),
             "degrees": finite(restored.degrees),
         },
-        "stress": members(stress, restored, sigma_zz_errors=_errors(restored)),
+        "stress": members(stress, restored.profile()),
         "calculated": calculated,
         "checks": checks_json(restored.checks),
         "warnings": texts_of(restored.messages),
@@ -107,11 +103,8 @@ def tables(restored: Restoration) -> list[Table]:
         rows.append((f"{origin}, blurred", fit))
         share = f"within 95 % bounds at {comparison.within:.0%} of radii"
         rows.append((f"{origin}, beside the restored", share))
-    film, indenter, *_ = restored.scan.set_up
-    title = (
-        f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
-        f"radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
-    )
+    pressed = contact_words(restored.scan)
+    title = f"Stress at the base of {pressed} (± standard uncertainty, k = 1)"
     return [Table(title, ("", ""), rows), _stress_table(restored), checks_table(restored.checks)]
 
 
@@ -144,11 +137,11 @@ def _origin(comparison: StressComparison) -> str:
     return "expected stress" if source is None else f"expected stress ({source.file_name})"
 
 
-def _arrays(restored: Restoration) -> dict[str, FloatArray]:
+def _arrays(restored: Restoration) -> dict[str, Any]:
     values = {
         "r": restored.r,
         "sigma_zz": restored.sigma_zz,
-        "sigma_zz_errors": _errors(restored),
+        "sigma_zz_errors": restored.profile().sigma_zz_errors,
         "covariance": restored.covariance,
     }
     if restored.comparison is not None:

@@ -6,8 +6,10 @@ import numpy as np
 
 from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
 from memscal.model import records
-from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.model.indenter import RoundIndenter
+from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.quantities import MM, Quantity, by_name
+from memscal.model.scan import Scan
 from memscal.summaries import declared
 from memscal.summaries.table import Table, checks_json, checks_table, texts_of, verdict
 
@@ -96,14 +98,20 @@ def _profiles_table(stress: MeasuredStress) -> Table:
         if failed:
             marked.add(i)
         rows.append([*row, f"FAILED: {', '.join(failed)}" if failed else "passed"])
-    film = stress.scans[0].film
-    indenter = stress.scans[0].indenter
-    title = (
-        f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
-        f"{indenter.shape} of radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
-    )
+    pressed = contact_words(stress.scans[0])
+    title = f"Stress measured at the base of {pressed} (± standard uncertainty, k = 1)"
     head = ("", _NUMBERS["load"].heading, "state", *headings, "checks")
     return Table(title, head, rows, frozenset(marked), labels=3)
+
+
+def contact_words(scan: Scan | MeasuredScan) -> str:
+    """Return what was pressed on what film."""
+    film = scan.film
+    indenter = scan.indenter
+    if film is None or not isinstance(indenter, RoundIndenter):
+        return "the film"
+    pressed = f"a {indenter.shape} of radius {indenter.radius / MM:.4g} mm"
+    return f"a {film.thickness / MM:.4g} mm film under {pressed}"
 
 
 def _common_table(stress: MeasuredStress) -> Table:

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from memscal.mechanics.elements.mesh import graded
 from memscal.model.arrays import BoolArray, FloatArray, IndexArray
 from memscal.model.film import ElasticFilm
 
@@ -182,17 +183,10 @@ def _tensor(even: FloatArray, side: float, reach: float, size: FilmSize) -> Any:
     contact = even[-1]
     grow = 1 + _GROWTH / refinement
     near, far = (widest * thickness / refinement for widest in (_WIDEST_NEAR, _WIDEST_FAR))
-    r = [contact]
-    step = side
-    while r[-1] < radius:
-        step = min(step * grow, near if r[-1] < contact + reach * thickness else far)
-        r.append(radius if radius - r[-1] < 1.5 * step else r[-1] + step)
-    depth = [0.0]
-    step = side
-    while depth[-1] < thickness:
-        depth.append(thickness if thickness - depth[-1] < 1.5 * step else depth[-1] + step)
-        step = min(step * grow, near)
-    heights = thickness - np.array(depth[::-1])
+    edge = contact + reach * thickness
+    r = graded(contact, radius, side, grow, lambda r: near if r < edge else far)
+    depth = graded(0.0, thickness, side / grow, grow, lambda _: near)
+    heights = thickness - depth[::-1]
     heights[0] = 0.0
     return skfem.MeshTri.init_tensor(np.concatenate([even, r[1:]]), heights)
 

@@ -25,18 +25,22 @@ def sweep_figure(sweep: Sweep) -> Figure:
     if not -2 <= power <= 3:
         unit = f"$10^{{{power}}}$ {unit}"
         scale *= 10.0**power
-    a = (sweep.conversion_constant / scale, sweep.seed_conversion_constant / scale)
-    sigma = (sweep.gaussian_sigma_deconvolved / MM, sweep.seed_gaussian_sigma / MM)
+    rows = (
+        (f"$A$ ({unit})", sweep.conversion_constant, sweep.seed_conversion_constant, scale),
+        (
+            r"$\sigma$ of deconvolved $G$ (mm)",
+            sweep.gaussian_sigma_deconvolved,
+            sweep.seed_gaussian_sigma,
+            MM,
+        ),
+        ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
+    )
     with panels_of(6.6, 3, note="", sharex=True) as (figure, panels):
-        _draw_row(panels[0], sweep.amplitude, *a)
-        _relative_axis(panels[0], sweep.amplitude, a[0])
-        panels[0].set_ylabel(f"$A$ ({unit})")
-        _draw_row(panels[1], sweep.amplitude, *sigma)
-        _relative_axis(panels[1], sweep.amplitude, sigma[0])
-        panels[1].set_ylabel(r"$\sigma$ of deconvolved $G$ (mm)")
-        axes = panels[2]
-        _draw_row(axes, sweep.amplitude, sweep.relative_rms / 0.01, sweep.seed_relative_rms / 0.01)
-        axes.set_ylabel("reconvolution, rms misfit (%)")
+        for axes, (label, exact, draws, size) in zip(panels, rows, strict=True):
+            _draw_row(axes, sweep.amplitude, exact / size, draws / size)
+            if axes is not panels[2]:
+                _relative_axis(axes, sweep.amplitude, exact / size)
+            axes.set_ylabel(label)
         axes.set_xlabel("noise amplitude, relative to the one chosen by rule (1)")
         axes.set_xlim(0.85 * np.min(sweep.amplitude), 1.18 * np.max(sweep.amplitude))
         axes.xaxis.set_major_formatter(lambda amplitude, _: f"{amplitude:g}")

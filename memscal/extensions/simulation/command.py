@@ -27,27 +27,6 @@ if TYPE_CHECKING:
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with the names of its scans."""
 
-_SPHERE_NAMES = (
-    "contacts",
-    "draw_inputs",
-    "exponential",
-    "friction",
-    "gain",
-    "greenwood_tripp",
-    "load_scatter",
-    "loading",
-    "lubricated_loads",
-    "one_load_cell",
-    "position_error",
-    "record_loads",
-    "slip_length",
-    "spacing",
-    "sphere_radius",
-    "sphere_radius_uncertainty",
-    "thickness_factor",
-)
-"""The options that only an experiment with a sphere has."""
-
 _LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
@@ -93,6 +72,10 @@ _sphere_options = options_of(
     ),
 )
 
+_SPHERE = click.Command("sphere")
+_sphere_options(_SPHERE)
+_SPHERE_NAMES = [each.name for each in _SPHERE.params]
+"""The options that only an experiment with a sphere has."""
 
 _PERCENT = ("noise", "baseline", "drift", "load_uncertainty", "load_scatter")
 _AS_GIVEN = (

@@ -298,7 +298,7 @@ class ElementFilm:
         """The finite-element equations, in film thicknesses and shear moduli."""
         rings = self.r / self.film.thickness
         radius = self.radius / self.film.thickness
-        mesh = film_triangles(rings, radius=radius, thickness=1.0, refinement=self.refinement)
+        mesh = film_triangles(rings, radius=radius, refinement=self.refinement)
         return MixedSystem(mesh, self.film.poisson_ratio)
 
     @cached_property

@@ -6,8 +6,10 @@ depends on how fine the rings are.  Where the surface is finer, a row goes down 
 and there are more of them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -47,13 +49,11 @@ class TriangleMesh:
     triangles: IndexArray
 
 
-def film_triangles(
-    rings: FloatArray, *, radius: float, thickness: float, refinement: int = 1
-) -> TriangleMesh:
-    """Return a mesh from the axis to the free edge; all lengths in the unit of the rings."""
-    sizes = _Sizes(rings[-1], thickness, refinement)
+def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> TriangleMesh:
+    """Return a mesh from the axis to the free edge; all lengths in thicknesses of the film."""
+    sizes = _Sizes(rings[-1], refinement)
     front = _Front(_surface_nodes(rings, radius, sizes), sizes)
-    while np.any(front.depth < thickness):
+    while np.any(front.depth < 1.0):
         front.advance()
     return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
 
@@ -63,26 +63,33 @@ class _Sizes:
     """How long a side of a triangle may be."""
 
     contact: float
-    thickness: float
     refinement: int
 
     def widest(self, r: FloatArray | float) -> FloatArray:
         """Return the longest side allowed at ``r``."""
-        away = (r - self.contact) / self.thickness
+        away = r - self.contact
         widest = np.interp(away, _DISTANCES, _WIDEST)
         widest += _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
-        return widest * self.thickness / self.refinement
+        return widest / self.refinement
 
 
 def _surface_nodes(rings: FloatArray, radius: float, sizes: _Sizes) -> FloatArray:
     """Return the corners of triangles on the surface: some of the rings, and others beyond."""
     inside = _fitted(rings, sizes)
-    beyond = [rings[-1]]
     step = rings[-1] - inside[-2]
-    while beyond[-1] < radius:
-        step = min(step * (1 + _GROWTH / sizes.refinement), float(sizes.widest(beyond[-1])))
-        beyond.append(radius if radius - beyond[-1] < 1.5 * step else beyond[-1] + step)
-    return np.concatenate([inside, beyond[1:]])
+    growth = 1 + _GROWTH / sizes.refinement
+    return np.concatenate([inside, graded(rings[-1], radius, step, growth, sizes.widest)[1:]])
+
+
+def graded(
+    begin: float, end: float, step: float, growth: float, widest: Callable[[float], Any]
+) -> FloatArray:
+    """Return nodes whose distances grow from a step by a factor, up to the widest at each."""
+    nodes = [begin]
+    while nodes[-1] < end:
+        step = min(step * growth, float(widest(nodes[-1])))
+        nodes.append(end if end - nodes[-1] < 1.5 * step else nodes[-1] + step)
+    return np.array(nodes)
 
 
 def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
@@ -120,8 +127,8 @@ class _Front:
 
     def advance(self) -> None:
         """Go down where that leads least deep, and fill what lies between with triangles."""
-        above = self.depth < self.sizes.thickness
-        ahead = np.where(above, self._next_depths(), self.sizes.thickness)
+        above = self.depth < 1.0
+        ahead = np.where(above, self._next_depths(), 1.0)
         reach = (ahead + _TOGETHER * (ahead - self.depth))[above].min()
         moving = above & (ahead <= reach)
         lower = np.where(moving, ahead, self.depth)
@@ -138,12 +145,12 @@ class _Front:
     def _next_depths(self) -> FloatArray:
         """Return the depth to which each node would go; the last steps to the base are even."""
         sides = np.pad((self.r[2:] - self.r[:-2]) / 2, 1, mode="edge")
-        left = self.sizes.thickness - self.depth
-        tallest = self.sizes.thickness / (2 * self.sizes.refinement)
+        left = 1.0 - self.depth
+        tallest = 1.0 / (2 * self.sizes.refinement)
         step = np.minimum(sides, np.minimum(self.sizes.widest(self.r), tallest))
         count = np.round(np.maximum(left / step, 1.0))
         depth = self.depth + np.where(count <= _EVEN_STEPS, left / count, step)
-        return np.where(count == 1, self.sizes.thickness, depth)
+        return np.where(count == 1, 1.0, depth)
 
     def _kept(self, moving: BoolArray, lower: FloatArray) -> BoolArray:
         """Return which nodes the next row has: never do two neighbours drop out."""
