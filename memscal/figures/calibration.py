@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
-from memscal.figures import style
 from memscal.figures.calibration_scan import (
     MOST_PANELS,
     Loads,
@@ -24,7 +23,20 @@ from memscal.figures.calibration_scan import (
     some_points,
     standardised,
 )
-from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED, channel_indices, legend_above
+from memscal.figures.style import (
+    ALONG_RADIUS,
+    COLOURS,
+    EXPANDED,
+    FIGURE_WIDTH,
+    channel_indices,
+    draw_band,
+    drawable,
+    house_style,
+    legend_above,
+    new_figure,
+    on_axis,
+    panel_letters,
+)
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, Reconvolution
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import ESTIMATED, KPA, MM, PER_MM, PER_MM2, measured_text
@@ -55,9 +67,9 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
 
 def radial_figure(data: ApparatusData) -> Figure:
     """Draw G(r) alone, half a page wide, as a certificate shows it."""
-    with style.house_style():
-        figure = style.new_figure(2.4)
-        figure.set_figwidth(style.FIGURE_WIDTH / 2)
+    with house_style():
+        figure = new_figure(2.4)
+        figure.set_figwidth(FIGURE_WIDTH / 2)
         axes = figure.subplots()
         draw_radial(axes, data)
         axes.set_xlabel("distance from the axis $r$ (mm)")
@@ -86,8 +98,8 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
         end = min(end, 2.0 * limit)
     k = np.linspace(0.0, end, _FINE)
     samples = np.stack([transfer.modulus, EXPANDED * transfer.modulus_errors, transfer.window])
-    modulus, band, window = style.on_axis(transfer.k, samples, k * PER_MM)
-    style.draw_band(axes, k, np.maximum(modulus - band, 0.0), modulus + band, _BAND)
+    modulus, band, window = on_axis(transfer.k, samples, k * PER_MM)
+    draw_band(axes, k, np.maximum(modulus - band, 0.0), modulus + band, _BAND)
     axes.plot(k, np.maximum(modulus, 0.0), color=COLOURS["deconvolved"], label="modulus for G")
     gaussian = gaussian_transfer(k * PER_MM, data.gaussian_sigma)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
@@ -108,10 +120,10 @@ def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
     radial = data.radial_profile
     end = _shown_radius(radial)
     r = np.linspace(0.0, end, _FINE)
-    g, band = style.on_axis(radial.r, np.stack([radial.g, EXPANDED * radial.g_errors]), r)
+    g, band = on_axis(radial.r, np.stack([radial.g, EXPANDED * radial.g_errors]), r)
     profiles = np.stack([g - band, g + band, g, unit_gaussian(r, data.gaussian_sigma)])
     low, high, g, gaussian = np.maximum(profiles, floor) / PER_MM2
-    style.draw_band(axes, r / MM, low, high, _BAND)
+    draw_band(axes, r / MM, low, high, _BAND)
     axes.plot(r / MM, g, color=COLOURS["deconvolved"], label="deconvolved G")
     axes.plot(r / MM, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian fit")
     axes.set_xlim(0.0, end / MM)
@@ -231,8 +243,8 @@ def calibration_figure(result: Calibrated) -> Figure:
     heights = [_LINE_HEIGHT * (len(lines) + 0.6), _PANELS_HEIGHT + max(apart - 3, 0)]
     if mapped:
         heights.append(_MAP_HEIGHT * len(mapped))
-    with style.house_style():
-        figure = style.new_figure(sum(heights))
+    with house_style():
+        figure = new_figure(sum(heights))
         outer = figure.add_gridspec(len(heights), 2, height_ratios=heights)
         _write_lines(figure, lines)
         figure.add_subplot(outer[0, :]).set_axis_off()
@@ -240,7 +252,7 @@ def calibration_figure(result: Calibrated) -> Figure:
         panels = [*scan_panels, *_draw_g_panels(figure, outer[1, 1], data)]
         if mapped:
             panels += _draw_maps(figure, outer[2, :], data, mapped)
-        style.panel_letters(panels)
+        panel_letters(panels)
         # Passes of the layout (maps need three), then none: rendering twice gives the same picture.
         for _ in range(3 if mapped else 1):
             figure.draw_without_rendering()
@@ -332,7 +344,7 @@ def _write_lines(figure: Figure, lines: list[_Line]) -> None:
         text = figure.text(
             _MARGIN,
             y,
-            style.drawable(line),
+            drawable(line),
             color=colour,
             weight=weight,
             va="top",

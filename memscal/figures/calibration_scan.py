@@ -10,8 +10,18 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from memscal.estimation.points import MINIMUM_POSITIONS, loads_differ
-from memscal.figures import style
-from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED, channel_indices, legend_above
+from memscal.figures.style import (
+    ALONG_RADIUS,
+    COLOURS,
+    EXPANDED,
+    SCATTER_THRESHOLD,
+    channel_indices,
+    draw_measured,
+    draw_residual_band,
+    legend_above,
+    marker_size,
+    shades,
+)
 from memscal.model.apparatus import ApparatusData, Reconvolution
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES
@@ -28,7 +38,7 @@ MOST_PANELS = 6
 def _draw_scan(axes: Axes, data: ApparatusData, look: _Look) -> Any:
     """Draw the scan, and on the right-hand axis U/A in kPa; return the drawn points."""
     scan = data.reconvolution
-    label = "scan" if scan.x.size > style.SCATTER_THRESHOLD else "scan, ±2u"
+    label = "scan" if scan.x.size > SCATTER_THRESHOLD else "scan, ±2u"
     points = _draw_measured(axes, data, scan.u_zz, look, label)
     _draw_predictions(axes, data)
     _draw_reference(axes, data)
@@ -86,9 +96,9 @@ def draw_scan_log(axes: Axes, data: ApparatusData, loads: Loads) -> None:
                 mfc="none",
                 mew=0.7,
                 color=COLOURS["muted"],
-                ms=0.8 * style.marker_size(x.size),
+                ms=0.8 * marker_size(x.size),
                 label="less than 2u: upper limit, U + 2u",
-                rasterized=x.size > style.SCATTER_THRESHOLD,
+                rasterized=x.size > SCATTER_THRESHOLD,
             )
         _draw_predictions(axes, part, net=True)
         heights.append(_draw_reference(axes, part, net=True))
@@ -128,15 +138,15 @@ def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, 
     """Draw voltages (V) at the scan's points, with their expanded uncertainties; return them."""
     x = data.reconvolution.x / MM
     colour, marker = look
-    return style.draw_measured(
+    return draw_measured(
         axes,
         x,
         u / data.reading.scale,
         _bars(data) / data.reading.scale,
-        many=x.size > style.SCATTER_THRESHOLD,
+        many=x.size > SCATTER_THRESHOLD,
         ls="none",
         marker=marker,
-        ms=style.marker_size(x.size),
+        ms=marker_size(x.size),
         mfc="white",
         mew=0.7,
         color=colour,
@@ -149,7 +159,7 @@ def _draw_measured(axes: Axes, data: ApparatusData, u: FloatArray, look: _Look, 
 
 def _looks(loads: Loads, alone: str) -> list[_Look]:
     """Return colour and marker of each load, the same in all panels; of a single one ``alone``."""
-    colours = style.shades(len(loads), 0.25) if len(loads) > 1 else [alone]
+    colours = shades(len(loads), 0.25) if len(loads) > 1 else [alone]
     return list(zip(colours, cycle("o^DvP*"), strict=False))
 
 
@@ -173,7 +183,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
         line.set_color(COLOURS[colour])
         if mixed or np.any(np.diff(x) <= 0):  # many voltages near one x, which no line joins
             line.set(linestyle="none", marker=marker, rasterized=True)
-            line.set_markersize(1.2 if x.size > style.SCATTER_THRESHOLD else 2.5)
+            line.set_markersize(1.2 if x.size > SCATTER_THRESHOLD else 2.5)
 
 
 def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -340,11 +350,11 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
     # One outlier cannot stretch the axis.
     sizes = np.abs([with_g, with_gaussian])
     limit = max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9)))
-    style.draw_residual_band(axes)
-    many = scan.x.size > style.SCATTER_THRESHOLD
+    draw_residual_band(axes)
+    many = scan.x.size > SCATTER_THRESHOLD
     common = {
         "ls": "none",
-        "ms": 1.2 if many else style.marker_size(scan.x.size),
+        "ms": 1.2 if many else marker_size(scan.x.size),
         "mew": 0.3 if many else 0.7,
         "rasterized": many,
     }

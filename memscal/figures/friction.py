@@ -10,15 +10,20 @@ from matplotlib.figure import Figure
 
 from memscal.errors import InputError
 from memscal.extensions import hook
-from memscal.figures import friction_profiles as profiles
 from memscal.figures.friction_profiles import (
+    chosen,
     comparison_looks,
+    draw_profiles,
+    draw_residuals,
     friction_axis,
     friction_colour,
     friction_name,
     friction_position,
+    friction_set_figure,
     joint_estimate,
     lubricated_words,
+    profile_figure,
+    share_limits,
 )
 from memscal.figures.style import (
     ALONG_RADIUS,
@@ -158,13 +163,13 @@ def comparison_figure(
         return figures[name]()
     if comparison.by_shear:
         raise InputError("There is no figure of a comparison by the shear alone.")
-    loads = profiles.chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, loading, lubrication)
     with panels_of(5.6, 2, 2, note=_BOTH_NOTE) as (figure, panels):
-        profiles.draw_profiles(panels[0, 0], comparison, loads)
+        draw_profiles(panels[0, 0], comparison, loads)
         _draw_maxima(panels[0, 1], comparison, loads[0].loading)
         best = joint_estimate(comparison, loads).best
-        largest = profiles.draw_residuals(panels[1, 0], comparison, loads, best)
-        profiles.share_limits([panels[1, 0]], largest)
+        largest = draw_residuals(panels[1, 0], comparison, loads, best)
+        share_limits([panels[1, 0]], largest)
         panels[0, 0].set_xlabel(ALONG_RADIUS)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
         _draw_effective(panels[1, 1], comparison, loads)
@@ -179,10 +184,8 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
         return figures
     for state in dict.fromkeys(profile.lubrication for profile in comparison.measured.profiles):
         tail = f"-{state}" if state else ""
-        figures[f"profiles{tail}"] = partial(profiles.profile_figure, comparison, lubrication=state)
-        figures[f"friction-set{tail}"] = partial(
-            profiles.friction_set_figure, comparison, lubrication=state
-        )
+        figures[f"profiles{tail}"] = partial(profile_figure, comparison, lubrication=state)
+        figures[f"friction-set{tail}"] = partial(friction_set_figure, comparison, lubrication=state)
     figures["maxima"] = partial(maxima_figure, comparison)
     figures["effective-friction"] = partial(effective_friction_figure, comparison)
     figures["likelihood"] = partial(likelihood_figure, comparison)
@@ -280,7 +283,7 @@ def _panels(
     ) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
-                draw(axes, comparison, profiles.chosen(comparison, loading, lubrication))
+                draw(axes, comparison, chosen(comparison, loading, lubrication))
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
                 axes.label_outer()

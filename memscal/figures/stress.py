@@ -9,8 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from memscal.figures import style
-from memscal.figures.style import ALONG_RADIUS, COLOURS, EXPANDED
+from memscal.figures.style import (
+    ALONG_RADIUS,
+    COLOURS,
+    COVERAGE_NOTE,
+    EXPANDED,
+    SCATTER_THRESHOLD,
+    draw_band,
+    draw_measured,
+    draw_residual_band,
+    draw_zero,
+    legend_above,
+    load_looks,
+    mark,
+    marker_size,
+    panels_of,
+    shades,
+)
 from memscal.measurement.restoration import Restoration
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import BoolArray
@@ -23,10 +38,10 @@ _DECADES = 1e-3
 def measured_stress_figure(measured: MeasuredStress) -> Figure:
     """Draw the measured profiles of all loads against the distance from the centre."""
     # Dots of many points have no bars.
-    many = min(profile.r.size for profile in measured.profiles) > style.SCATTER_THRESHOLD
-    with style.panels_of(3.6, 1, 2, "" if many else style.COVERAGE_NOTE) as (figure, panels):
+    many = min(profile.r.size for profile in measured.profiles) > SCATTER_THRESHOLD
+    with panels_of(3.6, 1, 2, "" if many else COVERAGE_NOTE) as (figure, panels):
         linear, logarithmic = panels
-        looks = style.load_looks(profile.load for profile in measured.profiles)
+        looks = load_looks(profile.load for profile in measured.profiles)
         for profile in measured.profiles:
             colour, _ = looks[profile.load]
             clear = profile.s_zz > EXPANDED * profile.s_zz_errors
@@ -36,7 +51,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             axes.set(xlabel=ALONG_RADIUS, ylabel="blurred stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
         linear.set_title("linear scale", fontsize=8, loc="left")
-        style.draw_zero(linear)
+        draw_zero(linear)
         words = "logarithmic scale; pale: less than 2u"
         logarithmic.set_title(words, fontsize=8, loc="left")
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
@@ -52,19 +67,19 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, clear: BoolArray) -
     dashes = "--" if profile.lubrication == "lubricated" else "-"
     curve = profile.curve_s_zz / KPA
     axes.plot(profile.curve_r / MM, curve, color=colour, lw=0.8, ls=dashes, alpha=0.7)
-    look = style.mark(profile.lubrication, colour) | {
+    look = mark(profile.lubrication, colour) | {
         "ls": "none",
         "mew": 0.7,
         "ms": 2.6,
-        "many": profile.r.size > style.SCATTER_THRESHOLD,
+        "many": profile.r.size > SCATTER_THRESHOLD,
         "elinewidth": 0.6,
     }
     r = profile.r / MM
     stress = profile.s_zz / KPA
     bars = EXPANDED * profile.s_zz_errors / KPA
-    style.draw_measured(axes, r[clear], stress[clear], bars[clear], **look)
+    draw_measured(axes, r[clear], stress[clear], bars[clear], **look)
     if not clear.all():
-        style.draw_measured(axes, r[~clear], stress[~clear], None, alpha=0.3, **look)
+        draw_measured(axes, r[~clear], stress[~clear], None, alpha=0.3, **look)
     axes.axvline(profile.contact_radius / MM, ymin=0.94, color=colour, lw=1.2, ls=dashes)
 
 
@@ -74,7 +89,7 @@ def _legend(
     """Name loads by colour and states by mark, once for both panels."""
     handles = [Line2D([], [], color=colour, lw=2.0, label=name) for colour, name in colours.items()]
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
-        look = style.mark(state, "0.2")
+        look = mark(state, "0.2")
         words = state or "measured"
         if many:
             look["marker"] = "."
@@ -93,7 +108,7 @@ _LEAST_LIMIT = 3.5
 
 def restoration_figure(restored: Restoration) -> Figure:
     """Draw the stress at the base as restored, as blurred by the sensor, and as calculated."""
-    with style.panels_of(3.3, 1, 2, width_ratios=(1.6, 1)) as (figure, panels):
+    with panels_of(3.3, 1, 2, width_ratios=(1.6, 1)) as (figure, panels):
         _draw_stress(panels[0], restored)
         _draw_residuals(panels[1], restored)
     return figure
@@ -103,7 +118,7 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
     r = restored.r / MM
     stress = restored.sigma_zz / KPA
     band = EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
-    style.draw_band(axes, r, stress - band, stress + band)
+    draw_band(axes, r, stress - band, stress + band)
     axes.plot(r, stress, color=COLOURS["deconvolved"], label=r"restored $\sigma_{zz}$, ±2u")
     blurred = restored.blurred_stress(restored.r) / KPA
     label = r"blurred again, $S_{zz} = G*\sigma_{zz}$"
@@ -117,7 +132,7 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
             label = rf"calculated $\sigma_{{zz}}$, {words}"
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
     count = restored.points.u.size
-    many = count > style.SCATTER_THRESHOLD
+    many = count > SCATTER_THRESHOLD
     (points,) = axes.plot(
         restored.distance / MM,
         restored.measured_stress / KPA,
@@ -125,15 +140,15 @@ def _draw_stress(axes: Axes, restored: Restoration) -> None:
         color=COLOURS["measured"],
         mfc="none",
         mew=0.6,
-        ms=1.2 if many else 0.8 * style.marker_size(count),
+        ms=1.2 if many else 0.8 * marker_size(count),
         label="scan, blurred stress $S_{zz} = U/A$",
         rasterized=many,
     )
-    style.draw_zero(axes)
+    draw_zero(axes)
     axes.set_xlim(0, max(r[-1], restored.distance.max() / MM))
     axes.set_xlabel(ALONG_RADIUS)
     axes.set_ylabel(r"stress $\sigma_{zz}$ at the base, blurred stress $S_{zz}$ (kPa)")
-    style.legend_above(axes, points=count, first=points)
+    legend_above(axes, points=count, first=points)
 
 
 def _draw_residuals(axes: Axes, restored: Restoration) -> None:
@@ -143,15 +158,15 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     ordinary = np.abs(z) <= limit
     along = "x" if restored.points.free[0, 0] else "y"
     side = getattr(restored.points, along) / MM
-    style.draw_residual_band(axes)
-    size = style.marker_size(z.size)
+    draw_residual_band(axes)
+    size = marker_size(z.size)
     label = f"scan: rms {np.sqrt(np.mean(z**2)):.2f}"
     axes.plot(side[ordinary], z[ordinary], "o", color=COLOURS["measured"], ms=size, label=label)
     edge = 0.93 * limit * np.sign(z[~ordinary])
     axes.plot(side[~ordinary], edge, "^", color=COLOURS["failed"], ms=4)
     axes.set_ylim(-limit, limit)
     axes.set(xlabel=f"position ${along}$ (mm)", ylabel="residual / $u$")
-    style.legend_above(axes, columns=1)
+    legend_above(axes, columns=1)
 
 
 _MICROMETRE = 1e-6
@@ -167,8 +182,8 @@ def contact_figure(contact: Contact, *, beside: Sequence[Contact] = ()) -> Figur
     """Draw pressure and shear of one contact or several; of several, load against depth, too."""
     contacts = [contact, *beside]
     several = len(contacts) > 1
-    with style.panels_of(2.9, 1, 3 if several else 2, note="") as (figure, panels):
-        colours = style.shades(len(contacts), 0.15)
+    with panels_of(2.9, 1, 3 if several else 2, note="") as (figure, panels):
+        colours = shades(len(contacts), 0.15)
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
@@ -209,9 +224,9 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
     axes.plot([], [], color="0.4", marker="|", ms=8, ls="none", label="contact radius")
     if slipping:
         axes.plot([], [], color="0.4", ls="none", label="stick radius", **stick)
-    style.draw_zero(axes)
+    draw_zero(axes)
     axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the interface (kPa)")
-    style.legend_above(axes)
+    legend_above(axes)
 
 
 def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
@@ -222,6 +237,6 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
         axes.plot(r / MM, contact.base_shear(r) / KPA, color=colour, ls="--")
     axes.plot([], [], color="0.4", label=r"normal, $\sigma_{zz}$")
     axes.plot([], [], color="0.4", ls="--", label=r"shear, outward, $\sigma_{rz}$")
-    style.draw_zero(axes)
+    draw_zero(axes)
     axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the base (kPa)")
-    style.legend_above(axes, columns=1)
+    legend_above(axes, columns=1)

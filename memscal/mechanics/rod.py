@@ -27,8 +27,12 @@ from numpy.polynomial import legendre
 
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
-from memscal.mechanics import film_response
-from memscal.mechanics.film_response import HalfSpaceIntegrals, base_stress
+from memscal.mechanics.film_response import (
+    HalfSpaceIntegrals,
+    base_stress,
+    corrections,
+    half_space_coupling,
+)
 from memscal.model.arrays import BoolArray, FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -242,7 +246,7 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     # Of the half-space: the integral of j_l^2 is pi/2(2l + 1).
     even_orders = 2 * np.arange(terms)
     matrix = np.diag(np.pi / (4 * even_orders + 2))
-    by_normal, by_coupling, by_radial = film_response.corrections(x, nu)
+    by_normal, by_coupling, by_radial = corrections(x, nu)
     matrix += (even * (weights * by_normal)) @ even.T
     if not sticking:
         return matrix
@@ -252,7 +256,7 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     apart = even_orders[:, None] - even_orders - 1
     both = even_orders[:, None] + even_orders + 1
     products = np.where(apart % 4 == 1, 1.0, -1.0) / (apart * (both + 1))
-    coupling = film_response.half_space_coupling(nu) * products
+    coupling = half_space_coupling(nu) * products
     coupling += (even * (weights * by_coupling)) @ odd.T
     return np.block([[matrix, coupling], [coupling.T, radial]])
 

@@ -9,8 +9,15 @@ from memscal.mechanics.contact import Contact
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
 from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
-from memscal.summaries import declared
-from memscal.summaries.declared import DataFrame, Dataset, members
+from memscal.summaries.declared import (
+    DataFrame,
+    Dataset,
+    cell,
+    correlated_numbers,
+    data_frame,
+    labelled_dataset,
+    members,
+)
 from memscal.summaries.stress import contact_words
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
@@ -84,7 +91,7 @@ def _cells(restored: Restoration) -> dict[str, str]:
     """Return the numbers that the scan determines, with their uncertainties, by their names."""
     values = _values(restored)
     shown = _determined(restored).items()
-    return {name: declared.cell(q, restored, **values) for name, q in shown if name in _NUMBERS}
+    return {name: cell(q, restored, **values) for name, q in shown if name in _NUMBERS}
 
 
 def tables(restored: Restoration) -> list[Table]:
@@ -151,13 +158,13 @@ def _arrays(restored: Restoration) -> dict[str, Any]:
 
 def dataset(restored: Restoration) -> Dataset:
     """Return the stress with its covariance along r, and the calculated one where there is one."""
-    return declared.labelled_dataset(_QUANTITIES, _arrays(restored))
+    return labelled_dataset(_QUANTITIES, _arrays(restored))
 
 
 def frame(restored: Restoration) -> DataFrame:
     """Return one row for each radius."""
     columns = {name: values for name, values in _arrays(restored).items() if values.ndim == 1}
-    return declared.data_frame(_QUANTITIES, columns)
+    return data_frame(_QUANTITIES, columns)
 
 
 def correlated(restored: Restoration) -> dict[str, Any]:
@@ -165,4 +172,4 @@ def correlated(restored: Restoration) -> dict[str, Any]:
     values = _values(restored) | {"force": restored.force, "baseline": restored.baseline}
     names = [name for name in _determined(restored) if name in _NUMBERS]
     numbers = [values[name] for name in names]
-    return declared.correlated_numbers(names, numbers, restored.scalar_covariance)
+    return correlated_numbers(names, numbers, restored.scalar_covariance)

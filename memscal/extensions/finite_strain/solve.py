@@ -14,8 +14,14 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform, radial_spline
 from memscal.errors import ConvergenceError, DomainError
-from memscal.extensions.finite_strain import film_elements
-from memscal.extensions.finite_strain.film_elements import FilmSize, Finer
+from memscal.extensions.finite_strain.film_elements import (
+    FilmElements,
+    FilmSize,
+    Finer,
+    Rubber,
+    mesh_below_a_rod,
+    mesh_below_a_sphere,
+)
 from memscal.extensions.finite_strain.pressing import (
     NewtonError,
     Path,
@@ -194,7 +200,7 @@ class _Request:
             face, mesh = self._below_rod(size)
         else:
             face, mesh = self._below_sphere(size, coarse)
-        elements = film_elements.FilmElements(mesh, film_elements.Rubber.of(self.film))
+        elements = FilmElements(mesh, Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 
@@ -209,7 +215,7 @@ class _Request:
             inner, outer = _FOLD_STICKING
             outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
         fold = (inner * rod, outer * rod)
-        return face, film_elements.mesh_below_a_rod(
+        return face, mesh_below_a_rod(
             size, rod=rod, fold=fold, finest=finest * face.edge, finer=self.finer
         )
 
@@ -227,7 +233,7 @@ class _Request:
                 f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
                 why="It must end well within both.",
             )
-        return face, film_elements.mesh_below_a_sphere(size, contact=widest)
+        return face, mesh_below_a_sphere(size, contact=widest)
 
     def _depth(self, goal: Target) -> float:
         """Return a rod's depth at a goal, that on a half-space at a load, in mm."""

@@ -11,10 +11,17 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.calibration import uncertainty
 from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.calibration.stages import Solution, solve
-from memscal.calibration.uncertainty import BUDGETED, InputEffect
+from memscal.calibration.uncertainty import (
+    BUDGETED,
+    NOT_RANDOM,
+    InputEffect,
+    correlation_matrix,
+    drawn_about,
+    expected_values,
+    read_off,
+)
 from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.points import measured_mask
@@ -73,7 +80,7 @@ class DrawnScans:
         noise: FloatArray = rng.standard_normal(points.u.size)
         if points.decorrelation is not None:
             noise = points.decorrelation.correlate(noise)
-        residual = points.u - uncertainty.drawn_about(self.solution)
+        residual = points.u - drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise
         return [
@@ -97,7 +104,7 @@ class DrawnScans:
 
     def standardised(self, normal: FloatArray) -> dict[str, FloatArray]:
         """Turn normal draws, (inputs, ...), into each input's error over its uncertainty."""
-        matrix = uncertainty.correlation_matrix(list(self.effects), self.correlations)
+        matrix = correlation_matrix(list(self.effects), self.correlations)
         values, vectors = np.linalg.eigh(matrix)
         # By the symmetric root every input keeps its draw where there are no correlations.
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
@@ -109,7 +116,7 @@ class DrawnScans:
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
         """Voltages without noise (n,), in V: A G convolved with the stress of the true inputs."""
         estimate = self.solution.estimate
-        voltages = uncertainty.drawn_about(self.solution)
+        voltages = drawn_about(self.solution)
         signal = voltages - estimate.background
         solved = {item.source for item in self.solved}
         for source, effect in self.effects.items():
@@ -174,7 +181,7 @@ class DrawnScans:
         return tuple(changes)
 
     def _results_of(self, solution: Solution) -> FloatArray:
-        numbers, g = uncertainty.read_off(solution.deconvolution, self.solution.deconvolution.g.r)
+        numbers, g = read_off(solution.deconvolution, self.solution.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
 
@@ -369,7 +376,7 @@ def monte_carlo(
         cure = "The scan is close to failing, too; measure with less noise."
         raise FitError(problem, why=f"The first one: {failures[0]}", cure=cure)
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
-    expected = uncertainty.expected_values(solution)
+    expected = expected_values(solution)
     deconvolution = solution.deconvolution
     comparisons = []
     for name, column in zip(BUDGETED, samples.T, strict=True):
@@ -404,7 +411,7 @@ def _compared(
     mean = float(column.mean())
     spread = float(column.std(ddof=1))
     # Of the inputs and noise; a correlation's contribution has a sign.
-    parts = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
+    parts = np.array([u for source, u in budget.items() if source not in NOT_RANDOM])
     u = float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
     # The standard uncertainty of the standard deviation, by the kurtosis of the draws.
     square = (column - mean) ** 2

@@ -7,10 +7,25 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import PAPER_FILM, Quantity, figure_option, option, output_options, si
+from memscal.cli.options import (
+    FREE_OR_STUCK,
+    PAPER_FILM,
+    Quantity,
+    figure_option,
+    film_from,
+    film_options,
+    indenter_from,
+    kernel_from,
+    kernel_options,
+    option,
+    output_options,
+    radius_options,
+    require_one_kernel,
+    rod_friction_option,
+    si,
+)
 from memscal.formats.files import together
 
 #: Options in other units than SI, by the power of ten.
@@ -55,13 +70,13 @@ def _target(value: str) -> tuple[str, float]:
 
 
 @click.command("design", epilog=EXAMPLES)
-@common.kernel_options
+@kernel_options
 @option("--load", Quantity("N"), 1.0)("Normal load, in N.")
 @option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
     "Standard uncertainty (k = 1) of the load, in percent."
 )
-@common.radius_options(default=0.25, uncertainty=0.0025)
-@common.film_options(defaults=PAPER_FILM)
+@radius_options(default=0.25, uncertainty=0.0025)
+@film_options(defaults=PAPER_FILM)
 @option("--step", Quantity("mm"), 0.25)("Distance of neighbouring positions, in mm.")
 @option("--half-range", Quantity("mm"), 8.0)("Positions run from minus to plus this, in mm.")
 @option("--repeats", click.IntRange(min=1), 1)("How often the line is scanned.")
@@ -73,7 +88,7 @@ def _target(value: str) -> tuple[str, float]:
 @option("--centre", Quantity("mm", low=-float("inf")), 0.0)(
     "Expected position of the sensor along the scan, in mm."
 )
-@common.rod_friction_option(f"{common.FREE_OR_STUCK} Default: the scan will not state it.")
+@rod_friction_option(f"{FREE_OR_STUCK} Default: the scan will not state it.")
 @option("--position-scale-uncertainty", Quantity("percent", open_low=False))(
     "Standard uncertainty (k = 1) of the stage's scale, in percent."
 )
@@ -109,7 +124,7 @@ def command(
     the estimate and the uncertainties of film, rod and load. Defaults are the paper's. With --want
     and --vary, the smallest scan that reaches the targets is found.
     """
-    common.require_one_kernel(options)
+    require_one_kernel(options)
     source = click.get_current_context().get_parameter_source("noise")
     if options["noise_voltage"] is not None and source == ParameterSource.COMMANDLINE:
         raise click.UsageError("--noise and --noise-voltage both state the noise: give one.")
@@ -123,11 +138,11 @@ def command(
     settings: dict[str, Any] = {name: options[name] for name in _AS_GIVEN}
     for name, power in _SCALED.items():
         settings[name] = si(options[name], power)
-    settings["rod"] = common.indenter_from("rod", options)
+    settings["rod"] = indenter_from("rod", options)
     with out.working("Planning"):
         planned = design(
-            film=common.film_from(options),
-            kernel=common.kernel_from(options),
+            film=film_from(options),
+            kernel=kernel_from(options),
             want=dict(targets),
             vary=vary,
             **settings,

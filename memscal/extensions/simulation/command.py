@@ -11,9 +11,27 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from memscal.cli import options as common
 from memscal.cli.failures import DONE
-from memscal.cli.options import FILE, PAPER_FILM, Quantity, option, options_of, output_options, si
+from memscal.cli.options import (
+    FILE,
+    FREE_OR_STUCK,
+    PAPER_FILM,
+    Quantity,
+    film_from,
+    film_options,
+    indenter_from,
+    kernel_from,
+    kernel_options,
+    laboratory_option,
+    option,
+    options_of,
+    output_options,
+    radius_options,
+    require_one_kernel,
+    rod_friction_option,
+    si,
+    with_laboratory,
+)
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable, working
 from memscal.cli.reference import interface_of, interface_options
 from memscal.errors import OutputError
@@ -101,10 +119,10 @@ def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
         **{name: options[name] for name in _AS_GIVEN},
     )
     return {
-        "film": common.film_from(options),
-        "rod": common.indenter_from("rod", options),
+        "film": film_from(options),
+        "rod": indenter_from("rod", options),
         "rod_friction": options["rod_friction"],
-        "kernel": common.kernel_from(options),
+        "kernel": kernel_from(options),
         "conversion_constant": si(options["conversion_constant"], -3),
         "repeats": options["repeats"],
         "disturbances": disturbances,
@@ -194,14 +212,14 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Scan to write (memscal-scan), or the folder of an experiment's three scans.  "
     "[default: synthetic_scan.h5, or synthetic_experiment]"
 )
-@common.kernel_options
+@kernel_options
 @option("--load loads", Quantity("N"), multiple=True)(
     "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
     "0.34, 0.69, 1.37 and 2.75]"
 )
-@common.radius_options(default=0.25, uncertainty=0.0025)
-@common.film_options(defaults=PAPER_FILM)
-@common.rod_friction_option(common.FREE_OR_STUCK)
+@radius_options(default=0.25, uncertainty=0.0025)
+@film_options(defaults=PAPER_FILM)
+@rod_friction_option(FREE_OR_STUCK)
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
 )
@@ -233,7 +251,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Whether the scan states the film's law and the rod's friction."
 )
 @option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
-@common.laboratory_option("Rod scan alone: ")
+@laboratory_option("Rod scan alone: ")
 @_sphere_options
 @output_options
 def command(
@@ -267,7 +285,7 @@ def command(
             **_shared_settings(options),
         )
     if laboratory:
-        scan = common.with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
+        scan = with_laboratory(laboratory, replace(scan, sensor=StressSensor()))
     with together():
         write_scan(scan, output, overwrite=force)
         if as_json:
@@ -293,7 +311,7 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
         other = "sphere" if experiment == "rod" else "rod"
         belongs = "belongs" if len(names) == 1 else "belong"
         raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
-    common.require_one_kernel(options)
+    require_one_kernel(options)
     if options["raster"] and max(len(options["loads"]), 1) * options["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
@@ -321,7 +339,7 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
 
     _require_writable_folder(folder, overwrite=force)
     radius = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
-    sphere: Any = common.indenter_from("sphere", radius)
+    sphere: Any = indenter_from("sphere", radius)
     with working("Simulating"):
         made = simulate_experiment(
             sphere=sphere,

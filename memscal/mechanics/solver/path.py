@@ -12,8 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from memscal.errors import ConvergenceError
-from memscal.mechanics.solver import step
-from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target, Touch
+from memscal.mechanics.solver.step import (
+    ContactProblem,
+    ContactState,
+    Load,
+    Target,
+    Touch,
+    take_step,
+)
 from memscal.progress import Task
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
@@ -56,7 +62,7 @@ def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target)
     untouched = np.zeros_like(problem.heights)
     start = replace(smooth, anchor=untouched, outward=untouched)
     try:
-        return step.take_step(problem, start, target)
+        return take_step(problem, start, target)
     except ConvergenceError:
         rings = int(np.count_nonzero(start.touching))
         if problem.interface.normal_law is not None or not np.all(start.touching[:rings]):
@@ -71,7 +77,7 @@ def _between_rings(
 
     def meeting_at(ring: int) -> ContactState:
         inside = replace(start, touching=np.arange(start.touching.size) < ring)
-        return step.take_step(problem, inside, Touch(ring), same_contact=True)
+        return take_step(problem, inside, Touch(ring), same_contact=True)
 
     last = problem.heights.size - 1
     rings = min(rings, last)
@@ -182,7 +188,7 @@ def _step_by_step(
             if problem.interface.normal_law is not None:
                 _walk_evenly(walk, target, farthest, increments)
             elif problem.friction == 0:
-                walk.step_to(step.take_step(problem, walk.state, target))
+                walk.step_to(take_step(problem, walk.state, target))
             else:
                 resume = _walk_ring_by_ring(walk, target, rising=rising)
                 upward = rising
@@ -213,7 +219,7 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
     for value in np.linspace(_reached(walk.state, target), target.value, count + 1)[1:]:
         goal = replace(target, value=float(value))
-        walk.step_to(step.take_step(problem, walk.state, goal, same_contact=True))
+        walk.step_to(take_step(problem, walk.state, goal, same_contact=True))
     return walk
 
 
@@ -225,8 +231,8 @@ def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) 
     count = max(1, math.ceil(increments * abs(end - begin) - 1e-9))
     for share in np.linspace(begin, end, count + 1)[1:-1]:
         goal = replace(target, value=farthest * float(share) ** power)
-        walk.step_to(step.take_step(walk.problem, walk.state, goal))
-    walk.step_to(step.take_step(walk.problem, walk.state, target))
+        walk.step_to(take_step(walk.problem, walk.state, goal))
+    walk.step_to(take_step(walk.problem, walk.state, target))
 
 
 def _next_meeting(
@@ -249,10 +255,10 @@ def _next_meeting(
     for ring in np.flatnonzero(edge):
         goal = Touch(int(ring))
         # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
-        state = step.take_step(problem, onset, goal, same_contact=True)
+        state = take_step(problem, onset, goal, same_contact=True)
         in_tension = state.pressure.min() < -_PULL * state.pressure.max()
         if in_tension or _overlaps(problem, state):
-            state = step.take_step(problem, onset, goal)
+            state = take_step(problem, onset, goal)
         states.append(state)
     # A contact with a hole has two edges: what meets, or parts, first comes next.
     nearest = min if rising else max
