@@ -1,7 +1,5 @@
 """Results by their declared quantities: JSON, cells of tables, datasets, and data frames."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 

@@ -6,8 +6,6 @@ the stress changes with the load.  From lubricated loads, which bear no shear, f
 whether the interface yields normally.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Records of laws of the interface: their evidence, the slip length, and what it means."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from scipy.special import chdtrc
