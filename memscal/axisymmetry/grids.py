@@ -135,8 +135,10 @@ class Lattice:
 
     def __post_init__(self) -> None:
         if self.x.size % 2 == 0 or self.y.size % 2 == 0:
-            problem = f"A lattice of {self.y.size} by {self.x.size} points has no central point."
-            raise InputError(problem, cure="Use odd numbers of points.")
+            raise InputError(
+                f"A lattice of {self.y.size} by {self.x.size} points has no central point.",
+                cure="Use odd numbers of points.",
+            )
 
     @property
     def axes(self) -> tuple[FloatArray, FloatArray]:

@@ -105,8 +105,10 @@ class GaussianMixture:
                 f"{len(self.weights)} weights do not fit {len(self.sigmas)} widths of Gaussians."
             )
         if not abs(sum(self.weights) - 1) <= 1e-9:
-            problem = f"The weights of the Gaussians add up to {sum(self.weights):g}, not to 1."
-            raise InputError(problem, why="An apparatus function has unit integral.")
+            raise InputError(
+                f"The weights of the Gaussians add up to {sum(self.weights):g}, not to 1.",
+                why="An apparatus function has unit integral.",
+            )
         for sigma in self.sigmas:
             require_positive("width of a Gaussian", sigma, "m")
 

@@ -158,8 +158,9 @@ def comparison_figure(
     if name:
         figures = comparison_figures(comparison)
         if name not in figures:
-            problem = f"The comparison has no figure {name!r}."
-            raise InputError(problem, cure=f"Choose from {', '.join(figures)}.")
+            raise InputError(
+                f"The comparison has no figure {name!r}.", cure=f"Choose from {', '.join(figures)}."
+            )
         return figures[name]()
     if comparison.by_shear:
         raise InputError("There is no figure of a comparison by the shear alone.")

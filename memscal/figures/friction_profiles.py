@@ -70,15 +70,17 @@ def chosen(
     """Return the loads of one loading and lubrication, increasing; of the first by default."""
     loading = comparison.loadings[0] if loading is None else loading
     if loading not in comparison.loads:
-        problem = f"The loading {loading!r} was not compared."
-        cure = f"There is {', '.join(repr(name) for name in comparison.loadings)}."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            f"The loading {loading!r} was not compared.",
+            cure=f"There is {', '.join(repr(name) for name in comparison.loadings)}.",
+        )
     measured = [at_load.lubrication for at_load in comparison.loads[loading]]
     state = measured[0] if lubrication is None else lubrication
     if state not in measured:
-        problem = f"No profile is {lubricated_words(state)!r}."
-        cure = f"There is {', '.join(sorted({lubricated_words(name) for name in measured}))}."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            f"No profile is {lubricated_words(state)!r}.",
+            cure=f"There is {', '.join(sorted({lubricated_words(name) for name in measured}))}.",
+        )
     loads = [at_load for at_load in comparison.loads[loading] if at_load.lubrication == state]
     return sorted(loads, key=lambda at_load: at_load.load)
 

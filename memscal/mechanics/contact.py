@@ -187,8 +187,10 @@ class Contact(Result):
         """Return displacement and stress in the whole film, on the mesh of its finite elements."""
         mesh: Callable[[], FieldMesh] | None = getattr(self.inside, "mesh", None)
         if mesh is None:
-            problem = f'A contact that was solved with backend="{self.backend}" has no mesh.'
-            raise InputError(problem, cure='Press the indenter with backend="fem".')
+            raise InputError(
+                f'A contact that was solved with backend="{self.backend}" has no mesh.',
+                cure='Press the indenter with backend="fem".',
+            )
         return mesh()
 
     def profile(self, r: ArrayLike | None = None) -> StressProfile:
@@ -253,6 +255,8 @@ def _radii(r: ArrayLike) -> FloatArray:
     if not np.all(np.isfinite(radii)):
         raise InputError("A radius is not finite.", cure="Leave missing positions out.")
     if np.any(radii < 0):
-        cure = "Give distances from the indenter's axis, such as abs(x - centre)."
-        raise InputError(f"A radius is {radii.min():g} m, but radii are not negative.", cure=cure)
+        raise InputError(
+            f"A radius is {radii.min():g} m, but radii are not negative.",
+            cure="Give distances from the indenter's axis, such as abs(x - centre).",
+        )
     return radii

@@ -269,6 +269,7 @@ def _check_request(
             cure="Leave them out.",
         )
     if rings is not None and rings < _FEWEST_RINGS:
-        problem = f"rings is {rings}, but a contact takes at least {_FEWEST_RINGS}."
-        cure = "Leave it out: rings are then doubled until the contact has converged."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            f"rings is {rings}, but a contact takes at least {_FEWEST_RINGS}.",
+            cure="Leave it out: rings are then doubled until the contact has converged.",
+        )

@@ -55,9 +55,10 @@ class TabulatedField:
         return nodes.synthesise(values, np.ravel(r), order=order).reshape(np.shape(r))
 
     def _absent(self, *_: Any, **__: Any) -> NoReturn:
-        problem = "The table of rods holds the stress at the base alone."
-        cure = "Press the rod by memscal.indent, which solves the whole film."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            "The table of rods holds the stress at the base alone.",
+            cure="Press the rod by memscal.indent, which solves the whole film.",
+        )
 
     surface = pressure = shear = pressure_transform = shear_transform = _absent
     half_space_integrals = _absent

@@ -137,10 +137,11 @@ def correlated(comparison: FrictionComparison) -> dict[str, Any]:
                 budget[source, lubrication if source in _SCAN_SOURCES else ""] = u
             budgets.append(budget)
     if not names:
-        problem = "No friction coefficient of all loads has a standard uncertainty."
-        why = "; ".join(estimate.reason for *_, estimate in _joint(comparison))
-        cure = "Use summary() or to_dict(), which give its bounds."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            "No friction coefficient of all loads has a standard uncertainty.",
+            why="; ".join(estimate.reason for *_, estimate in _joint(comparison)),
+            cure="Use summary() or to_dict(), which give its bounds.",
+        )
     sources = set().union(*budgets)
     shares = np.array([[budget.get(source, 0.0) for source in sources] for budget in budgets])
     # The budget is linear; the standard uncertainty is that of the likelihood.

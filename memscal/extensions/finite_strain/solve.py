@@ -81,9 +81,11 @@ def press_at_finite_strain(request: RingRequest) -> tuple[Contact, ...]:
             cure='Use friction 0 and inf, which bracket the others, or strain="linear".',
         )
     if not isinstance(indenter, Rod | Sphere):
-        problem = f"At finite strain a {indenter.shape} cannot be pressed on the film."
-        why = "Only a rod and a sphere are modelled there."
-        raise DomainError(problem, why=why, cure='Press it with strain="linear".')
+        raise DomainError(
+            f"At finite strain a {indenter.shape} cannot be pressed on the film.",
+            why="Only a rod and a sphere are modelled there.",
+            cure='Press it with strain="linear".',
+        )
     if math.isinf(friction) and request.loading == "incremental" and isinstance(indenter, Sphere):
         raise DomainError(
             f'At finite strain a {indenter.shape} that sticks is solved for loading="total" only.',

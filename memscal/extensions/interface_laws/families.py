@@ -78,8 +78,9 @@ def normal_compliance_family(
         lengths = [share * (film.roughness_rms or _USUAL_ROUGHNESS) for share in _LENGTHS]
     values = parameter_values("lengths of the normal compliance", lengths)
     if math.isinf(values[-1]):
-        problem = "A length of the normal compliance is infinite: such a film bears no load."
-        raise InputError(problem)
+        raise InputError(
+            "A length of the normal compliance is infinite: such a film bears no load."
+        )
     paths = []
     for length in values:
         interface = Interface()

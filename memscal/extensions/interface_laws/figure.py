@@ -41,8 +41,10 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
         laws = comparison
         loads = ()
     if laws is None:
-        cure = "Compare with interface=True and a macroscopic friction coefficient."
-        raise InputError("There is no law of the interface to draw.", cure=cure)
+        raise InputError(
+            "There is no law of the interface to draw.",
+            cure="Compare with interface=True and a macroscopic friction coefficient.",
+        )
     slip = laws.tangential
     implied = None if slip is None else slip.implied
     columns = 2 if implied is None else 3

@@ -148,8 +148,9 @@ def compare_interface(
 ) -> InterfaceComparison:
     """Weigh laws of the interface; a family without a load within 1 % of each is calculated."""
     if not profiles:
-        problem = "Laws of the interface are compared with measured profiles, but none is given."
-        raise InputError(problem)
+        raise InputError(
+            "Laws of the interface are compared with measured profiles, but none is given."
+        )
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)

@@ -117,8 +117,11 @@ def run_meshio(
     header = json.loads(np.load(answer, allow_pickle=False).tobytes())
     if "error" in header:
         kind_of_error = UnsafeFileError if header["unsafe"] else FormatError
-        why = f"The reader says: {printable(header['error'], _MAX_REASON)}."
-        raise kind_of_error(f"{name} cannot be read as a mesh.", why=why, cure=_AS_VTU)
+        raise kind_of_error(
+            f"{name} cannot be read as a mesh.",
+            why=f"The reader says: {printable(header['error'], _MAX_REASON)}.",
+            cure=_AS_VTU,
+        )
     numbers = []
     while answer.tell() < len(answer.getbuffer()):
         numbers.append(np.load(answer, allow_pickle=False))
@@ -147,18 +150,22 @@ def _run(parts: Iterable[bytes | memoryview], seconds: float, name: str) -> byte
     except subprocess.TimeoutExpired:
         late = True
     except OSError as error:
-        problem = "A mesh is read by a process of its own, which cannot be started."
-        why = f"The system says: {error.strerror or error}."
-        cure = "Run memscal where Python may start itself, with space in the temporary folder "
-        cure += "(TMPDIR) for a copy of the mesh."
-        raise InputError(problem, why=why, cure=cure) from error
+        raise InputError(
+            "A mesh is read by a process of its own, which cannot be started.",
+            why=f"The system says: {error.strerror or error}.",
+            cure="Run memscal where Python may start itself, with space in the temporary folder "
+            "(TMPDIR) for a copy of the mesh.",
+        ) from error
     if late:
-        problem = f"Reading {name} takes longer than {seconds:.3g} s."
-        raise UnsafeFileError(problem, why="It was ended.", cure=_AS_VTU)
+        raise UnsafeFileError(
+            f"Reading {name} takes longer than {seconds:.3g} s.", why="It was ended.", cure=_AS_VTU
+        )
     if done.returncode:
-        problem = f"The process that read {name} was ended by an error ({done.returncode})."
-        why = "The mesh is damaged, or larger than the memory that its file's size allows."
-        raise UnsafeFileError(problem, why=why, cure=_AS_VTU)
+        raise UnsafeFileError(
+            f"The process that read {name} was ended by an error ({done.returncode}).",
+            why="The mesh is damaged, or larger than the memory that its file's size allows.",
+            cure=_AS_VTU,
+        )
     return done.stdout
 
 
@@ -244,8 +251,10 @@ def read_mesh(path: FilePath) -> Mesh:
 
 def _require_meshio() -> None:
     if importlib.util.find_spec("meshio") is None:
-        problem = "Meshes are read and written with meshio, which is not installed."
-        raise InputError(problem, cure='Install it with: pip install "memscal[fem-io]"')
+        raise InputError(
+            "Meshes are read and written with meshio, which is not installed.",
+            cure='Install it with: pip install "memscal[fem-io]"',
+        )
 
 
 def _checked(
@@ -309,9 +318,11 @@ def _fields(fields: dict[str, NDArray[Any]], count: int) -> dict[str, FloatArray
 
 
 def _unusable(source: SourceFile, content: str) -> FormatError:
-    why = "A stress at the base cannot be found in it."
-    cure = "Save the mesh again, as an unstructured grid (.vtu)."
-    return FormatError(f"{source.file_name} has {content}.", why=why, cure=cure)
+    return FormatError(
+        f"{source.file_name} has {content}.",
+        why="A stress at the base cannot be found in it.",
+        cure="Save the mesh again, as an unstructured grid (.vtu).",
+    )
 
 
 def write_mesh(mesh: FieldMesh, path: FilePath, *, overwrite: bool = False) -> None:
@@ -333,8 +344,10 @@ def write_mesh(mesh: FieldMesh, path: FilePath, *, overwrite: bool = False) -> N
             meshio.vtu.write(str(plain), written)
             data = plain.read_bytes()
     except OSError as error:
-        problem = f"The mesh cannot be written to the temporary folder: {error.strerror}."
-        raise OutputError(problem, cure="Free some space there, or set TMPDIR.") from error
+        raise OutputError(
+            f"The mesh cannot be written to the temporary folder: {error.strerror}.",
+            cure="Free some space there, or set TMPDIR.",
+        ) from error
     head, grid, body = data.partition(b"<UnstructuredGrid>")
     words = (
         f"Written by memscal {__version__}: an axisymmetric section, x = radius and y = height "

@@ -55,8 +55,10 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     tolerance = _TOLERANCE * np.abs(inside).max()
     varying = [i for i in range(3) if np.ptp(inside[:, i]) > tolerance]
     if len(varying) < 2:
-        cure = "Give a section of the film from the axis outward, or the film in 3-D."
-        raise InputError(f"{name} holds a mesh that is a line or a point.", cure=cure)
+        raise InputError(
+            f"{name} holds a mesh that is a line or a point.",
+            cure="Give a section of the film from the axis outward, or the film in 3-D.",
+        )
     up = varying[-1] if vertical is None else AXES.find(vertical)
     if up not in varying:
         raise InputError(
@@ -140,8 +142,10 @@ def average_over_circles(
     try:
         fields = LinearNDInterpolator(distinct * reach, at_places)(points)
     except QhullError as error:
-        cure = "Name the axis across the film (vertical; --vertical)."
-        raise InputError("The nodes on the base of the film lie on one line.", cure=cure) from error
+        raise InputError(
+            "The nodes on the base of the film lie on one line.",
+            cure="Name the axis across the film (vertical; --vertical).",
+        ) from error
     # Circles of which less than half as much is inside as of others are left out: the corners.
     share = np.isfinite(fields[..., 0]).sum(axis=1)
     kept = share >= max(1, share.max() / 2)
@@ -186,8 +190,10 @@ def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
     name, _, number = field.rpartition(":")
     if field not in counts and name in counts and number.isdecimal():
         if not 1 <= int(number) <= counts[name]:
-            problem = f"The field {name!r} in {mesh.source.file_name} has no component {number}."
-            raise InputError(problem, why=f"It has {counts[name]}, counted from 1.")
+            raise InputError(
+                f"The field {name!r} in {mesh.source.file_name} has no component {number}.",
+                why=f"It has {counts[name]}, counted from 1.",
+            )
         return Component(name, name in at_points, int(number) - 1, f"component {number}")
     if field not in counts:
         raise _no_such_field(mesh, field, at_points, in_cells)
@@ -239,9 +245,11 @@ def _no_such_field(
     has = "has no fields at all"
     if lists:
         has = f"has, with their numbers of components, {'; '.join(lists)}"
-    problem = f"{mesh.source.file_name} has no field {printable(field, 80)!r}."
-    cure = "Give the name of the stress among them, or save the mesh with its stress."
-    return InputError(problem, why=f"It {has}.", cure=cure)
+    return InputError(
+        f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
+        why=f"It {has}.",
+        cure="Give the name of the stress among them, or save the mesh with its stress.",
+    )
 
 
 _FEWEST_RADII = 3
@@ -274,13 +282,17 @@ def read_reference_mesh(
     normal = _find(mesh, frame, sigma, frame.vertical)
     section = len(frame.radial) == 1
     if section and centre is not None:
-        problem = f"A centre was given, but the mesh in {name} is a section."
-        cure = "Leave out the centre (--centre), or shift the mesh."
-        raise InputError(problem, why="The axis of a section is at radius 0.", cure=cure)
+        raise InputError(
+            f"A centre was given, but the mesh in {name} is a section.",
+            why="The axis of a section is at radius 0.",
+            cure="Leave out the centre (--centre), or shift the mesh.",
+        )
     if not section and shear is not None:
-        problem = f"A shear field was given, but the mesh in {name} is a body in 3-D."
-        cure = "Leave it out (shear; --shear), or give a section of the film."
-        raise InputError(problem, why="The radial shear is read from sections only.", cure=cure)
+        raise InputError(
+            f"A shear field was given, but the mesh in {name} is a body in 3-D.",
+            why="The radial shear is read from sections only.",
+            cure="Leave it out (shear; --shear), or give a section of the film.",
+        )
     tangential = _shear_component(mesh, frame, normal, shear) if section else None
     footing = find_base(mesh, frame, base)
     places, values = _at_base(mesh, frame, footing, normal)
@@ -321,9 +333,10 @@ def _along_radius(
         r = np.where(np.abs(places[:, 0]) <= frame.tolerance, 0.0, places[:, 0])
         distinct = 1 + np.count_nonzero(np.diff(np.sort(r)) > frame.tolerance)
         if distinct < _FEWEST_RADII:
-            problem = f"The base in {samples.source.file_name} has values at {distinct} radii only."
-            cure = "Name the axis across the film (vertical; --vertical), or give a finer mesh."
-            raise InputError(problem, cure=cure)
+            raise InputError(
+                f"The base in {samples.source.file_name} has values at {distinct} radii only.",
+                cure="Name the axis across the film (vertical; --vertical), or give a finer mesh.",
+            )
         return replace(samples, columns={"r": r, **samples.columns})
     reference.require_numbers(samples)  # a mean would leave out what is missing
     columns, note = average_over_circles(places - np.array(centre), samples.columns)

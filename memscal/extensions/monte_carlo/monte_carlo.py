@@ -372,9 +372,11 @@ def monte_carlo(
         else:
             rows.append(result)
     if len(rows) < 2:
-        problem = f"{len(failures)} of {draws} draws could not be calibrated."
-        cure = "The scan is close to failing, too; measure with less noise."
-        raise FitError(problem, why=f"The first one: {failures[0]}", cure=cure)
+        raise FitError(
+            f"{len(failures)} of {draws} draws could not be calibrated.",
+            why=f"The first one: {failures[0]}",
+            cure="The scan is close to failing, too; measure with less noise.",
+        )
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
     expected = expected_values(solution)
     deconvolution = solution.deconvolution

@@ -88,8 +88,10 @@ class Plan:
         require_positive("conversion constant", self.conversion_constant, "V/Pa")
         require_non_negative("relative standard uncertainty of the load", self.load_uncertainty)
         if self.repeats < 1 or self.repeats != int(self.repeats):
-            cure = "Give a whole number of repeats, one or more."
-            raise InputError(f"The scan would be repeated {self.repeats} times.", cure=cure)
+            raise InputError(
+                f"The scan would be repeated {self.repeats} times.",
+                cure="Give a whole number of repeats, one or more.",
+            )
         noise = self.noise if self.noise_voltage is None else self.noise_voltage
         if not 0 < noise < math.inf:
             raise InputError(
@@ -310,20 +312,28 @@ def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, fl
     for name, value in want.items():
         full = TARGETS.get(name, name)
         if full not in TARGETS.values():
-            problem = f"The design is wanted to reach {name!r}, which is no known target."
-            raise InputError(problem, cure=f"Choose from {', '.join(TARGETS)}.")
+            raise InputError(
+                f"The design is wanted to reach {name!r}, which is no known target.",
+                cure=f"Choose from {', '.join(TARGETS)}.",
+            )
         if not 0 < value < np.inf:
             raise InputError(f"The {name} that is wanted is {value:g}, but it must be above zero.")
         if value >= 1 and full != TARGETS["resolved"]:
-            problem = f"The {name} is wanted to {value:.0%}, which is no uncertainty of use."
-            raise InputError(problem, cure="Give the relative uncertainty: 0.01 is 1 %.")
+            raise InputError(
+                f"The {name} is wanted to {value:.0%}, which is no uncertainty of use.",
+                cure="Give the relative uncertainty: 0.01 is 1 %.",
+            )
         named[full] = value
     if vary is not None and vary not in VARIED:
-        cure = f"Choose from {', '.join(VARIED)}."
-        raise InputError(f"The design is to vary {vary!r}, which cannot be varied.", cure=cure)
+        raise InputError(
+            f"The design is to vary {vary!r}, which cannot be varied.",
+            cure=f"Choose from {', '.join(VARIED)}.",
+        )
     if bool(named) != (vary is not None):
-        cure = f"Give both want and vary (one of {', '.join(VARIED)}), or neither."
-        raise InputError("want and vary go together: a target needs something to vary.", cure=cure)
+        raise InputError(
+            "want and vary go together: a target needs something to vary.",
+            cure=f"Give both want and vary (one of {', '.join(VARIED)}), or neither.",
+        )
     return named
 
 
@@ -404,8 +414,10 @@ def _in_words(name: str, value: float) -> str:
 
 def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) -> FitError:
     if not tried:
-        cure = "Plan more repeats, less noise, a larger load or a larger half range."
-        return FitError(f"No {what} makes a scan that can be calibrated with.", cure=cure)
+        return FitError(
+            f"No {what} makes a scan that can be calibrated with.",
+            cure="Plan more repeats, less noise, a larger load or a larger half range.",
+        )
     name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
     by_reached = partial(_reached, name=name)
     best = min(tried, key=by_reached)
@@ -425,8 +437,12 @@ def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) 
         step = best.plan.step
         sampled = np.pi / step
         if best.resolved_wavenumber >= 0.99 * sampled:
-            why = f"A step of {step * 1e3:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
-            return FitError(problem, why=why, cure="Plan a finer step.")
+            return FitError(
+                problem,
+                why=f"A step of {step * 1e3:.4g} mm samples no more than {sampled * 1e-3:.4g} "
+                "rad/mm.",
+                cure="Plan a finer step.",
+            )
         return FitError(
             problem,
             why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "

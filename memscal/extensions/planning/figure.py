@@ -43,8 +43,10 @@ _CURVES = (
 def design_figure(planned: Design, vary: str = "step") -> Figure:
     """Draw G, its transfer function, and uncertainties of A and sigma against what is varied."""
     if vary not in _AXES:
-        problem = f"The figure is to vary {vary!r}, which cannot be varied."
-        raise InputError(problem, cure=f"Choose from {', '.join(_AXES)}.")
+        raise InputError(
+            f"The figure is to vary {vary!r}, which cannot be varied.",
+            cure=f"Choose from {', '.join(_AXES)}.",
+        )
     with panels_of(2.9, 1, 3) as (figure, panels):
         _draw_radial(panels[0], planned)
         _draw_transfer(panels[1], planned)

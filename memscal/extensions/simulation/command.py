@@ -316,8 +316,9 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
         if experiment == "sphere" and len(set(options[name])) < len(options[name]):
-            problem = "A load of the sphere is given twice: give it once, and --repeats."
-            raise click.UsageError(problem)
+            raise click.UsageError(
+                "A load of the sphere is given twice: give it once, and --repeats."
+            )
 
 
 def _require_writable_folder(target: Path, *, overwrite: bool) -> None:
@@ -326,9 +327,11 @@ def _require_writable_folder(target: Path, *, overwrite: bool) -> None:
         ensure_writable(target)
         return
     if not target.is_dir():
-        why = "An experiment is several scans, each a file of its own."
-        cure = "Give the name of a folder; a new one is made."
-        raise OutputError(f"The output {target} is not a folder.", why=why, cure=cure)
+        raise OutputError(
+            f"The output {target} is not a folder.",
+            why="An experiment is several scans, each a file of its own.",
+            cure="Give the name of a folder; a new one is made.",
+        )
     for name in FILES:
         ensure_writable(target / name, overwrite=overwrite)
 

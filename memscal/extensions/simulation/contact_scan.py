@@ -116,8 +116,10 @@ def simulate_contacts(
 def _require_row(loads: FloatArray, points: int, spacing: float, repeats: int, seed: int) -> None:
     """Refuse a row of contacts that is none."""
     if np.unique(loads).size != loads.size:
-        problem = f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N."
-        raise InputError(problem, cure="Give each load once, and the number of its repeats.")
+        raise InputError(
+            f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",
+            cure="Give each load once, and the number of its repeats.",
+        )
     require_range("spacing", spacing, 1e-9, 0.1, "m")
     if points < 2 or repeats < 1 or seed < 0:
         raise InputError(

@@ -32,9 +32,11 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
     # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
     integral = kernel.transform(np.array([1e-2]))[0]
     if not abs(integral - 1) <= 1e-6:
-        problem = f"The kernel's transform is {integral:g} at k = 0, not 1."
-        cure = "Divide the kernel by its integral; the conversion constant carries the size."
-        raise InputError(problem, why="An apparatus function has unit integral.", cure=cure)
+        raise InputError(
+            f"The kernel's transform is {integral:g} at k = 0, not 1.",
+            why="An apparatus function has unit integral.",
+            cure="Divide the kernel by its integral; the conversion constant carries the size.",
+        )
     return kernel
 
 

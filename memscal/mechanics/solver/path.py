@@ -41,10 +41,11 @@ def _mixture(lower: ContactState, upper: ContactState, target: Target) -> Contac
     end = _reached(upper, target)
     share = (target.value - begin) / (end - begin)
     if not 0 <= share <= 1:
-        problem = f"No contact was found at {target}."
-        why = f"It should lie from {begin:.6g} to {end:.6g}, where two neighbouring rings touch."
-        cure = "Try another number of rings, or a friction coefficient nearby."
-        raise ConvergenceError(problem, why=why, cure=cure)
+        raise ConvergenceError(
+            f"No contact was found at {target}.",
+            why=f"It should lie from {begin:.6g} to {end:.6g}, where two neighbouring rings touch.",
+            cure="Try another number of rings, or a friction coefficient nearby.",
+        )
     mixed = {
         name: (1 - share) * getattr(lower, name) + share * getattr(upper, name)
         for name in ("pressure", "shear", "depth", "load", "anchor", "outward")
