@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 #: Directions over which a field of a lattice is averaged.
 _DIRECTIONS = 64
@@ -122,7 +122,7 @@ class EvenGrid:
         return ((even + even[:, ::-1]) / 2)[self.count - 1 :, self.count - 1 :]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Lattice:
     """A rectangular lattice for a raster: odd numbers of even positions about the axis, in m.
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -26,7 +25,7 @@ import numpy as np
 from scipy.special import j0, j1, jv
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, table_spline
+from memscal.model.arrays import FloatArray, array_record, table_spline
 
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
@@ -69,7 +68,7 @@ _TABLE_PHASE = 40.0
 _MOST_KEPT = 300_000
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Wavenumbers:
     r"""Quadrature nodes ``k`` (rad/m), weights :math:`k\,dk/2\pi` of the inverse transform."""
 
@@ -96,7 +95,7 @@ class Wavenumbers:
         return matrix @ (spectrum.T * self.weights).T
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class RadialSpectrum:
     """A radial function (a vector field's component for order 1) by its transform at nodes."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chndtr, i0e, j0, j1
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, require_positive
+from memscal.model.arrays import FloatArray, array_record, require_positive
 
 #: Beyond its edge by so many widths of the blur nothing is left of a disc.
 _FARTHEST = 9.0
@@ -187,7 +187,7 @@ class SmoothedDisc:
         }
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Rings:
     """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,)."""
 

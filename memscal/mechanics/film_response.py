@@ -40,7 +40,6 @@ the oscillation of the Bessel functions.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Protocol
 
@@ -49,7 +48,7 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
 from memscal.mechanics import surface
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
@@ -193,7 +192,7 @@ def base_stress(
     return stress.reshape(np.shape(r))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class RingTraction:
     """Pressure and outward shear (Pa) linear between rings (m, from 0), zero beyond the last."""
 
@@ -263,7 +262,7 @@ def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     return surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class HankelFilm:
     """A bonded film of infinite extent with tractions on rings of radii ``r`` (m), from 0."""
 
@@ -290,7 +289,7 @@ class HankelFilm:
         return HankelField(self.film, RingTraction(self.r, pressure, shear))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class HankelField:
     """The field in a film under a traction; base stresses below 1e-13 of their peak are zero."""
 

@@ -19,7 +19,7 @@ incompressible).  A sticking compressible film has an oscillating edge, exponent
 :math:`-1/2 \pm i\ln(3-4\nu)/2\pi`: the number of terms is doubled until the base stress settles.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -33,7 +33,7 @@ from memscal.mechanics.film_response import (
     corrections,
     half_space_coupling,
 )
-from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, array_record
 from memscal.model.film import ElasticFilm
 
 
@@ -122,7 +122,7 @@ _LARGEST_KH = 22.0
 _CHUNK = 8192
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class RodTraction:
     """Traction under a rod of ``radius`` (m) and ``load`` (N): coefficients a_n and b_n."""
 
@@ -185,7 +185,7 @@ class RodTraction:
         return ratio, m, under, self.load / (2 * np.pi * self.radius**2)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class RodSolution:
     """Solution of the rod problem for one geometry, free of load and modulus."""
 

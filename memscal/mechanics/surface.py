@@ -19,17 +19,16 @@ into the film) and the outward displacement :math:`u`.  Of a half-space they are
 integrated with nodes that crowd there, others by a plain Gauss rule; both to about 1e-11.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from scipy.special import ellipe, ellipkm1
 
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class SurfaceCompliance:
     """Displacements at the rings by unit traction of every ring: (n, n) matrices in m/Pa."""
 

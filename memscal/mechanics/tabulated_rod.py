@@ -9,7 +9,6 @@ splines over the cube root of the depth: the contact grows around a rounded edge
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NoReturn
@@ -19,7 +18,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
@@ -31,7 +30,7 @@ _ACCURACY = 2e-3
 _STEPS = np.linspace(0.0, 1.0, 65)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class TabulatedField:
     """Base stress of a rod by its transforms (N) at wavenumbers (rad/m), and nothing else."""
 

@@ -3,8 +3,8 @@
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,14 @@ from memscal.errors import InputError, UnitWarning
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
+
+_Class = TypeVar("_Class")
+
+
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
+def array_record(cls: type[_Class]) -> type[_Class]:
+    """Make a class a frozen dataclass that equals itself alone: arrays have no single truth."""
+    return dataclass(frozen=True, eq=False)(cls)
 
 
 #: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.

@@ -26,7 +26,7 @@ import numpy as np
 from scipy import sparse
 
 from memscal.mechanics.elements.mesh import graded
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
@@ -195,7 +195,7 @@ def _tensor(even: FloatArray, side: float, reach: float, size: FilmSize) -> Any:
 _QUADRATURE = 5
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class FilmElements:
     """Forces for the unknowns (n radial and n upward displacements in mm, m pressures in MPa)."""
 

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements
 from memscal.mechanics.solver.step import Load, Target
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class NewtonError(ConvergenceError):
     """Newton's method found no equilibrium from where it started: load in smaller steps."""
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Pressed:
     """A film under an indenter."""
 
@@ -114,7 +114,7 @@ class Pressed:
     load: float = 0.0  # N
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Tangent:
     """The forces' change with what is free and with the depth, at a state."""
 
@@ -124,7 +124,7 @@ class _Tangent:
     stiffness: float  # load per depth
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Pressing:
     """A film, an indenter, and whether the surface sticks to it."""
 

@@ -8,7 +8,7 @@ whether the interface yields normally.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -43,7 +43,7 @@ from memscal.friction.marginal_likelihood import (
     log_uniform_prior,
 )
 from memscal.friction.results import BoundedEstimate, Interval
-from memscal.model.arrays import BoolArray, FloatArray, require_positive
+from memscal.model.arrays import BoolArray, FloatArray, array_record, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
@@ -230,7 +230,7 @@ def _messages(
             )
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class LawCurve:
     """The likelihood of a law along its parameter, at M values."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from scipy.special import chdtrc
 
 from memscal.friction.results import BoundedEstimate
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.bayes_factor import POSITIVE, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.result import Result
@@ -36,7 +36,7 @@ class InterfaceLaw:
         return float(chdtrc(self.degrees, self.least)) if self.degrees > 0 else 1.0
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ImpliedFriction:
     r"""What the fitted slip length means at each of ``loads`` (l,), in N, increasing.
 
@@ -52,7 +52,7 @@ class ImpliedFriction:
     stiffnesses: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class LawComparison:
     """Laws of the interface over all ``loads`` (l,), in N, of one lubrication.
 

@@ -16,7 +16,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.units import from_si
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
@@ -186,7 +185,7 @@ def is_mesh(path: FilePath) -> bool:
     return ending in _KINDS or ending in _OTHERS
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Cells:
     """Cells of one kind: their nodes, by rows, and the fields given for each of them."""
 
@@ -195,7 +194,7 @@ class Cells:
     data: dict[str, FloatArray]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Mesh:
     """A mesh and its fields as stored."""
 

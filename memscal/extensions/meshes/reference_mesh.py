@@ -10,7 +10,7 @@ from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
 from memscal.formats.files import FilePath
 from memscal.formats.tables import reference
 from memscal.formats.units import to_si
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.checks import Message, import_notes
 from memscal.model.notation import printable
 
@@ -22,7 +22,7 @@ _CIRCLES = 501
 _DIRECTIONS = 72
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Frame:
     """How a mesh lies in space: ``points`` (n, 3) and ``tolerance`` in m, and its axes."""
 
@@ -38,7 +38,7 @@ class Frame:
         return self.points[:, self.vertical]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Base:
     """Nodes on the base, cells with a side there and that side's middle; 1 or -1 is outward."""
 

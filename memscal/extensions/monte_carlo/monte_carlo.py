@@ -26,7 +26,7 @@ from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.points import measured_mask
 from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, rod_spectrum
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
@@ -53,7 +53,7 @@ class SolvedInput:
         return np.asarray(ndtri(low + (high - low) * ndtr(standard)))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class DrawnScans:
     """Model that turns random numbers into scans of a calibrated sensor, and calibrates them."""
 
@@ -213,7 +213,7 @@ _NOT_LINEAR = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class BudgetComparison:
     """One parameter by draws and by the first-order budget, in its SI unit."""
 

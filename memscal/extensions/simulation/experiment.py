@@ -22,7 +22,7 @@ from memscal.extensions.simulation.disturbances import (
 )
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate, without_law
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import require_non_negative
+from memscal.model.arrays import array_record, require_non_negative
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.instrument import LoadCell
@@ -75,7 +75,7 @@ def drawn(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Experiment:
     """The scans of one synthetic experiment, with one sensor on one film.
 

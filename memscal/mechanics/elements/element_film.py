@@ -21,7 +21,6 @@ the base does the same work as the forces that hold its nodes; its integral is t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -33,7 +32,7 @@ from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.progress import Task
@@ -44,7 +43,7 @@ _SMOOTH_DEGREE = 5
 _ORDER = 5
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class QuarticLine:
     """Quartics on a straight side of a mesh; ``r`` are corners and quarters, shape (4 m + 1,)."""
 
@@ -117,7 +116,7 @@ def smooth(
 _QUADRATURE = 8
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class MixedSystem:
     """The equations of a bonded film with a free edge, in film thicknesses, and their factors."""
 
@@ -276,7 +275,7 @@ _BATCH = 128
 _PER_NODE = 4
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ElementFilm:
     """A bonded film with tractions on rings ``r`` (m, from 0) and a free edge at ``radius`` (m)."""
 
@@ -342,7 +341,7 @@ class ElementFilm:
         return ElementField(self.film, self.radius, self.system, solution[:, 0])
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ElementField:
     """The field in a film under a traction, zero beyond the film's edge at ``radius`` (m)."""
 

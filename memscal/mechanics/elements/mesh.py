@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
@@ -41,7 +41,7 @@ _EVEN_STEPS = 3
 _ROOM = 0.2
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class TriangleMesh:
     """Nodes (radius and depth, shape (n, 2)) and the corners of triangles (shape (m, 3))."""
 

@@ -20,6 +20,7 @@ from memscal.mechanics.solver.step import (
     Touch,
     take_step,
 )
+from memscal.model.arrays import array_record
 from memscal.progress import Task
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
@@ -106,7 +107,7 @@ def _between_rings(
 _STEPS_OF_A_FIXED_CONTACT = 24
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class PathPoint:
     """A state that was asked for, and what happened on the way to it; energies in J."""
 

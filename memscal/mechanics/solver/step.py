@@ -32,11 +32,11 @@ import numpy as np
 from memscal.errors import ConvergenceError
 from memscal.mechanics.interface import Interface, NormalLaw
 from memscal.mechanics.surface import SurfaceCompliance
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.film import ElasticFilm
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ContactProblem:
     """A film, an indenter and what is between them."""
 
@@ -57,7 +57,7 @@ class ContactProblem:
         return self.heights - state.depth + w
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ContactState:
     """A contact in equilibrium, as arrays over the rings."""
 
@@ -96,7 +96,7 @@ Target = Load | Depth
 Goal = Load | Depth | Touch
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Status:
     """Status and trial values of the n rings while the equations are solved."""
 
