@@ -3,7 +3,7 @@
 import math
 import textwrap
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,7 +44,7 @@ from memscal.readings.find_places import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_name
 from memscal.summaries.table import verdict
 
-_Line: TypeAlias = tuple[str, str, str]  # text, colour and weight
+_Line = tuple[str, str, str]  # text, colour and weight
 _MOST_DRAWN = 5_000  # points of lines
 _FINE = 401  # points of the curves of G and its transform
 _LOG_DECADES = 4.0

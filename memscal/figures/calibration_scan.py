@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle, pairwise
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,8 +29,8 @@ from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.quantities import KPA, MM
 
-Loads: TypeAlias = Sequence[tuple[str, ApparatusData]]  # each load's text and points
-_Look: TypeAlias = tuple[str, str]  # colour and marker
+Loads = Sequence[tuple[str, ApparatusData]]  # each load's text and points
+_Look = tuple[str, str]  # colour and marker
 MOST_PANELS = 6
 """Loads that are drawn in panels of their own and named."""
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, TypeAlias
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -230,7 +230,7 @@ class Contact(Result):
         return self.profile(radii[:last])
 
 
-BaseStress: TypeAlias = StressProfile | Contact
+BaseStress = StressProfile | Contact
 """A calculated stress at the base of a film, as a table or as the contact itself."""
 
 

@@ -253,7 +253,7 @@ def hat_transform(ring_bytes: bytes, k_bytes: bytes, order: int) -> FloatArray:
     k = np.frombuffer(k_bytes)
     widths = np.diff(rings)
     # Gauss nodes between the rings, enough for the largest wavenumber in the widest gap.
-    count = 4 + math.ceil(0.7 * float(k.max() * widths.max()))
+    count = 4 + math.ceil(0.7 * (k.max() * widths.max()))
     s, weights = gauss_between(rings, count)
     rising = ((s.reshape(widths.size, count) - rings[:-1, None]) / widths[:, None]).ravel()
     waves = bessel(order, np.multiply.outer(k, s)) * (weights * s)
@@ -308,7 +308,7 @@ class HankelField:
         """Return depression or outward displacement of the surface in m."""
         x = np.ravel(r)
         traction = self.traction
-        k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
+        k, weights = _wavenumbers(self.film, x.max(initial=0.0) + traction.radius)
         transforms = traction.pressure_transform(k), traction.shear_transform(k)
         half_space = traction.half_space_integrals(x)
         displaced = _displacements(self.film, x, (k, weights), transforms, half_space)

@@ -84,7 +84,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
     # Miller's backward recurrence j_(l-1) = (2l+1) j_l/x - j_(l+1), normalised by the sum of
     # (2l+1) j_l^2, which is 1.  One sweep serves all orders.
     x = np.maximum(x, 1e-30)
-    largest = float(np.max(x, initial=0.0))
+    largest = np.max(x, initial=0.0)
     # From here upward the functions are below 1e-16 (Airy decay beyond the turning point).
     start = max(count, int(largest + 15 * (largest / 2) ** (1 / 3))) + 30
     rows = np.zeros((count, x.size))

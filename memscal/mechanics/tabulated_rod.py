@@ -49,7 +49,7 @@ class TabulatedField:
 
     def base(self, r: FloatArray, order: int) -> FloatArray:
         """Return normal stress or outward traction at the base in Pa."""
-        nodes = Wavenumbers.covering(float(self.k[-1]), float(np.max(r, initial=self.radius)))
+        nodes = Wavenumbers.covering(self.k[-1], np.max(r, initial=self.radius))
         values = self.spectrum(nodes.k, order)
         return nodes.synthesise(values, np.ravel(r), order=order).reshape(np.shape(r))
 
@@ -143,10 +143,10 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> tuple[_Rows, fl
     # How many depths each column has; the rod's ends where the first of its neighbours does.
     reached = np.isfinite(columns[..., 0]).sum(axis=-1)
     # The interval of each axis that the rod lies in.
-    i = int(np.searchsorted(ratios[1:-1], poisson, side="right"))
-    j = int(np.searchsorted(radii[1:-1], radius, side="right"))
+    i = np.searchsorted(ratios[1:-1], poisson, side="right")
+    j = np.searchsorted(radii[1:-1], radius, side="right")
     ends = reached[i : i + 2, j : j + 2].min(axis=1)
-    count = int(ends[_polynomial(tuple(ratios[i : i + 2]), poisson) != 0].min())
+    count = ends[_polynomial(tuple(ratios[i : i + 2]), poisson) != 0].min()
     if count < _STENCIL:
         return None
     rows = np.empty((count, columns.shape[-1]))
@@ -166,7 +166,7 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> tuple[_Rows, fl
     return spline, float(depths[count - 1])
 
 
-def _nearest(nodes: Any, place: int) -> list[int]:
+def _nearest(nodes: Any, place: Any) -> list[int]:
     """Return up to four of the nodes around the interval after a place."""
     order = sorted(nodes.tolist(), key=lambda node: abs(node - place - 0.5))
     return sorted(order[:_STENCIL])

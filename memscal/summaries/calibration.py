@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from memscal.calibration.calibrate import Calibration
 from memscal.calibration.stages import Misfit
@@ -33,7 +33,7 @@ from memscal.summaries.declared import (
 )
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of, verdict
 
-Calibrated: TypeAlias = Calibration | ApparatusData
+Calibrated = Calibration | ApparatusData
 
 _BY_METHOD = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
 #: What scans tell of the film, where they do.

@@ -49,16 +49,16 @@ _QUANTITIES = (
 def tables(planned: Design) -> list[Table]:
     """Return the plan, the expected parameters, and the sources of their uncertainties."""
     plan = planned.plan
-    words = {quantity.name: quantity.words for quantity in PLAN}
     noise = f"{plan.point_noise / MV:.3g} mV ({plan.point_noise / plan.signal * 100:.3g} %)"
-    rows = [
-        (words["positions"], f"{plan.positions}, every {plan.step / MM:.4g} mm"),
-        (words["half_range"], f"{plan.half_range / MM:.4g} mm"),
-        (words["repeats"], f"{plan.repeats}"),
-        (words["load"], f"{plan.load:.4g} N"),
-        (words["signal"], f"{plan.signal / MV:.4g} mV"),
-        (words["point_noise"], noise),
-    ]
+    shown = {
+        "positions": f"{plan.positions}, every {plan.step / MM:.4g} mm",
+        "half_range": f"{plan.half_range / MM:.4g} mm",
+        "repeats": f"{plan.repeats}",
+        "load": f"{plan.load:.4g} N",
+        "signal": f"{plan.signal / MV:.4g} mV",
+        "point_noise": noise,
+    }
+    rows = [(q.words, shown[q.name]) for q in PLAN if q.name in shown]
     title = f"A planned scan (nothing was measured), for method {planned.method}"
     head = ("", "value", "uncertainty", "relative")
     return [

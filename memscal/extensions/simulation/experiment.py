@@ -49,7 +49,7 @@ def drawn(
 
     def around(value: float, uncertainty: float | None) -> float:
         # Drawn in any case: a source that is not stated moves no other.
-        return value + (uncertainty or 0.0) * float(rng.standard_normal())
+        return value + (uncertainty or 0.0) * rng.standard_normal()
 
     film = stated.film
     modulus = around(film.young_modulus, film.young_modulus_uncertainty)

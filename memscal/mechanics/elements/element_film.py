@@ -177,8 +177,7 @@ class MixedSystem:
     @cached_property
     def _held(self) -> IndexArray:
         """Nothing moves at the base, and nothing outward on the axis."""
-        deepest = self.mesh.points[:, 1].max()
-        base = self.displacement.get_dofs(lambda x: x[1] == deepest).all()
+        base = self.displacement.get_dofs(lambda x: x[1] == 1.0).all()
         return np.union1d(base, self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"]))
 
     def side(self, depth: float) -> tuple[QuarticLine, IndexArray, IndexArray]:

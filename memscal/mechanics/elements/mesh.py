@@ -87,7 +87,7 @@ def graded(
     """Return nodes whose distances grow from a step by a factor, up to the widest at each."""
     nodes = [begin]
     while nodes[-1] < end:
-        step = min(step * growth, float(widest(nodes[-1])))
+        step = min(step * growth, widest(nodes[-1]))
         nodes.append(end if end - nodes[-1] < 1.5 * step else nodes[-1] + step)
     return np.array(nodes)
 
@@ -101,7 +101,7 @@ def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
         single = gaps.size - last < _AT_THE_EDGE or gaps[last - 1] < _NARROW * gaps[-1]
         span = 1 if single else max(1, _INTERVALS // sizes.refinement)
         first = last - 1
-        longest = float(sizes.widest(rings[last]))
+        longest = sizes.widest(rings[last])
         while first > 0 and last - first < span:
             group = gaps[first - 1 : last]
             if group.sum() > longest or group.max() > _UNEVEN * group.min():

@@ -93,7 +93,7 @@ def _between_rings(
         upper = lower
         lower = meeting_at(rings - 1)
     state = _mixture(lower, upper, target)
-    tension = -float(problem.compliance.areas @ np.minimum(state.pressure, 0.0))
+    tension = -problem.compliance.areas @ np.minimum(state.pressure, 0.0)
     if tension > _TENSION * state.load or _overlaps(problem, state):
         raise ConvergenceError(
             f"No contact that is loaded in one step was found at {target}.",

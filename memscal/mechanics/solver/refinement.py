@@ -129,7 +129,7 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
             reach *= 2
             continue
         states = [point.state for point in points]
-        filled = max((int(np.flatnonzero(s.pressure > 0)[-1]) for s in states), default=_COARSE)
+        filled = max((np.flatnonzero(s.pressure > 0)[-1] for s in states), default=_COARSE)
         if filled >= _COARSE - 4:
             reach *= 2
         elif filled < _COARSE // 3 and reach > 1e-6 * film.thickness:
@@ -142,7 +142,7 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
                 why="Such a film responds like a column at every point, not like a layer.",
                 cure="Lower the load or the depth, or check the units of film and indenter.",
             )
-    within = float(rings[filled + 1])
+    within = rings[filled + 1]
     if within > request.indenter.extent:
         raise DomainError(
             f"The contact would reach the end of the {request.indenter.shape}, "
@@ -235,10 +235,10 @@ def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState
     p = state.pressure
     if request.interface.normal_law is not None:
         # Without an edge: where the pressure has fallen to a small share of its largest.
-        last = int(np.flatnonzero(p > _EDGE * p.max())[-1])
+        last = np.flatnonzero(p > _EDGE * p.max())[-1]
         share = (p[last] - _EDGE * p.max()) / (p[last] - p[last + 1])
         return float(rings[last] + share * (rings[last + 1] - rings[last]))
-    last = int(np.flatnonzero(p > 0)[-1])
+    last = np.flatnonzero(p > 0)[-1]
     if last == 0:
         return float(rings[1]) / 2
     # The pressure ends like a square root: its square falls in proportion to r^2.
@@ -256,7 +256,7 @@ def _stick_radius(
 ) -> float:
     """Return the radius in m within which the film sticks."""
     sticking = np.flatnonzero(state.touching & (state.slip == 0) & (state.pressure > 0))
-    last = int(sticking.max(initial=0))
+    last = sticking.max(initial=0)
     if last == 0 or request.friction == 0:
         return 0.0
     if last + 1 >= rings.size or not state.touching[last + 1]:
