@@ -89,8 +89,11 @@ def simulate_contacts(
     middle = [contacts[len(contacts) // 2] for contacts in states]
     undisturbed = blurred_stress(middle, sensor.kernel, np.hypot(x - centre_x, centre_y))
     shape = x.shape if row.size == 1 else noise.shape
-    nominal = np.broadcast_to(loads[row, None], noise.shape)
-    stated, uncertainty = _stated_loads(nominal, ratio, reading_errors, disturbances)
+    stated = np.broadcast_to(loads[row, None], noise.shape)
+    uncertainty = disturbances.load_scatter
+    if disturbances.record_loads:
+        uncertainty = disturbances.load_reading
+        stated = stated * ratio * (1 + uncertainty * reading_errors)
     position_error = disturbances.position_error
     return simulated_scan(
         sensor,
@@ -157,15 +160,6 @@ def described_film(film: ElasticFilm) -> dict[str, float]:
     """Return what of a true film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
     return {name: float(getattr(film.expected, name)) for name in names}
-
-
-def _stated_loads(
-    nominal: FloatArray, ratio: FloatArray, errors: FloatArray, disturbances: Disturbances
-) -> tuple[FloatArray, float]:
-    """Return the load that is stated for each contact (N), and its relative uncertainty."""
-    if not disturbances.record_loads:
-        return nominal, disturbances.load_scatter
-    return nominal * ratio * (1 + disturbances.load_reading * errors), disturbances.load_reading
 
 
 def _truth(

@@ -52,7 +52,11 @@ class TriangleMesh:
 def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> TriangleMesh:
     """Return a mesh from the axis to the free edge; all lengths in thicknesses of the film."""
     sizes = _Sizes(rings[-1], refinement)
-    front = _Front(_surface_nodes(rings, radius, sizes), sizes)
+    # Corners of triangles on the surface: some of the rings, and others beyond.
+    inside = _fitted(rings, sizes)
+    growth = 1 + _GROWTH / refinement
+    beyond = graded(rings[-1], radius, rings[-1] - inside[-2], growth, sizes.widest)
+    front = _Front(np.concatenate([inside, beyond[1:]]), sizes)
     while np.any(front.depth < 1.0):
         front.advance()
     return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
@@ -71,14 +75,6 @@ class _Sizes:
         widest = np.interp(away, _DISTANCES, _WIDEST)
         widest += _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
         return widest / self.refinement
-
-
-def _surface_nodes(rings: FloatArray, radius: float, sizes: _Sizes) -> FloatArray:
-    """Return the corners of triangles on the surface: some of the rings, and others beyond."""
-    inside = _fitted(rings, sizes)
-    step = rings[-1] - inside[-2]
-    growth = 1 + _GROWTH / sizes.refinement
-    return np.concatenate([inside, graded(rings[-1], radius, step, growth, sizes.widest)[1:]])
 
 
 def graded(
