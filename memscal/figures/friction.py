@@ -59,8 +59,7 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
     with panels_of(3.4, 1, count, sharey=True, squeeze=False) as (figure, panels):
         for axes, loading in zip(panels.flat, comparison.loadings, strict=True):
             _draw_maxima(axes, comparison, loading)
-        for axes in panels.flat[1:]:
-            axes.set_ylabel("")
+            axes.label_outer()
     return figure
 
 

@@ -372,14 +372,8 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
     """Return the first coefficient at which the maximum is as large."""
     if top >= curve.max() * (1 - _STICK):
         return math.inf
-    above = np.argmax(curve >= top)
-    if above == 0:
-        return float(values[0])
-    below = above - 1
-    if math.isinf(values[above]):
-        return float(values[below])
-    share = (top - curve[below]) / (curve[above] - curve[below])
-    return float(values[below] + share * (values[above] - values[below]))
+    finite = np.isfinite(values)
+    return float(np.interp(top, np.maximum.accumulate(curve[finite]), values[finite]))
 
 
 #: Intervals of a length are wider by this factor: contacts are linearised about the stated film.
