@@ -96,8 +96,7 @@ def html_report(result: Result) -> str:
         if content:
             body.append(f"<section>\n<h2>{heading}</h2>\n{content}\n</section>")
     page = Template(_PAGE.read_text(encoding="utf-8"))
-    program = f"memscal {__version__}"
-    return page.substitute(title=title, body="\n".join(body), program=program)
+    return page.substitute(title=title, body="\n".join(body), program=f"memscal {__version__}")
 
 
 def _verdict(result: Result, report: Report) -> list[str]:

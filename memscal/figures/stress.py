@@ -52,8 +52,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             axes.set_xlim(left=0.0)
         linear.set_title("linear scale", fontsize=8, loc="left")
         draw_zero(linear)
-        words = "logarithmic scale; pale: less than 2u"
-        logarithmic.set_title(words, fontsize=8, loc="left")
+        logarithmic.set_title("logarithmic scale; pale: less than 2u", fontsize=8, loc="left")
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         logarithmic.set_yscale("log")
         logarithmic.set_ylim(_DECADES * top, 1.6 * top)

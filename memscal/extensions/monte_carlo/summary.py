@@ -3,22 +3,16 @@
 from typing import Any
 
 from memscal.extensions.monte_carlo.monte_carlo import BudgetComparison, MonteCarlo
-from memscal.model.quantities import Quantity, estimated_quantity
+from memscal.model.quantities import estimated_quantity
 from memscal.summaries.declared import DataFrame, plain
 from memscal.summaries.table import Table, texts_of
 
-DRAWN = (
-    Quantity("value", "number", "value of the calibration"),
-    Quantity("expected", "number", "expectation of the draws to first order"),
-    Quantity("mean", "number", "mean of the draws"),
-    Quantity("uncertainty", "number", "u of the draws", label="standard_uncertainty"),
-    Quantity("sampling_error", "number", "standard uncertainty of that"),
-    Quantity("symmetric", "number", "95 % interval", label="interval_95"),
-    Quantity("shortest", "number", "shortest 95 % interval", label="shortest_interval_95"),
-    Quantity("first_order", "number", "u by the budget"),
-    Quantity("stated", "number", "u with what regularisation hides"),
-)
-"""A parameter by draws and by its budget, all in the unit of the parameter."""
+_KEYS = {
+    "uncertainty": "standard_uncertainty",
+    "symmetric": "interval_95",
+    "shortest": "shortest_interval_95",
+}
+"""Names in JSON of what a comparison holds, where they differ."""
 
 
 def tables(result: MonteCarlo) -> list[Table]:
@@ -59,9 +53,9 @@ def mapping(result: MonteCarlo) -> dict[str, Any]:
 def _comparison_json(comparison: BudgetComparison, result: MonteCarlo) -> dict[str, Any]:
     quantity = estimated_quantity(comparison.name).read_in(result.reading)
     values = {}
-    for drawn in DRAWN:
-        number = getattr(comparison, drawn.name)
-        values[drawn.label or drawn.name] = plain(number, quantity.scale)
+    for name, number in vars(comparison).items():
+        if name not in ("name", "reason"):
+            values[_KEYS.get(name, name)] = plain(number, quantity.scale)
     decided = {"agrees": comparison.agrees, "reason": comparison.reason}
     return {**values, "unit": quantity.unit_text, **decided}
 

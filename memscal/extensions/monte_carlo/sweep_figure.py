@@ -73,8 +73,7 @@ def _draw_seeds(
     band = axes.fill_between(x, lower, upper, color=COLOURS["gaussian"], alpha=0.2, lw=0)
     band.set_label("middle 68 % of draws")
     across = np.broadcast_to(amplitude[:, None], draws.shape)
-    label = "one draw"
-    axes.plot(across.ravel(), draws.ravel(), ".", alpha=0.6, mew=0, label=label, **look)
+    axes.plot(across.ravel(), draws.ravel(), ".", alpha=0.6, mew=0, label="one draw", **look)
     axes.plot(x, median, "--", label="median of draws", **look)
     outside = 0
     for sign, edge, marker in ((1, limits[1], "^"), (-1, limits[0], "v")):
