@@ -8,27 +8,13 @@ from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, Quantity
 from memscal.model.records import ESTIMATE_FIT, SLIP_LENGTH
 from memscal.summaries.comparison import bounded_json, friction_name
-from memscal.summaries.declared import members
+from memscal.summaries.declared import members, plain
 from memscal.summaries.table import Table, texts_of
 
 _PER_LOAD = ("load",)
 
-LAW = (
-    Quantity("name", "text", "law"),
-    Quantity("best", "number", "best parameters"),
-    Quantity("log_evidence", "number", "ln of evidence"),
-    Quantity("log_likelihood", "number", "ln of the largest likelihood"),
-    Quantity("numerical_error", "number", "standard uncertainty of the integral"),
-    *ESTIMATE_FIT[1:],
-)
-
-BAYES_FACTOR = (
-    Quantity("favoured", "text", "law that is favoured"),
-    Quantity("against", "text", "law"),
-    Quantity("log_factor", "number", "ln of the Bayes factor"),
-    Quantity("words", "text", "evidence"),
-    Quantity("log_likelihood_ratio", "number", "ln of the ratio of the largest likelihoods"),
-)
+_LAW = ("name", "best", "log_evidence", "log_likelihood", "numerical_error")
+_FACTOR = ("favoured", "against", "log_factor", "words", "log_likelihood_ratio")
 
 COMPARED_LAWS = (
     Quantity("lubrication", "text", "dry or lubricated"),
@@ -127,12 +113,16 @@ def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
     for direction, compared in comparison.by_direction.items():
         whole[direction] = {
             **members(COMPARED_LAWS, compared),
-            "laws": [members(LAW, law) for law in compared.laws],
-            "bayes_factors": [members(BAYES_FACTOR, factor) for factor in compared.factors],
+            "laws": [_held(_LAW, law) | members(ESTIMATE_FIT[1:], law) for law in compared.laws],
+            "bayes_factors": [_held(_FACTOR, factor) for factor in compared.factors],
             "length": bounded_json(SLIP_LENGTH, compared.length),
             "implied": None if compared.implied is None else _implied_json(compared.implied),
         }
     return whole | {"warnings": texts_of(comparison.messages)}
+
+
+def _held(names: tuple[str, ...], record: object) -> dict[str, Any]:
+    return {name: plain(getattr(record, name)) for name in names}
 
 
 def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:
