@@ -384,24 +384,8 @@ class Scan:
         if self.kind in ("line", "raster"):
             return self  # one pass
         if self.kind == "repeats":
-            return replace(self, **self._rows(np.atleast_1d(numbers)))
-        return self.only_points(np.flatnonzero(np.isin(self.passes, numbers)))
-
-    def only_points(self, keep: IndexArray, **changes: Any) -> Scan:
-        """Return some of the points of a scan of this kind, with changes of other fields."""
-        chosen = self._rows(keep, "x", "y", "repeat", "x_errors")
-        if self.u_zz_correlation is not None:
-            chosen["u_zz_correlation"] = of_points(self.u_zz_correlation, keep)
-        return replace(self, **(chosen | changes))
-
-    def _rows(self, keep: IndexArray, *names: str) -> dict[str, Any]:
-        """Return some rows of the readings, of what is stated like them, and of further arrays."""
-        stated = {name: getattr(self, name) for name in (*names, "branch", "u_zz", *LIKE_SIGNAL)}
-        rows: dict[str, Any] = {
-            n: values[keep] for n, values in stated.items() if values is not None
-        }
-        rows["channels"] = {name: values[keep] for name, values in self.channels.items()}
-        return rows
+            return replace(self, **_rows(self, np.atleast_1d(numbers)))
+        return only_points(self, np.flatnonzero(np.isin(self.passes, numbers)))
 
     def _freeze_positions(self) -> None:
         for name in ("x", "y"):
@@ -509,6 +493,22 @@ class Scan:
                 why="By a load that may be zero nothing is known of the stress.",
                 cure=f"Give it in N: 1 % of the load are {0.01 * self.load:g} N.",
             )
+
+
+def only_points(scan: Scan, keep: IndexArray, **changes: Any) -> Scan:
+    """Return some points of a scan of kind points, with changes of other fields."""
+    chosen = _rows(scan, keep, "x", "y", "repeat", "x_errors")
+    if scan.u_zz_correlation is not None:
+        chosen["u_zz_correlation"] = of_points(scan.u_zz_correlation, keep)
+    return replace(scan, **(chosen | changes))
+
+
+def _rows(scan: Scan, keep: IndexArray, *names: str) -> dict[str, Any]:
+    """Return some rows of the readings, of what is stated like them, and of further arrays."""
+    stated = {name: getattr(scan, name) for name in (*names, "branch", "u_zz", *LIKE_SIGNAL)}
+    rows: dict[str, Any] = {n: values[keep] for n, values in stated.items() if values is not None}
+    rows["channels"] = {name: values[keep] for name, values in scan.channels.items()}
+    return rows
 
 
 def common_circumstances(scans: Sequence[Scan]) -> dict[str, Any]:

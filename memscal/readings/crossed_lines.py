@@ -3,7 +3,7 @@
 import numpy as np
 
 from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
+from memscal.model.scan import Scan, only_points
 
 #: Points within this share of the lines' length from a line are on it.
 _ON_LINE = 1e-3
@@ -25,8 +25,8 @@ def crossed_lines(scan: Scan) -> tuple[Scan, ...]:
     x = scan.x[along_x] - middles[0]
     y = scan.y[along_y] - middles[1]
     return (
-        scan.only_points(np.flatnonzero(along_x), x=x, y=None),
-        scan.only_points(np.flatnonzero(along_y), x=y, y=None, direction="y"),
+        only_points(scan, np.flatnonzero(along_x), x=x, y=None),
+        only_points(scan, np.flatnonzero(along_y), x=y, y=None, direction="y"),
     )
 
 
