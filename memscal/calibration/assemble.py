@@ -39,6 +39,7 @@ def assemble(
     checks: tuple[QualityCheck, ...],
     laws: FilmLawComparison | None,
     assumptions: tuple[Assumption, ...],
+    explanations: list[dict[str, Any]],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
     # Film and indenter are as stated by the scan where nothing was calculated with them.
@@ -70,7 +71,7 @@ def assemble(
         load=scan.load if prepared.reading.per == "Pa" else None,
         reference=reference,
         process=Process.of_now(
-            configuration=_configuration(prepared, solution, laws),
+            configuration=_configuration(prepared, solution, laws, explanations),
             messages=calibration_messages(prepared, solution, results, checks, laws, assumptions),
             input_scan=scan.source,
             input_reference=reference.source,
@@ -84,7 +85,10 @@ def assemble(
 
 
 def _configuration(
-    prepared: Prepared, solution: Solution, laws: FilmLawComparison | None
+    prepared: Prepared,
+    solution: Solution,
+    laws: FilmLawComparison | None,
+    explanations: list[dict[str, Any]],
 ) -> dict[str, Any]:
     """Return what was asked for and decided; what is usual is left out."""
     request = prepared.request
@@ -114,6 +118,7 @@ def _configuration(
         "reference_unit": None if unit == "Pa" else unit,
         "free": prepared.thickness and prepared.thickness.record,
         "film_laws": laws and laws.record,
+        "explanations": explanations or None,
         "channel": None if request.channel == "zz" else request.channel,
         "film_law": request.film_law,
         "rod_friction": request.rod_friction,

@@ -10,6 +10,7 @@ from memscal.calibration.assemble import assemble
 from memscal.calibration.assumptions import assumptions_of, at_offsets, less_mean_offset
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
+from memscal.calibration.explanations import MISFITS, explained
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.film_inference import free_thickness, require_free, weigh_laws
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
@@ -244,11 +245,15 @@ def calibrate(
     done_with("uncertainties")
     assumptions = assumptions_of(solution, results)
     checks = quality_checks(solution, results, by_other_route, assumptions)
+    explanations: list[dict[str, Any]] = []
+    if not all(check.passed or check.name not in MISFITS for check in checks):
+        checks, explanations = explained(solution, checks)
     done_with("checks")
     laws = None if relative or solution.stress.form else weigh_laws(solution)
     if not other:
         by_other_route = None
-    apparatus = assemble(prepared, solution, results, by_other_route, checks, laws, assumptions)
+    found = (checks, laws, assumptions, explanations)
+    apparatus = assemble(prepared, solution, results, by_other_route, *found)
     return Calibration(apparatus, solution, effects, dict(request.correlations))
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, logsumexp
 
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
@@ -95,8 +95,7 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     )
     gaussian = (
         "Reduced chi-square of the scan against the fitted Gaussian convolved with the reference. "
-        "A failure means that G is not Gaussian at this noise: use the deconvolved G, not "
-        "gaussian_sigma."
+        "A failure means that G is not Gaussian at this noise, or that something is not as stated."
     )
     fitted = solution.gaussian_misfit
     p_value = None
@@ -345,23 +344,23 @@ def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
 
 
 def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
-    prior = HYPOTHESES[0].estimate
-    probability = estimate.weighed.probability
-    posterior = np.clip(probability[0], 1e-4, 1 - 1e-4)
-    factor = (1 - posterior) / posterior * prior / (1 - prior)
+    weighed = estimate.weighed
+    priors = np.array([hypothesis.estimate for hypothesis in HYPOTHESES[1:]])
+    departed = logsumexp(weighed.log_marginals[1:], b=priors / priors.sum())
     kinds: dict[str, float] = {}
-    for hypothesis, departure in zip(HYPOTHESES[1:], probability[1:], strict=True):
+    for hypothesis, departure in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
         if hypothesis.estimate > 0:
             kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(departure)
     kind = max(kinds, key=lambda name: kinds[name])
     share = kinds[kind] / max(sum(kinds.values()), 1e-300)
     meaning = (
-        "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
-        "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
-        "means that G is not Gaussian: use the deconvolved G. The most probable departure is "
-        f"{_KINDS[kind]} ({share:.0%} of them)."
+        "Natural logarithm of the Bayes factor for a departure of G from a Gaussian; below "
+        "zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
+        "means that G is not Gaussian, or that something is not as stated. The most probable "
+        f"departure is {_KINDS[kind]} ({share:.0%} of them)."
     )
-    return check("gaussian_evidence", float(np.log(factor)), _LOG_BAYES_LIMIT, meaning)
+    value = float(departed - weighed.log_marginals[0])
+    return check("gaussian_evidence", value, _LOG_BAYES_LIMIT, meaning)
 
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:

@@ -299,6 +299,7 @@ class WeighedFit:
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
     means: FloatArray  # (h, all columns): of each hypothesis; zero where it is unlikely
+    log_marginals: FloatArray  # (h,): logarithm of the voltages' probability by each of HYPOTHESES
 
     def of_kind(self, name: str, integrals: FloatArray) -> tuple[float, float]:
         """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
@@ -402,6 +403,7 @@ class Weighing:
             probability=estimate,
             residual=model.points.u - fit.predicted - self.basis.voltages(model, fit, mean),
             means=means,
+            log_marginals=self.log_marginals,
         )
 
 

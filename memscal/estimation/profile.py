@@ -1,5 +1,6 @@
 """Estimate of a radial profile from the points of scans: centre, baseline, noise and outliers."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -330,6 +331,23 @@ def log_marginal_likelihood(
     count = estimate.outlier_weight.sum()
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
     return np.asarray(weighing.log_marginal_likelihoods) - volume / 2
+
+
+def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
+    """Logarithm of p(u) by a Gaussian sensor, fitted at an estimate's weights, as by hypotheses."""
+    weights = estimate.weights
+    if not fit.has_width(weights, estimate.noise_scale):
+        return -math.inf
+    # The prior of a curvature is a further reading.
+    _, prior = fit.prior
+    residual = fit.points.standardised(fit.points.u - fit.predicted, weights)
+    chi_square = float(residual @ residual + prior @ prior)
+    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
+    variance = max(chi_square / freedom, _least_noise(fit) ** 2)
+    loss = freedom * math.log(variance) + chi_square / variance
+    # The flat priors are of ln A and ln(width).
+    _, volume = np.linalg.slogdet(fit.covariance(weights, 1.0))
+    return float(volume - loss) / 2 - math.log(fit.conversion_constant * fit.sigma)
 
 
 def _least_noise(fit: GaussianFit) -> float:

@@ -31,7 +31,12 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.summaries import comparison as comparisons
-from memscal.summaries.calibration import apparatus_of, assumptions_table, sensor_title
+from memscal.summaries.calibration import (
+    apparatus_of,
+    assumptions_table,
+    explanations_table,
+    sensor_title,
+)
 from memscal.summaries.declared import total_of
 from memscal.summaries.stress import contact_words
 from memscal.summaries.table import CHECKS, Table, checks_table, stated_text, verdict, worst_checks
@@ -65,7 +70,7 @@ class Report:
     checks: Sequence[QualityCheck] = ()
     messages: Sequence[Message] = ()
     budget: Table | None = None
-    assumptions: Table | None = None
+    assumptions: Sequence[Table] = ()
     settings: Sequence[Table] = ()
     files: Mapping[str, SourceFile | None] = field(default_factory=dict)
     process: Process | None = None
@@ -86,7 +91,7 @@ def html_report(result: Result) -> str:
         "Quality checks": _html([checks]),
         "Notes and warnings": f"<ul>\n{items}\n</ul>" if items else "",
         "Uncertainty budget": _html([report.budget] if report.budget else []),
-        "What the answer assumes": _html([report.assumptions] if report.assumptions else []),
+        "What the answer assumes": _html(report.assumptions),
         "What was measured on": _html(report.settings),
         "Provenance": _html(_provenance(report)),
     }
@@ -186,7 +191,7 @@ def _calibration_report(result: Calibration | ApparatusFunction) -> Report:
         checks=data.checks,
         messages=process.messages,
         budget=_budget(*budgets, down=True),
-        assumptions=assumptions_table(data),
+        assumptions=[explanations_table(data), assumptions_table(data)],
         settings=[_setting(data, data.load, data.reference)],
         files={"scan": process.input_scan, "reference": process.input_reference},
         process=process,

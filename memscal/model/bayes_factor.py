@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-#: From these values of twice its logarithm on the evidence is positive, and strong.
+#: From these values of twice its logarithm on the evidence is positive, strong, and very strong.
 POSITIVE = 2.0
 STRONG = 6.0
+VERY_STRONG = 10.0
 #: Steps of twice the natural logarithm of a Bayes factor, in words.
 _WORDS = (
     (POSITIVE, "not worth more than a bare mention"),
     (STRONG, "positive"),
-    (10.0, "strong"),
+    (VERY_STRONG, "strong"),
     (math.inf, "very strong"),
 )
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from memscal.calibration.calibrate import Calibration
+from memscal.calibration.explanations import DEPARTURE, MISFITS, explanation
 from memscal.calibration.stages import Misfit
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
@@ -36,14 +37,8 @@ from memscal.summaries.table import Table, checks_json, checks_table, finite, te
 Calibrated = Calibration | ApparatusData
 
 _BY_METHOD = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
-#: What scans tell of the film, where they do.
-_FILM = ("film_laws", "free")
-#: Checks that a G that is Gaussian passes.
-_GAUSSIAN = ("gaussian_misfit", "width_agreement")
-#: Reduced chi-squares of the Gaussian and of G(r) whose ratio is smaller are alike; where that of
-#: G(r) fails its check, too.
-_ALIKE = 1.1
-_ALIKE_FAILED = 1.5
+#: What scans tell of the film, and what explains them, where they do.
+_FOUND = ("film_laws", "free", "explanations")
 
 
 def tables(result: Calibrated) -> list[Table]:
@@ -79,27 +74,20 @@ def answer(result: Calibrated) -> str:
     if apparatus.reading.per == "relative":
         a = a.replace("(relative)", "(relative: the load is not known)")
     law = _dominating_law(apparatus)
-    use = f"Use A = {a}{by}. {verdict(apparatus.checks)}"
-    return f"{law}{use}\n{_which_g(apparatus)}"
-
-
-def _which_g(apparatus: ApparatusData) -> str:
-    """Say whether the Gaussian suffices, by the checks that a Gaussian G passes."""
-    checks = {check.name: check for check in apparatus.checks}
-    failed = [name for name, check in checks.items() if name in _GAUSSIAN and not check.passed]
-    if not failed:
+    checks = verdict(apparatus.checks)
+    if all(check.passed or check.name not in MISFITS for check in apparatus.checks):
         sigma = measured_text(apparatus.parameters, "gaussian_sigma")
-        return f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
-    if failed == ["gaussian_misfit"] and "reconvolution" in checks:
-        g = checks["reconvolution"]
-        ratio = _ALIKE if g.passed else _ALIKE_FAILED
-        if checks["gaussian_misfit"].value < ratio * g.value:
-            return (
-                "The Gaussian fails the check gaussian misfit, and G(r) explains the scan no "
-                "better: the noise is larger than stated, or the model does not hold."
-            )
-    names = " and ".join(name.replace("_", " ") for name in failed)
-    return f"Use G(r), for the Gaussian fails the check {names}."
+        suffices = f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
+        return f"{law}Use A = {a}{by}. {checks}\n{suffices}"
+    rows = _explanations(apparatus)
+    rivals = [row for row in rows if row["named"] and row["name"] != DEPARTURE]
+    settled = ": which A to use is not settled" if rivals else ""
+    return f"{law}A = {a}{by} if all is as stated{settled}. {checks}\n{explanation(rows)}"
+
+
+def _explanations(apparatus: ApparatusData) -> Sequence[Mapping[str, Any]]:
+    rows: Sequence[Mapping[str, Any]] = apparatus.process.configuration.get("explanations", ())
+    return rows
 
 
 def _dominating_law(apparatus: ApparatusData) -> str:
@@ -156,7 +144,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         names = parameters.names
         shown = [parameter_json(parameters, n) for n in names if n.startswith("centre")]
         values["centres"] = {**choice, "values": shown}
-    values |= {name: configuration[name] for name in _FILM if name in configuration}
+    values |= {name: configuration[name] for name in _FOUND if name in configuration}
     if isinstance(result, Calibration):
         misfit = result.solution.deconvolution.misfit
         gaussian = result.solution.gaussian_misfit
@@ -184,6 +172,17 @@ def assumptions_table(apparatus: ApparatusData) -> Table:
         rows.append((assumption.sentence, assumption.state, measure, *sizes))
     heads = ("taken for granted", "state", "size", "for u(A)", "for u(σ)", "for u(FWHM)")
     return Table("Sizes that move a result by one standard uncertainty", heads, rows)
+
+
+def explanations_table(apparatus: ApparatusData) -> Table:
+    """Return what was weighed to explain a scan that fails a check."""
+    rows = []
+    for row in _explanations(apparatus):
+        factor = f"{row['log_bayes_factor']:.1f}"
+        change = f"{row['relative_change_of_a']:+.1%}"
+        rows.append((row["words"], factor, change, "named" if row["named"] else ""))
+    heads = ("explanation", "ln of the Bayes factor", "A by it", "")
+    return Table("What explains the scan, against a Gaussian G and all as stated", heads, rows)
 
 
 def dataset(result: Calibrated) -> Dataset:

@@ -1,0 +1,78 @@
+"""What is said of a scan that fails a check of the Gaussian."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from helpers.scans import LINEAR_FILM, TAILS, simulated
+
+import memscal
+from memscal.calibration.explanations import DEPARTURE, explanation
+
+
+@pytest.fixture(scope="module")
+def wrong() -> memscal.Calibration:
+    """A calibration of a film that is thicker by a tenth than it states."""
+    film = replace(LINEAR_FILM, thickness=1.1 * LINEAR_FILM.thickness)
+    made = simulated(film=film, load=0.05, noise=0.001, seed=2)
+    return memscal.calibrate(replace(made, film=LINEAR_FILM))
+
+
+def test_a_wrong_thickness_is_named_with_its_size(wrong) -> None:
+    rows = {row["name"]: row for row in wrong.to_dict()["explanations"]}
+    assert rows["thickness"]["named"]
+    assert re.match(r"a film of \(2\.[12]\d* ± 0\.0\d+\) mm", rows["thickness"]["words"])
+    factors = [row["log_bayes_factor"] for row in rows.values()]
+    assert factors == sorted(factors, reverse=True)
+    assert rows["thickness"]["log_bayes_factor"] > rows["baseline_curvature"]["log_bayes_factor"]
+
+
+def test_first_lines_checks_and_report_say_so(wrong) -> None:
+    words = wrong.to_dict()["explanations"][0]["words"]
+    first, second = wrong.answer().splitlines()
+    assert "which A to use is not settled" in first
+    assert words in second
+    assert second.endswith("or by a cause that is not listed.")
+    failed = [check for check in wrong.apparatus.checks if check.name == "gaussian_evidence"]
+    assert words in failed[0].meaning
+    assert "ln of the Bayes factor" in wrong.report()
+
+
+def test_an_artifact_keeps_what_was_weighed(wrong, tmp_path) -> None:
+    wrong.apparatus.save(tmp_path / "sensor.h5")
+    read = memscal.load_apparatus(tmp_path / "sensor.h5")
+    assert read.to_dict()["explanations"] == wrong.to_dict()["explanations"]
+    assert read.answer() == wrong.answer()
+
+
+def test_nothing_is_weighed_where_the_checks_pass() -> None:
+    good = memscal.calibrate(simulated(seed=3))
+    assert "explanations" not in good.to_dict()
+    assert "suffices" in good.answer()
+
+
+def test_tails_are_named_as_such() -> None:
+    result = memscal.calibrate(simulated(kernel=TAILS, noise=0.001))
+    rows = result.to_dict()["explanations"]
+    assert DEPARTURE in [row["name"] for row in rows if row["named"]]
+    assert "is explained by a G that is not Gaussian" in result.answer()
+
+
+def test_of_a_raster_only_g_is_weighed() -> None:
+    result = memscal.calibrate(simulated(raster=True, kernel=TAILS, noise=0.001))
+    assert [row["name"] for row in result.to_dict()["explanations"]] == [DEPARTURE]
+
+
+def row(name: str, named: bool = True) -> dict:
+    return {"name": name, "words": f"a {name}", "named": named}
+
+
+@pytest.mark.parametrize(("rows", "text"), [
+    ([row(DEPARTURE), row("lag", named=False)], "by a departure, or"),
+    ([row("lag"), row(DEPARTURE), row("film")], "departure; as well explained by a lag or a film,"),
+    ([row("lag"), row(DEPARTURE, named=False)], "by a lag, better than by a G that is not"),
+    ([row("lag", named=False)], "nothing that was weighed, but by larger or slower noise, or"),
+])  # fmt: skip
+def test_the_sentence_says_what_is_as_good(rows, text) -> None:
+    assert text in explanation(rows)
+    assert explanation(rows).endswith("or by a cause that is not listed.")
