@@ -51,6 +51,7 @@ MISFITS = (
     "residual_runs",
     "residual_correlation",
     "symmetry",
+    "baseline_curvature",
 )
 DEPARTURE = "departure"
 _BY_G = "a G that is not Gaussian"
@@ -62,7 +63,11 @@ _RIVALS = {
     "film_law": ("a film {} of the way from linear to neo-Hookean", 0.3, ""),
     "stage_scale": ("a stage scale of {}", 0.02, ""),
     "line_offset": ("a line {} beside the centre", 0.3e-3, "mm"),
-    "baseline_curvature": ("a baseline that bends by {} of the largest signal", 0.02, ""),
+    "baseline_curvature": (
+        "a baseline that bends by {} of the largest signal beyond what is fitted",
+        0.02,
+        "",
+    ),
     "gain_curvature": ("an amplifier of curvature {}", 0.05, ""),
     "lag": ("a lag of {} along the scan", 0.2e-3, "mm"),
 }
@@ -169,7 +174,8 @@ def _fitted(solution: Solution, name: str) -> tuple[float, float, float, float]:
     width = max(bend, _FARTHEST**-2) ** -0.5
     size = unit * float(best.x)
     evidence = math.log(math.sqrt(2 * math.pi) * width) - float(best.fun)
-    return stated + size, width * unit, evidence, fitted(size).conversion_constant
+    value = min(stated + size, 0.5) if name == "poisson_ratio" else stated + size
+    return value, width * unit, evidence, fitted(size).conversion_constant
 
 
 def _statement(solution: Solution, name: str) -> tuple[float, float | None]:

@@ -2,8 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,13 +9,12 @@ from memscal.calibration.drawn_scatter import LINEAR_METHODS, draw_count
 from memscal.calibration.film_inference import FilmLawComparison
 from memscal.calibration.prepare import Prepared
 from memscal.calibration.stages import Solution
-from memscal.calibration.uncertainty import Results, changes_by, input_effects
+from memscal.calibration.uncertainty import Results
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate, point_messages
 from memscal.estimation.reference_spectra import RECTANGLE
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.press_rod import is_tabulated
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
 from memscal.model.assumptions import ASSUMED, Assumption
@@ -167,28 +164,22 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     law = film.law
     changes = results.changes
     if law == LINEAR:
-        rubbers = [scan.set_up.under(NEO_HOOKEAN) for scan in solution.scans]
-        if not all(is_tabulated(*rubber) for rubber in rubbers):
-            text = "The film is taken as linear elastic, as stated; no other law is counted."
-            return [Message("film_law", text)]
-        changes = _changes(solution, results, law="")
+        text = "The film is taken as linear elastic, as stated; no other law is counted."
+        return [Message("film_law", text)]
 
-    def changed(by: str, sign: int) -> str:
+    def changed(by: str) -> str:
         if by not in changes:
             return "cannot be solved at this depth, and nothing is counted for it"
-        a, sigma = sign * _relative_changes(results, changes[by]) / RECTANGLE
+        a, sigma = _relative_changes(results, changes[by]) / RECTANGLE
         return f"would change A by {a:+.1%} and sigma by {sigma:+.1%}"
 
-    if law == LINEAR:
-        rubber = f"a neo-Hookean film {changed('model_form', -1)}"
-        text = f"The film is taken as linear elastic, as stated; {rubber}: it is not counted."
-    elif not law:
+    if not law:
         text = "The film's law is not stated (film/law, --film-law): "
         if isinstance(solution.stress, Contact):
             taken = law_in_words(solution.stress.film_of_law.law)
             text += f"it is taken as {taken}. "
         other = LINEAR if "model_form" in changes else law_in_words(NEO_HOOKEAN)
-        text += f"A {other} film {changed('model_form', 1)}."
+        text += f"A {other} film {changed('model_form')}."
         if "model_form" in changes:
             text += " Changes up to that, of either sign, count as equally likely (model_form)."
     else:
@@ -198,26 +189,17 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         )
         if isinstance(solution.stress, Contact):
             text += f" The rod is found by {solution.stress.discretisation}."
-    if law != LINEAR and solution.scan.rod_friction is None:
+    if solution.scan.rod_friction is None:
         text += (
             " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "
             "--rod-friction): "
         )
         if "rod_friction" in changes:
-            text += f"the reference is midway. A film that sticks {changed('rod_friction', 1)}, "
+            text += f"the reference is midway. A film that sticks {changed('rod_friction')}, "
             text += "one that slides by the opposite: that is counted (rod_friction)."
         else:
-            text += f"it is taken to stick, and sliding {changed('rod_friction', 1)}."
+            text += f"it is taken to stick, and sliding {changed('rod_friction')}."
     return [Message("film_law", text)]
-
-
-def _changes(solution: Solution, results: Results, **film: Any) -> dict[str, FloatArray]:
-    """Changes of the parameters by one standard uncertainty of a film that states this."""
-    scans = [replace(scan, film=replace(scan.set_up.film, **film)) for scan in solution.scans]
-    effects = input_effects(scans, solution.stresses, solution.estimate)
-    parameters = results.parameters
-    changes = changes_by(effects, results.by_voltage, parameters.names, parameters.values)
-    return dict(zip(effects, changes, strict=True))
 
 
 def _relative_changes(results: Results, change: FloatArray) -> FloatArray:

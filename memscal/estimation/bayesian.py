@@ -26,6 +26,7 @@ from itertools import compress, product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy.special import logsumexp
 
 from memscal.estimation.departures import (
     FAMILIES,
@@ -356,14 +357,9 @@ class Weighing:
     log_marginals: FloatArray  # (h,): of each of HYPOTHESES
 
     @cached_property
-    def log_marginal_likelihoods(self) -> tuple[float, float]:
-        """Of all hypotheses by either prior, up to a constant of the scan."""
-        sums = []
-        for prior in _PRIORS:
-            possible = prior > 0
-            terms = self.log_marginals[possible] + np.log(prior[possible])
-            sums.append(float(np.logaddexp.reduce(terms)))
-        return sums[0], sums[1]
+    def log_marginal_likelihoods(self) -> FloatArray:
+        """Of all hypotheses by either prior, up to a constant of the scan, (2,)."""
+        return np.asarray(logsumexp(self.log_marginals, b=_PRIORS, axis=1))
 
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""

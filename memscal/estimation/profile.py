@@ -330,7 +330,7 @@ def log_marginal_likelihood(
     least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = estimate.outlier_weight.sum()
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
-    return np.asarray(weighing.log_marginal_likelihoods) - volume / 2
+    return weighing.log_marginal_likelihoods - volume / 2
 
 
 def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
@@ -338,13 +338,13 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     weights = estimate.weights
     if not fit.has_width(weights, estimate.noise_scale):
         return -math.inf
+    points = fit.points
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
-    residual = fit.points.standardised(fit.points.u - fit.predicted, weights)
-    chi_square = float(residual @ residual + prior @ prior)
+    left = np.append(points.standardised(points.u - fit.predicted, weights), prior)
     freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
-    variance = max(chi_square / freedom, _least_noise(fit) ** 2)
-    loss = freedom * math.log(variance) + chi_square / variance
+    variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
+    loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).
     _, volume = np.linalg.slogdet(fit.covariance(weights, 1.0))
     return float(volume - loss) / 2 - math.log(fit.conversion_constant * fit.sigma)
