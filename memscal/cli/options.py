@@ -312,9 +312,11 @@ kernel_options = options_of(
 """The apparatus function and the conversion constant."""
 
 
-def require_one_kernel(options: Mapping[str, Any]) -> None:
-    """Refuse options that describe no kernel, or two."""
-    sigmas = options["sigmas"]
+def kernel_from(options: Mapping[str, Any]) -> RadialKernel:
+    """Return the apparatus function that the options describe; refuse those of none, or of two."""
+    from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
+
+    sigmas = tuple(si(sigma, -6) for sigma in options["sigmas"])
     weights = options["weights"]
     if options["disc_radius"] is not None:
         if weights or len(sigmas) > 1:
@@ -322,17 +324,9 @@ def require_one_kernel(options: Mapping[str, Any]) -> None:
                 "A disc is blurred by one Gaussian: give --disc-radius and one --sigma, and no "
                 "--weight."
             )
-    elif len(weights) != len(sigmas) and (weights or len(sigmas) > 1):
+        return SmoothedDisc(radius=si(options["disc_radius"], -6), sigma=sigmas[0])
+    if len(weights) != len(sigmas) and (weights or len(sigmas) > 1):
         raise click.UsageError(
             f"There are {len(sigmas)} --sigma and {len(weights)} --weight: give one weight to each."
         )
-
-
-def kernel_from(options: Mapping[str, Any]) -> RadialKernel:
-    """Return the apparatus function that the options describe."""
-    from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
-
-    sigmas = tuple(si(sigma, -6) for sigma in options["sigmas"])
-    if options["disc_radius"] is not None:
-        return SmoothedDisc(radius=si(options["disc_radius"], -6), sigma=sigmas[0])
-    return GaussianMixture(options["weights"] or (1.0,), sigmas)
+    return GaussianMixture(weights or (1.0,), sigmas)

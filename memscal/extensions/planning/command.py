@@ -22,7 +22,6 @@ from memscal.cli.options import (
     option,
     output_options,
     radius_options,
-    require_one_kernel,
     rod_friction_option,
     si,
 )
@@ -124,7 +123,6 @@ def command(
     the estimate and the uncertainties of film, rod and load. Defaults are the paper's. With --want
     and --vary, the smallest scan that reaches the targets is found.
     """
-    require_one_kernel(options)
     source = click.get_current_context().get_parameter_source("noise")
     if options["noise_voltage"] is not None and source == ParameterSource.COMMANDLINE:
         raise click.UsageError("--noise and --noise-voltage both state the noise: give one.")

@@ -27,7 +27,6 @@ from memscal.cli.options import (
     options_of,
     output_options,
     radius_options,
-    require_one_kernel,
     rod_friction_option,
     si,
     with_laboratory,
@@ -311,7 +310,6 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
         other = "sphere" if experiment == "rod" else "rod"
         belongs = "belongs" if len(names) == 1 else "belong"
         raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
-    require_one_kernel(options)
     if options["raster"] and max(len(options["loads"]), 1) * options["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
