@@ -7,7 +7,15 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, figure_option, option, report_options, trust_options
+from memscal.cli.options import (
+    FILE,
+    artifact_argument,
+    figure_option,
+    option,
+    report_options,
+    scans_argument,
+    trust_options,
+)
 from memscal.formats.files import together
 
 EXAMPLES = """\b
@@ -19,8 +27,8 @@ Examples:
 
 
 @click.command("apply", epilog=EXAMPLES)
-@click.argument("artifact", type=FILE)
-@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
+@artifact_argument
+@scans_argument()
 @option("-o --output", FILE, metavar="OUT")(
     "File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5."
 )

@@ -204,7 +204,7 @@ def calibration_settings(
 
 
 @click.command("calibrate", epilog=EXAMPLES)
-@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
+@common.scans_argument()
 @option("-o --output", FILE, metavar="OUT")(
     "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
 )

@@ -14,9 +14,11 @@ from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
     NonNegative,
+    artifact_argument,
     figure_option,
     option,
     report_options,
+    scans_argument,
     trust_options,
 )
 from memscal.figures import FIGURE_SUFFIXES
@@ -73,8 +75,8 @@ Examples:
 
 
 @click.command("compare", epilog=EXAMPLES)
-@click.argument("artifact", type=FILE)
-@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN|STRESS...")
+@artifact_argument
+@scans_argument("SCAN|STRESS...")
 @option("--friction friction", _COEFFICIENT, multiple=True, metavar="MU")(
     "Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "

@@ -12,7 +12,6 @@ from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import FILE, NonNegative, Quantity, option, output_options, si
-from memscal.cli.output import emit, emit_json, message, show_messages
 from memscal.extensions import hook
 from memscal.formats.files import together
 from memscal.model.checks import marked_texts
@@ -289,11 +288,11 @@ def command(
         warnings = [note for note in notes if note.severity == "warning"]
         if as_json:
             head = {"schema_version": "1", "output": str(output), "format": kind}
-            emit_json({**head, "notes": marked_texts(notes)})
+            out.emit_json({**head, "notes": marked_texts(notes)})
         else:
-            emit(readable("\n".join(note.text for note in notes if note not in warnings)))
-    show_messages(warnings)
-    message(f"Written: {output}")
+            out.emit(readable("\n".join(note.text for note in notes if note not in warnings)))
+    out.show_messages(warnings)
+    out.say_written([output])
     return DONE
 
 

@@ -43,6 +43,12 @@ class _FileName(click.Path):
 
 
 FILE = _FileName(readable=False, path_type=Path)
+artifact_argument = click.argument("artifact", type=FILE)
+
+
+def scans_argument(metavar: str = "SCAN...") -> _Adder:
+    """Return the argument of one or several scans."""
+    return click.argument("scans", type=FILE, nargs=-1, required=True, metavar=metavar)
 
 
 class Quantity(_Number):

@@ -268,7 +268,7 @@ def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool
         loading = options["loading"]
         output = options["output"]
         solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
-        head = {"schema_version": "1", "output": None if output is None else str(output)}
+        head = {"schema_version": "1", "output": output and str(output)}
         out.emit_json({**head, "solutions": solutions, "warnings": warnings})
     else:
         out.emit_tables(contacts_table(contacts))

@@ -13,6 +13,7 @@ from memscal.cli.failures import exit_code_of
 from memscal.cli.options import (
     FILE,
     Quantity,
+    artifact_argument,
     figure_option,
     option,
     report_options,
@@ -33,7 +34,7 @@ Examples:
 
 
 @click.command("restore", epilog=EXAMPLES)
-@click.argument("artifact", type=FILE)
+@artifact_argument
 @click.argument("scan", type=FILE)
 @option("-o --output", FILE, metavar="OUT")(
     "Reference file to write (memscal-reference): the restored stress with its uncertainty."
@@ -81,7 +82,7 @@ def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: A
         if output is not None:
             write_reference(restored.profile(), output, overwrite=force)
         out.write_files(files, force=force)
-        head = {"output": None if output is None else str(output)}
+        head = {"output": output and str(output)}
         out.emit_result(restored, head, as_json=as_json, brief=options["brief"])
     out.show_messages(restored.messages)
     out.say_written([output, *files])

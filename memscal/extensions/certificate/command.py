@@ -6,7 +6,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
-from memscal.cli.options import FILE, option, output_options
+from memscal.cli.options import FILE, artifact_argument, option, output_options
 from memscal.summaries.table import Table
 
 EXAMPLES = """\b
@@ -23,7 +23,7 @@ _FORM = out.FigurePath((".html", ".pdf", ".xml"))
 
 
 @click.command("certificate", epilog=EXAMPLES)
-@click.argument("artifact", type=FILE)
+@artifact_argument
 @option("--lab laboratory", FILE, required=True, metavar="lab.toml")(
     "Laboratory's file: laboratory, customer, sensor, equipment, conditions, decision rule."
 )
