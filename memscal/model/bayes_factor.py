@@ -1,7 +1,5 @@
 """Bayes factor: ratio of the evidences of two models, with its strength in words."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Rigid axisymmetric indenters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -196,7 +194,7 @@ class Profile(Indenter):
     @classmethod
     def from_function(
         cls, height: Callable[[FloatArray], ArrayLike], *, extent: float, points: int = 2001
-    ) -> Profile:
+    ) -> "Profile":
         """Return the profile of a function: ``points`` even radii up to ``extent``, all in m."""
         arrays.require_positive("extent of the indenter's profile", extent, "m")
         r = np.linspace(0.0, extent, points)

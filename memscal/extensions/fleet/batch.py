@@ -1,7 +1,5 @@
 """Batch of calibrations: shards of scans, each a task and a Parquet file that proves its work."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -109,7 +107,7 @@ class Batch:
         """Return the path of a shard's table."""
         return self.results / "shards" / f"{shard.name}.parquet"
 
-    def prepare(self, *, resume: bool) -> Batch:
+    def prepare(self, *, resume: bool) -> "Batch":
         """Make the folder of results, if it may be used; count the scans."""
         arrow()
         count = self._counted()

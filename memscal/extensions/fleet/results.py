@@ -1,7 +1,5 @@
 """Results of a fleet of sensors: what a summary needs of their calibrations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Files of a fleet: the manifest of its scans, and the Parquet tables of its results."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

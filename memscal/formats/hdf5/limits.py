@@ -5,8 +5,6 @@ through a damaged heap.  The claim is a descriptor of 16 bytes: length, address,
 Format Specification", section VIII).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 import zlib
@@ -199,7 +197,7 @@ class Layout(NamedTuple):
         return 8 * math.prod(self.shape)
 
     @classmethod
-    def of(cls, where: str, item: Any) -> Layout:
+    def of(cls, where: str, item: Any) -> "Layout":
         """Look at a dataset or an attribute."""
         # HDF5's objects are asked for once: each costs as much as reading a number.
         space = item.get_space()

@@ -4,8 +4,6 @@ HDF5 sees bytes in memory and never the disk; only known paths are opened, along
 every dataset is checked before it is read.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import math
@@ -34,7 +32,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 @contextlib.contextmanager
-def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator[SafeFile]:
+def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["SafeFile"]:
     """Open an HDF5 file safely, for the time of a ``with`` block."""
     data = read_bytes(path, limit=MOST_HDF5_BYTES)
     name = os.path.basename(os.fspath(path))

@@ -1,7 +1,5 @@
 """The one HDF5 writer, its schemas and their version; a tree becomes bytes, and they a file."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -63,7 +61,7 @@ class Group:
     """A NeXus group: its class, children by name, and attributes."""
 
     nx_class: str
-    children: Mapping[str, Node]
+    children: Mapping[str, "Node"]
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
 
 
