@@ -166,12 +166,8 @@ class FrameTable(NamedColumns):
         self._rows = rows
         self._column = column
 
-    def _room(self, columns: int) -> tuple[int, int]:
-        most = self._most(columns)
-        if self._rows > most:
-            cure = "Average neighbouring readings."
-            raise too_large(self._name, self._rows, most, f"rows of {columns} columns", cure=cure)
-        return self._rows, self._rows
+    def _count(self) -> int:
+        return self._rows
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
         lines = range(1, self._rows + 1)

@@ -92,9 +92,10 @@ class NamedColumns:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        rows, room = self._room(len(wanted))
+        rows = self._expected(len(wanted))
         count = 0
-        values = [np.empty(room) for _ in wanted]
+        # Lines may have other ends than were counted; room that stays empty is no memory.
+        values = [np.empty(2 * rows + _SAMPLE) for _ in wanted]
         parts = self._parts([*wanted.values()])
         for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
             self._lines_of.append((count, lines))
@@ -174,13 +175,18 @@ class NamedColumns:
             )
         return number - 1
 
-    def _most(self, columns: int) -> int:
-        """Return how many rows of some columns are taken."""
+    def _expected(self, columns: int) -> int:
+        """Return how many rows to expect; refuse more of some columns than are taken."""
         # A scan has up to three arrays more than columns, and its file must be read again.
-        return min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
+        most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
+        rows = self._count()
+        if rows > most:
+            cure = "Average neighbouring readings, or cut the table into several."
+            raise too_large(self._name, rows, most, f"{self._row}s of {columns} columns", cure=cure)
+        return rows
 
-    def _room(self, columns: int) -> tuple[int, int]:
-        """Return how many rows to expect, and for how many there must be room; refuse too many."""
+    def _count(self) -> int:
+        """Return how many rows there are, or may be."""
         raise NotImplementedError
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
@@ -420,14 +426,8 @@ class TextTable(NamedColumns):
         if len(self._said) > _MAX_COMMENTS:
             yield f"{len(self._said) - _MAX_COMMENTS} more lines above the table were left out."
 
-    def _room(self, columns: int) -> tuple[int, int]:
-        most = self._most(columns)
-        lines = sum(max(piece.count(b"\n"), piece.count(b"\r")) for piece in self._raw())
-        if lines > most:
-            cure = "Average neighbouring readings, or cut the table into several."
-            raise too_large(self._name, lines, most, f"lines of {columns} columns", cure=cure)
-        # Some may have other ends; room that stays empty is no memory.
-        return lines, 2 * lines + _SAMPLE
+    def _count(self) -> int:
+        return sum(max(piece.count(b"\n"), piece.count(b"\r")) for piece in self._raw())
 
     def _raw(self) -> Iterator[bytes]:
         if self._sheet:
