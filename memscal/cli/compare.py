@@ -211,9 +211,10 @@ def _require_channel(apparatus: ApparatusFunction, path: Path, channel: str) -> 
 
     given = apparatus.sensor.channel
     if given != channel and (apparatus.order or channel != "zz"):
-        problem = f"The artifact {path} is of channel {given}, not of {channel}."
-        cure = f"Give that of memscal calibrate --channel {channel} --method bayesian."
-        raise InputError(problem, cure=cure)
+        raise InputError(
+            f"The artifact {path} is of channel {given}, not of {channel}.",
+            cure=f"Give that of memscal calibrate --channel {channel} --method bayesian.",
+        )
 
 
 def _named_figures(options: Mapping[str, Any], lubrications: Iterable[str]) -> dict[str, Path]:

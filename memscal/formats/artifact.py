@@ -142,7 +142,9 @@ def _read_radial(file: SafeFile, path: str, covariance_path: str) -> ApparatusRa
     sizes = {"r": profile["r"].size}
     covariance = read_record(records.RADIAL_COVARIANCE, file, covariance_path, sizes=sizes)
     if not np.allclose(covariance["r"], profile["r"], rtol=1e-9, atol=0):
-        problem = f"{file.where(covariance_path)}/r differs from {path}/r."
-        why = "The covariance is that of the profile, radius by radius."
-        raise FormatError(problem, why=why, cure="Write the file again.")
+        raise FormatError(
+            f"{file.where(covariance_path)}/r differs from {path}/r.",
+            why="The covariance is that of the profile, radius by radius.",
+            cure="Write the file again.",
+        )
     return ApparatusRadial(**profile, g_covariance=covariance["g_covariance"])

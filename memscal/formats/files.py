@@ -200,14 +200,18 @@ def _checked_target(path: FilePath, *, overwrite: bool, inputs: Iterable[FilePat
     for source in inputs:
         with contextlib.suppress(OSError):
             if os.path.samestat(status, os.stat(source)):
-                why = f"Writing it would destroy what is being read. {_UNTOUCHED}"
-                cure = "Give the output another name."
-                raise OutputError(f"The output {shown} is also an input.", why=why, cure=cure)
+                raise OutputError(
+                    f"The output {shown} is also an input.",
+                    why=f"Writing it would destroy what is being read. {_UNTOUCHED}",
+                    cure="Give the output another name.",
+                )
     if not stat.S_ISREG(status.st_mode):
         kind = "a folder" if stat.S_ISDIR(status.st_mode) else "not a regular file"
-        why = "A result is written as one regular file that takes its name when it is whole."
-        cure = "Give the name of a file."
-        raise OutputError(f"The output {shown} is {kind}.", why=why, cure=cure)
+        raise OutputError(
+            f"The output {shown} is {kind}.",
+            why="A result is written as one regular file that takes its name when it is whole.",
+            cure="Give the name of a file.",
+        )
     if not overwrite:
         cure = "Choose another name, or allow overwriting (--force; overwrite=True in Python)."
         raise OutputError(f"The output {shown} exists already.", why=_UNTOUCHED, cure=cure)
@@ -333,9 +337,11 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
-            why = "A folder, pipe or device could keep a program waiting for ever."
-            cure = "Give the name of a file."
-            raise UnsafeFileError(f"{shown} is not a regular file.", why=why, cure=cure)
+            raise UnsafeFileError(
+                f"{shown} is not a regular file.",
+                why="A folder, pipe or device could keep a program waiting for ever.",
+                cure="Give the name of a file.",
+            )
         size = status.st_size
         total = 0
         piece = b""

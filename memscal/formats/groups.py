@@ -203,9 +203,11 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     }
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
-        why = "The group of the parameters holds something else of that name."
-        cure = "Give it another name."
-        raise InputError(f"A parameter cannot be called {min(reserved)}.", why=why, cure=cure)
+        raise InputError(
+            f"A parameter cannot be called {min(reserved)}.",
+            why="The group of the parameters holds something else of that name.",
+            cure="Give it another name.",
+        )
     children: dict[str, Node] = {"names": to_json("parameter names", parameters.names)}
     for name, dimension in dimensions.items():
         children[name] = si(parameters[name], dimension)
@@ -346,9 +348,11 @@ def read_round_indenter(file: SafeFile, path: str) -> RoundIndenter:
     """Read a rod or a sphere, the indenters of a scan."""
     shape = _shape(file, path)
     if shape not in _ROUND:
-        why = "A scan is made with a flat rod or with a sphere."
-        cure = 'Write "rod" or "sphere".'
-        raise FormatError(f'{file.where(path)}/shape is "{shape}".', why=why, cure=cure)
+        raise FormatError(
+            f'{file.where(path)}/shape is "{shape}".',
+            why="A scan is made with a flat rod or with a sphere.",
+            cure='Write "rod" or "sphere".',
+        )
     return _ROUND[shape](**read_record(records.ROUND_INDENTER, file, path))
 
 

@@ -108,9 +108,11 @@ def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
     if pixel_size is None:
-        why = "An array or image does not state it."
-        cure = "Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line."
-        raise InputError(f"The size of the pixels of {name} is not given.", why=why, cure=cure)
+        raise InputError(
+            f"The size of the pixels of {name} is not given.",
+            why="An array or image does not state it.",
+            cure="Give it, as pixel_size=5e-6 (in m), --pixel-size 5um on the command line.",
+        )
     require_positive("pixel size", pixel_size, "m")
     with damage_named(f"{name} cannot be read"):
         array = name.lower().endswith(".npy")

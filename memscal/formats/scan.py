@@ -244,9 +244,11 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
         )
     if axes != _POINTS and ("y" in axes) != file.has(f"{_DATA}/y"):
         stated = "names y, but there is no" if "y" in axes else "does not name y, but there is a"
-        why = "Without it a raster and a repeated line scan look the same."
-        cure = "Add the missing axis, or correct the attribute."
-        raise FormatError(f"{file.where(_DATA)}@axes {stated} {_DATA}/y.", why=why, cure=cure)
+        raise FormatError(
+            f"{file.where(_DATA)}@axes {stated} {_DATA}/y.",
+            why="Without it a raster and a repeated line scan look the same.",
+            cure="Add the missing axis, or correct the attribute.",
+        )
     return axes
 
 

@@ -204,9 +204,11 @@ def _scan_number(file: SafeFile, path: str) -> int:
     """Which scan a profile comes from, counted from one."""
     number = values.require_scalar(file, f"{path}/scan", "dimensionless")
     if not 1 <= number <= _MOST_SCANS:
-        why = f"Scans are counted from 1 to {_MOST_SCANS} at most."
-        cure = "Run memscal apply again."
-        raise FormatError(f"{file.where(path)}/scan is {number:g}.", why=why, cure=cure)
+        raise FormatError(
+            f"{file.where(path)}/scan is {number:g}.",
+            why=f"Scans are counted from 1 to {_MOST_SCANS} at most.",
+            cure="Run memscal apply again.",
+        )
     return int(number)
 
 

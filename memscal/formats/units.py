@@ -59,9 +59,11 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
     if unit is None:
         if dimension == "dimensionless":
             return numbers
-        why = f"It is a {dimension}, and a bare number could be in any unit."
-        cure = f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".'
-        raise UnitError(f"{where} has no unit.", why=why, cure=cure)
+        raise UnitError(
+            f"{where} has no unit.",
+            why=f"It is a {dimension}, and a bare number could be in any unit.",
+            cure=f'Add an attribute units, such as "{DIMENSIONS[dimension].stored}".',
+        )
     power = _power(unit.strip(), dimension)
     if power is not None:
         return _scaled(numbers, power)

@@ -22,21 +22,25 @@ def require_schema(file: SafeFile, schema: str) -> str:
     stored = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
     if stored != schema:
         held = "no memscal schema" if stored is None else f'the schema "{stored}"'
-        problem = f'{file.name} has {held}, but "{schema}" is needed here.'
-        why = f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds."
-        cure = "Give the right file, or make one with `memscal import` or `memscal calibrate`."
-        raise FormatError(problem, why=why, cure=cure)
+        raise FormatError(
+            f'{file.name} has {held}, but "{schema}" is needed here.',
+            why=f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds.",
+            cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
+        )
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
     major = version.partition(".")[0]
     if not re.fullmatch("[0-9]{1,9}", major):
-        problem = f'{file.name} has the schema version "{version[:80]}", which is not a version.'
-        cure = f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".'
-        raise FormatError(problem, cure=cure)
+        raise FormatError(
+            f'{file.name} has the schema version "{version[:80]}", which is not a version.',
+            cure=f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".',
+        )
     newest = SCHEMA_VERSION.partition(".")[0]
     if int(major) > int(newest):
-        problem = f"{file.name} was written by a newer memscal: {schema} version {version}."
-        why = f"This memscal reads versions up to {newest}.x and would misread it."
-        raise SchemaVersionError(problem, why=why, cure="Upgrade memscal.")
+        raise SchemaVersionError(
+            f"{file.name} was written by a newer memscal: {schema} version {version}.",
+            why=f"This memscal reads versions up to {newest}.x and would misread it.",
+            cure="Upgrade memscal.",
+        )
     if int(major) < int(newest):
         problem = f"{file.name} has {schema} version {version}, which is not read any more."
         raise SchemaVersionError(problem, cure="Write it again with the current memscal.")
@@ -54,9 +58,11 @@ def require_array(
 ) -> FloatArray:
     """Return the array at a path in SI units."""
     if not file.has(path):
-        why = f"It should hold a {dimension}."
-        cure = f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".'
-        raise FormatError(f"{file.where(path)} is missing.", why=why, cure=cure)
+        raise FormatError(
+            f"{file.where(path)} is missing.",
+            why=f"It should hold a {dimension}.",
+            cure=f'Write it, with an attribute units such as "{DIMENSIONS[dimension].si}".',
+        )
     values = file.array(path)
     if ndim is not None and values.ndim != ndim:
         problem = f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected."

@@ -272,10 +272,11 @@ class ApparatusData(Checked):
         per = self.reading.per
         if per != "Pa":
             whose = "relative" if per == "relative" else "per unit of a reference that is no stress"
-            problem = f"The conversion constant of the artifact is {whose}."
-            why = "The stress of its calibration was not known, and no reading tells another."
-            cure = "Calibrate with a known load and a stress in Pa, without --relative."
-            raise InputError(problem, why=why, cure=cure)
+            raise InputError(
+                f"The conversion constant of the artifact is {whose}.",
+                why="The stress of its calibration was not known, and no reading tells another.",
+                cure="Calibrate with a known load and a stress in Pa, without --relative.",
+            )
 
     @property
     def conversion_constant(self) -> float:

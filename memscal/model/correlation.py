@@ -36,9 +36,15 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
         _require_band(correlation)
         return correlation
     if size > MOST_CORRELATED:
-        why = "The cube of their number is worked with."
-        cure = "Give the correlation of neighbours alone, (n, w), or average neighbouring readings."
-        raise too_large("u_zz_correlation", size, MOST_CORRELATED, "points", why=why, cure=cure)
+        raise too_large(
+            "u_zz_correlation",
+            size,
+            MOST_CORRELATED,
+            "points",
+            why="The cube of their number is worked with.",
+            cure="Give the correlation of neighbours alone, (n, w), or average neighbouring "
+            "readings.",
+        )
     symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
     if not symmetric or not np.allclose(np.diag(correlation), 1.0):
         raise InputError(

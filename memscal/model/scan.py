@@ -52,9 +52,11 @@ LINE = 0.01
 def require_contacts(scan: Scan) -> None:
     """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
     if scan.normal_load_errors is not None and scan.normal_load is None:
-        why = "It is the standard uncertainty of the load at each point."
-        cure = "Give normal_load too, the load that was set at each point."
-        raise InputError("normal_load_errors is given without normal_load.", why=why, cure=cure)
+        raise InputError(
+            "normal_load_errors is given without normal_load.",
+            why="It is the standard uncertainty of the load at each point.",
+            cure="Give normal_load too, the load that was set at each point.",
+        )
     if scan.lubrication not in LUBRICATIONS:
         cure = "Give 'dry' or 'lubricated', or leave it out."
         raise InputError(f"The lubrication of the scan is {scan.lubrication!r}.", cure=cure)
@@ -69,9 +71,11 @@ def require_contacts(scan: Scan) -> None:
 def require_rod_friction(friction: float | None) -> None:
     """Refuse a friction of the rod that no film of rubber is solved with."""
     if friction not in (None, 0.0, math.inf):
-        why = "Only a rod that slides freely or sticks is solved at finite strain."
-        cure = "Give 0 or inf, or leave it out: the difference is then counted."
-        raise InputError(f"The rod's friction is {friction:g}.", why=why, cure=cure)
+        raise InputError(
+            f"The rod's friction is {friction:g}.",
+            why="Only a rod that slides freely or sticks is solved at finite strain.",
+            cure="Give 0 or inf, or leave it out: the difference is then counted.",
+        )
 
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
@@ -84,10 +88,11 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
         numbers = np.array(words).reshape(values.shape)
     known = np.isin(numbers, list(named.values()))
     if not known.all():
-        problem = f"{name} holds {values[~known][0]}, which names no branch."
-        why = "It says whether the indenter approached (was loaded) or retreated (was unloaded)."
-        cure = "Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"{name} holds {values[~known][0]}, which names no branch.",
+            why="It says whether the indenter approached (was loaded) or retreated (was unloaded).",
+            cure="Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known.",
+        )
     return numbers.astype(np.int64)
 
 
@@ -334,10 +339,11 @@ class Scan:
             "load (/entry/indenter/load)": load,
         }
         missing = " and no ".join(place for place, stated in places.items() if stated is None)
-        problem = f"{self.source.file_name if self.source else 'The scan'} states no {missing}."
-        why = "The stress that an indenter makes at the base of a film is calculated from them."
-        cure = "State them (memscal import --thickness, --radius, --load), or give --reference."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
+            why="The stress that an indenter makes at the base of a film is calculated from them.",
+            cure="State them (memscal import --thickness, --radius, --load), or give --reference.",
+        )
 
     @property
     def stated_load(self) -> float:

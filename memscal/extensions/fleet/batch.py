@@ -122,15 +122,18 @@ class Batch:
         shards = -(-count // size)
         numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(self.results)]
         if max(numbers, default=0) >= shards:
-            problem = f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}."
-            cure = "Resume with the manifest and the --shard-size that it was begun with."
-            raise OutputError(problem, why=stays, cure=cure)
+            raise OutputError(
+                f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}.",
+                why=stays,
+                cure="Resume with the manifest and the --shard-size that it was begun with.",
+            )
         try:
             (self.results / "shards").mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            cure = "Give a folder in which you may write."
-            problem = f"The folder {self.results} cannot be made: {error.strerror}."
-            raise OutputError(problem, cure=cure) from error
+            raise OutputError(
+                f"The folder {self.results} cannot be made: {error.strerror}.",
+                cure="Give a folder in which you may write.",
+            ) from error
         ensure_writable(self.results / "shards" / "proof")
         return replace(self, shard_size=size, count=count)
 

@@ -248,9 +248,11 @@ def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
             raise FormatError(f"{path} is a Parquet file, but none of memscal batch.")
         missing = set(columns or ()) - set(file.schema_arrow.names)
         if missing:
-            cure = "Run memscal batch --resume with this one."
-            problem = f"{path} was written by an earlier memscal."
-            raise FormatError(problem, why=f"It lacks {', '.join(sorted(missing))}.", cure=cure)
+            raise FormatError(
+                f"{path} was written by an earlier memscal.",
+                why=f"It lacks {', '.join(sorted(missing))}.",
+                cure="Run memscal batch --resume with this one.",
+            )
         return file.read(columns)
     except (pa.ArrowException, OSError) as error:
         reason = " ".join(str(error).split())[:200]
@@ -382,9 +384,11 @@ def read_fleet(results: Path) -> FleetResults:
         kinds = ", ".join(
             f"{unit} (as {statements.paths[i]})" for unit, i in statements.units.items()
         )
-        cure = "Run a batch for each unit of readings."
-        why = f"The conversion constants are in {kinds}."
-        raise FormatError(f"{results} holds sensors of several kinds.", why=why, cure=cure)
+        raise FormatError(
+            f"{results} holds sensors of several kinds.",
+            why=f"The conversion constants are in {kinds}.",
+            cure="Run a batch for each unit of readings.",
+        )
     columns = dict(zip(_NUMBERS, np.concatenate(numbers, axis=1), strict=True))
     return FleetResults(
         paths=statements.paths,

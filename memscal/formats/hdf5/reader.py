@@ -37,9 +37,11 @@ def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["Safe
     data = read_bytes(path, limit=MOST_HDF5_BYTES)
     name = os.path.basename(os.fspath(path))
     if not data.startswith(_SIGNATURE):
-        why = "It does not begin with HDF5's signature."
-        cure = "Convert a table with `memscal import`."
-        raise FormatError(f"{name} is not an HDF5 file.", why=why, cure=cure)
+        raise FormatError(
+            f"{name} is not an HDF5 file.",
+            why="It does not begin with HDF5's signature.",
+            cure="Convert a table with `memscal import`.",
+        )
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with damage_named(f"{name} cannot be opened as HDF5"):
         # The library's own copy of the bytes: no call of Python for each piece that it looks at.
@@ -172,9 +174,11 @@ class SafeFile:
         if links is None or not links.exists(key):
             return None
         if links.get_info(key).type != h5py.h5l.TYPE_HARD:
-            problem = f"{self.where(path)} is reached through a soft, external or other link."
-            why = "A link can lead to another file, to a pipe, or round in a circle."
-            raise UnsafeFileError(problem, why=why, cure="Copy the linked data into the file.")
+            raise UnsafeFileError(
+                f"{self.where(path)} is reached through a soft, external or other link.",
+                why="A link can lead to another file, to a pipe, or round in a circle.",
+                cure="Copy the linked data into the file.",
+            )
         return h5py.h5o.open(folder, key)
 
     def _existing(self, path: str) -> Any:

@@ -204,9 +204,14 @@ def tree_to_bytes(root: Group) -> bytes:
     held = max(len(data), sum(8 * np.size(values) for values in numbers))
     most = most_held(len(data))
     if held > most:
-        why = "The file could not be read again."
-        cure = "Write fewer scans, loads or points into one file."
-        raise too_large("What is to be written", held, most, "bytes", why=why, cure=cure)
+        raise too_large(
+            "What is to be written",
+            held,
+            most,
+            "bytes",
+            why="The file could not be read again.",
+            cure="Write fewer scans, loads or points into one file.",
+        )
     return data
 
 

@@ -77,9 +77,11 @@ def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
     require_numbers(samples)
     lowest = samples.columns["r"].min()
     if lowest < 0:
-        why = "A reference is a profile against the distance from the axis."
-        cure = "Give one half of a section through the axis, with r from 0."
-        raise InputError(f"{name} has a negative radius ({lowest * 1e3:g} mm).", why=why, cure=cure)
+        raise InputError(
+            f"{name} has a negative radius ({lowest * 1e3:g} mm).",
+            why="A reference is a profile against the distance from the axis.",
+            cure="Give one half of a section through the axis, with r from 0.",
+        )
     notes = list(samples.notes)
     # Stated is what no table or mesh holds: load, film, indenter.
     profile = StressProfile(

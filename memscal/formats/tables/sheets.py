@@ -63,9 +63,10 @@ def open_table(source: Any, **reading: Any) -> NamedColumns:
     try:
         reader = import_module(library)
     except ModuleNotFoundError as error:
-        problem = f"A {kind} is read by {library.partition('.')[0]}, which is not installed."
-        cure = 'Install it with the extra "tables": pip install "memscal[tables]"'
-        raise InputError(problem, cure=cure) from error
+        raise InputError(
+            f"A {kind} is read by {library.partition('.')[0]}, which is not installed.",
+            cure='Install it with the extra "tables": pip install "memscal[tables]"',
+        ) from error
     read: Callable[..., NamedColumns] = _sheet_table if kind == "workbook" else _parquet_table
     with _reading(f"{name} cannot be read"):
         return read(reader, name, data, **reading)

@@ -123,9 +123,11 @@ class NamedColumns:
             raise InputError(problem, why="One of them is wrong.", cure="Correct the table.")
         stated = below or head
         if unit and stated and not same_unit(unit, stated):
-            problem = f"{self.where(column)} states the unit {stated!r}, but {option} is {unit!r}."
-            cure = "Leave the option out to take the unit of the table, or correct the table."
-            raise InputError(problem, why="One of them is wrong.", cure=cure)
+            raise InputError(
+                f"{self.where(column)} states the unit {stated!r}, but {option} is {unit!r}.",
+                why="One of them is wrong.",
+                cure="Leave the option out to take the unit of the table, or correct the table.",
+            )
         chosen = unit or stated or default
         if not chosen:
             cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
