@@ -1,6 +1,5 @@
 """Messages of a calibration: what a user has to know of its result beside the checks."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -225,10 +224,8 @@ def _assumed(assumptions: Sequence[Assumption]) -> list[Message]:
     """Return what is taken for granted, and the size of each that moves A by one u."""
     listed = []
     for assumption in assumptions:
-        size = assumption.size("conversion_constant")
         if assumption.state == ASSUMED:
-            unit = f" {assumption.unit}" if assumption.is_length else ""
-            reached = f"{size:.2g}{unit}" if size < math.inf else "none does"
+            reached = assumption.size_text("conversion_constant")
             listed.append(f"{assumption.words} ({assumption.measure}: {reached})")
     if not listed:
         return []

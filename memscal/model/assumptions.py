@@ -130,6 +130,13 @@ class Assumption:
         """Size for one standard uncertainty of a parameter, in the unit in which it is shown."""
         return self.sizes[parameter] / (1e-3 if self.is_length else 1.0)
 
+    def size_text(self, parameter: str) -> str:
+        """Size for one standard uncertainty of a parameter, with its unit, in words."""
+        size = self.size(parameter)
+        if size == float("inf"):
+            return "none does"
+        return f"{size:.2g} mm" if self.is_length else f"{size:.2g}"
+
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON holds; a size that no error reaches is null."""
         values: dict[str, Any] = {

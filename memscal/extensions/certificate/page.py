@@ -71,6 +71,7 @@ def certificate_page(certificate: Certificate) -> str:
         "warnings": "\n".join(warnings),
         "facts": _facts(certificate),
         "equipment": _equipment(certificate),
+        "assumptions": _assumptions(apparatus),
         "values": _values(certificate),
         "profile": _profile(certificate),
         "figure": html_figures([picture]),
@@ -160,6 +161,15 @@ def _sources(apparatus: ApparatusFunction) -> str:
     for budget in apparatus.budget.values():
         sources |= dict.fromkeys(source for source, u in budget.items() if u)
     return ", ".join(source.replace("_", " ") for source in sources) or "no source that is named"
+
+
+def _assumptions(apparatus: ApparatusFunction) -> str:
+    """List what the values take for granted, and the size of each that moves A by one u."""
+    items = []
+    for each in apparatus.assumptions:
+        size = f"{each.measure}: {each.size_text('conversion_constant')}"
+        items.append(f"<li>{escape(f'{each.sentence} {each.state.capitalize()}; {size}.')}</li>")
+    return f"<ul>{''.join(items)}</ul>" if items else "<p>None is recorded.</p>"
 
 
 def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> str:
