@@ -324,9 +324,9 @@ def _unexplained(estimate: ProfileEstimate) -> list[QualityCheck]:
         "to point (a slow amplifier, creep, temperature). Look at the residual; state a known "
         "correlation as u_zz_correlation; uncertainties are too small until then."
     )
-    in_runs = (
-        "Share of neighbours along the scan whose residuals have the same sign: a half by chance. "
-        f"A failure means that residuals come in runs: {cause}"
+    stepped = (
+        "Largest step of the residuals along the scan, in standard deviations. A failure means "
+        f"that readings changed from one point on by what no radial G explains: {cause}"
     )
     alike = (
         "Correlation of each residual with its neighbours along the scan, halved for each step "
@@ -334,7 +334,7 @@ def _unexplained(estimate: ProfileEstimate) -> list[QualityCheck]:
         f"alike: {cause}"
     )
     neighbours = unexplained.neighbour_correlation_test(residuals)
-    checks.append(_tested("residual_runs", unexplained.runs_test(residuals), in_runs))
+    checks.append(_tested("residual_steps", unexplained.steps_test(residuals), stepped))
     checks.append(_tested("residual_correlation", neighbours, alike))
     return checks
 

@@ -4,26 +4,20 @@ The residuals of a fit with a prior for departures have no exact distribution.  
 Weighted data :math:`z` are projected off a design :math:`X = QR` of all that an
 apparatus function may do to first order: conversion constant, width, centre, baseline, drift,
 and every combination of departures that stands above a share of the noise.  What is left,
-:math:`(1 - QQ^T)z`, does not depend on G.  With as many points :math:`o` dropped as there are
-columns, the others :math:`1` give residuals of unit covariance that lie nearest to it (BLUS:
-Theil, J. Am. Stat. Assoc. 60, 1965),
-
-.. math::
-
-    w = (1 - Q_1 Q_1^T)^{-1/2}\,[(1 - QQ^T) z]_1, \qquad |w|^2 = |(1 - QQ^T) z|^2 .
+:math:`(1 - QQ^T)z`, does not depend on G.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
+from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.voltage_map import DENSE, evenly, orthonormalised, triangular
+from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
 from memscal.model.arrays import FloatArray, IndexArray
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
@@ -33,8 +27,6 @@ _CLIPPED = 4.0
 #: Columns are dependent where a singular value is below this; so many are multiplied at a time.
 _DEPENDENT = 1e-10
 _COLUMNS = 8
-#: Points among which those are chosen that determine the parameters.
-_CANDIDATES = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +98,8 @@ _FARTHEST = 8
 _LEAST_SKEWNESS = 1e-3
 #: Columns of the design differ within a place where more than this share of them does.
 _APART = 1e-6
+#: A step of which less is left, squared, is not tested.
+_LEAST_STEP = 0.1
 #: With fewer independent residuals there is nothing to test.
 FEWEST_RESIDUALS = 3
 
@@ -133,26 +127,6 @@ class Residuals:
     sequence: IndexArray  # (n,): which pass over the sensor: a repeat, or a raster's row
     stated: bool  # whether the noise is stated
     degrees: int  # how many of them are independent
-
-    @cached_property
-    def independent(self) -> tuple[FloatArray, IndexArray]:
-        """Independent residuals of equal variance and the same sum of squares, and their points."""
-        from scipy.linalg import qr
-
-        # The points that determine the parameters best are dropped: what is left of the others
-        # is then nearest to their own residuals.  Of very many, they are among some.
-        count = self.values.size
-        some = evenly(np.arange(count), _CANDIDATES)
-        pivots = qr(self.basis[some].T, mode="r", pivoting=True)[1]
-        dropped = some[pivots[: self.basis.shape[1]]]
-        rest = np.delete(np.arange(count), dropped)
-        # The symmetric inverse root of 1 - QQ' for the rows that are left of Q, by Q'Q of others.
-        lost = self.basis[dropped]
-        shares, vectors = np.linalg.eigh(lost.T @ lost)
-        root = np.sqrt(np.maximum(shares, np.finfo(float).eps))
-        along = self.basis.T @ self.values - lost.T @ self.values[dropped]
-        growth = vectors @ ((vectors.T @ along) / (root * (1 + root)))
-        return (self.values + self.basis @ growth)[rest], rest
 
 
 def residuals_of(estimate: ProfileEstimate, model: FreeModel | None = None) -> Residuals:
@@ -219,19 +193,30 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     return TestOutcome(value, limit, float(fdtrc(degrees, pure_degrees, value)))
 
 
-def runs_test(residuals: Residuals) -> TestOutcome:
-    """Test the share of neighbours along the scan whose residuals have the same sign."""
-    # The number of changes is binomial with probability 1/2 (Wald and Wolfowitz, Ann. Math. Stat.
-    # 11, 1940, count runs for an unknown median).  One-sided, for too few; the p-value is discrete.
-    values, rest = residuals.independent
-    same_pass = np.diff(residuals.sequence[rest]) == 0
-    pairs = int(same_pass.sum())
-    changes = int((np.diff(values > 0) & same_pass).sum())
-    # The fewest changes that chance allows.
-    fewest = int(np.argmax(bdtr(np.arange(pairs + 1.0), pairs, 0.5) > FALSE_ALARM))
-    share = (pairs - changes) / max(pairs, 1)
-    p_value = float(bdtr(float(changes), pairs, 0.5)) if pairs else 1.0
-    return TestOutcome(share, (pairs - fewest) / max(pairs, 1), p_value)
+def steps_test(residuals: Residuals) -> TestOutcome:
+    """Test the largest step of the residuals within a pass, in standard deviations."""
+    # A step has one degree of freedom, of which chi-square is exact (F, where no noise is stated);
+    # the largest of several has the p-value of one times their number (Bonferroni).
+    values = residuals.values
+    starts = np.flatnonzero(np.diff(residuals.sequence, prepend=-1, append=-1))
+    columns = np.column_stack([values, np.ones_like(values), residuals.basis])
+    onward = np.vstack([np.cumsum(columns[::-1], axis=0)[::-1], np.zeros(columns.shape[1])])
+    steps = onward[:-1] - np.repeat(onward[starts[1:]], np.diff(starts), axis=0)
+    # What no baseline and no G takes of a step.
+    square = steps[:, 1] - np.sum(steps[:, 2:] ** 2, axis=1)
+    tested = square > _LEAST_STEP
+    count = max(int(tested.sum()), 1)
+    value = float(np.max(steps[tested, 0] ** 2 / square[tested], initial=0.0))
+    share = FALSE_ALARM / count
+    if residuals.stated:
+        p_value = float(chdtrc(1, value))
+        limit = float(chdtri(1, share))
+    else:
+        rest = residuals.degrees - 1
+        value = rest * value / max(float(values @ values) - value, np.finfo(float).tiny)
+        p_value = float(fdtrc(1, rest, value))
+        limit = float(fdtri(1, rest, 1 - share))
+    return TestOutcome(math.sqrt(value), math.sqrt(limit), min(count * p_value, 1.0))
 
 
 def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:

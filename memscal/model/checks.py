@@ -60,10 +60,10 @@ noise_as_stated: scatter over the stated noise
     look for noise of position and load; state the actual noise
 chi_square: residuals that no radial G, or no radial stress, explains, against the noise
     check the reference (rod, film), baseline and stated noise; whether a contact is round
-residual_runs: runs of residuals of one sign
+residual_steps: largest step of the residuals, in standard deviations
     look for a step or bend of the baseline, a wrong reference, slow noise
 residual_correlation: correlation of neighbouring residuals
-    as residual_runs; or state a known correlation of the noise (u_zz_correlation)
+    as residual_steps; or state a known correlation of the noise (u_zz_correlation)
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit; the check names the kind of departure, too
 symmetry: difference of left and right (lines); even part of a shear

@@ -18,7 +18,7 @@ def checks(scan, **options) -> dict[str, QualityCheck]:
 
 @pytest.mark.parametrize(("options", "there", "absent"), [
     ({}, {"chi_square"}, {"held_out_repeat", "held_out_load", "held_out_scan"}),
-    ({"state_noise": False}, {"residual_runs"}, {"chi_square", "noise_as_stated"}),
+    ({"state_noise": False}, {"residual_steps"}, {"chi_square", "noise_as_stated"}),
     ({"state_noise": False, "repeats": 3}, {"chi_square", "held_out_repeat"}, set()),
     ({"load": [0.5, 1.0, 1.5]}, {"held_out_load"}, {"held_out_repeat"}),
     ({"load": [0.5, 1.0], "repeats": 2}, {"held_out_load", "held_out_repeat"}, set()),

@@ -18,7 +18,7 @@ from memscal.estimation.residuals import (
     neighbour_correlation_test,
     pure_error_test,
     residuals_of,
-    runs_test,
+    steps_test,
 )
 from memscal.model.scan import Scan
 
@@ -46,9 +46,6 @@ def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) 
     misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
     assert residuals.values @ residuals.values == pytest.approx(misfit @ misfit, rel=1e-6)
     assert residuals.degrees == model.data.size - model.design.shape[1]
-    independent, kept = residuals.independent
-    assert independent @ independent == pytest.approx(misfit @ misfit, rel=1e-6)
-    assert independent.size == kept.size == residuals.degrees
 
 
 def with_voltages(estimate: ProfileEstimate, u: np.ndarray) -> ProfileEstimate:
@@ -57,7 +54,7 @@ def with_voltages(estimate: ProfileEstimate, u: np.ndarray) -> ProfileEstimate:
     return replace(estimate, model=model, outlier_weight=np.ones(u.size))
 
 
-def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None:
+def test_residuals_of_many_noises_are_noise_of_unit_variance_less_its_projection() -> None:
     estimate = estimated(simulated(noise=0.01, points=33))
     rng = np.random.default_rng()
     rows = []
@@ -65,13 +62,15 @@ def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None
     for _ in range(draws):
         noise = rng.normal(0.0, 1.0, estimate.points.u.size) * estimate.points.u_errors
         noisy = with_voltages(estimate, estimate.gaussian.predicted + noise)
-        rows.append(residuals_of(noisy).independent[0])
+        residuals = residuals_of(noisy)
+        rows.append(residuals.values)
     covariance = np.cov(np.array(rows).T)
-    assert 20 < covariance.shape[0] < 28
-    # One of some 300 entries strays by six of its errors, 1/sqrt(draws), once in 1e6; a variance
+    assert 20 < residuals.degrees < 28
+    # One of some 600 entries strays by six of its errors, 1/sqrt(draws), once in 1e6; a variance
     # has an error sqrt(2) as large.
     limit = 8.5 / np.sqrt(draws)
-    np.testing.assert_allclose(covariance, np.eye(covariance.shape[0]), atol=limit)
+    expected = np.eye(33) - residuals.basis @ residuals.basis.T
+    np.testing.assert_allclose(covariance, expected, atol=limit)
 
 
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), TAILS, RING])
@@ -107,19 +106,20 @@ def test_the_chi_square_is_that_of_the_distribution() -> None:
     assert found.limit == pytest.approx(chi2.isf(1e-3, 4) / 4)
 
 
-def test_the_limit_of_runs_is_what_passes_at_a_thousandth() -> None:
-    for changes in range(20):
-        signs = np.where(np.arange(21) <= changes, (-1.0) ** np.arange(21), (-1.0) ** changes)
-        found = runs_test(made(signs))
-        assert found.value == pytest.approx(1 - changes / 20)
-        assert found.p_value == pytest.approx(binom.cdf(changes, 20, 0.5))
-        assert (found.value > found.limit) == (found.p_value <= 1e-3)
+def test_the_largest_step_is_that_of_a_mean_over_its_deviation() -> None:
+    values = np.append(np.zeros(12), np.ones(4))
+    found = steps_test(made(values))
+    assert found.value == pytest.approx(2.0)
+    assert found.p_value == pytest.approx(16 * chi2.sf(4.0, 1))
+    assert found.limit == pytest.approx(np.sqrt(chi2.isf(1e-3 / 16, 1)))
+    unstated = steps_test(replace(made(2 * values + np.tile([0.1, -0.1], 8)), stated=False))
+    assert unstated.p_value == pytest.approx(16 * f.sf(unstated.value**2, 1, 15))
+    assert (unstated.value > unstated.limit) == (unstated.p_value < 1e-3)
 
 
 def test_neighbours_of_different_passes_are_no_neighbours() -> None:
     values = np.tile([1.0, 1.0, -1.0, -1.0], 5)
-    assert runs_test(made(values, passes=10)).value == 1.0
-    assert runs_test(made(values, passes=20)).p_value == 1.0
+    assert steps_test(made(values, passes=10)).value == pytest.approx(np.sqrt(2))
     assert neighbour_correlation_test(made(values, passes=20)).value == 0.0
 
 
@@ -202,11 +202,13 @@ def disturbed(cause: str, noise: float = 0.003) -> Scan:
 
 
 @pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "correlated noise"])
-def test_faults_leave_runs_and_alike_neighbours(cause: str) -> None:
+def test_faults_leave_steps_and_alike_neighbours(cause: str) -> None:
     residuals = residuals_of(estimated(disturbed(cause)))
-    for found in (runs_test(residuals), neighbour_correlation_test(residuals)):
-        assert found.value > found.limit
-        assert found.p_value < 1e-3
+    found = [neighbour_correlation_test(residuals)]
+    if cause != "correlated noise":
+        found.append(steps_test(residuals))
+    assert all(outcome.value > outcome.limit for outcome in found)
+    assert max(outcome.p_value for outcome in found) < 1e-3
 
 
 @pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "a thicker film"])

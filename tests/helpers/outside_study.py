@@ -3,10 +3,11 @@
 Each row makes scans by the calculation of helpers.outside with one thing other than stated. The
 size at which A (or sigma) is wrong by two standard uncertainties is found without noise; at three a
 row is alarmed if checks fail; where a scan states the size as a standard uncertainty, sizes drawn
-from it are counted; where a calibration names a size, it is compared.
+from it are counted, at two and at three; where a calibration names a size, it is compared.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -26,6 +27,10 @@ SYMBOLS = {"conversion_constant": "A", "gaussian_sigma": "σ"}
 #: Sizes are tried up to this factor of the first one, each larger by this ratio.
 _FARTHEST = 32.0
 _RATIO = 1.25
+#: Limits of what is counted (rms of z), alarmed (share of runs) and named (factor).
+COUNTED = 1.4
+ALARMED = 0.9
+NAMED = 1.5
 
 Stated = Callable[[Scan, float], Scan]
 
@@ -60,13 +65,27 @@ class Row:
     parameter: str = "conversion_constant"
     signs: tuple[float, ...] = (-1.0, 1.0)
 
-    def calibrated(self, size: float, seed: int | None = None) -> ApparatusFunction:
-        """Calibrate a scan of a size, without noise or with that of a seed."""
+    def calibrated(self, size: float) -> ApparatusFunction:
+        """Calibrate a scan of a size without noise, which it states as it is."""
         world = self.world(size)
-        scan = perturbed_scan(world, seed or 0)
-        if seed is None:
-            scan = replace(scan, u_zz=world.voltages(scan.x))
+        scan = perturbed_scan(world, 0)
+        scan = replace(scan, u_zz=world.voltages(scan.x))
         return memscal.calibrate(scan, other=False).apparatus
+
+    def failed(self, size: float, seed: int) -> list[str]:
+        """Names of the checks that a scan of a size fails, with all that a user gets."""
+        apparatus = memscal.calibrate(perturbed_scan(self.world(size), seed)).apparatus
+        return [check.name for check in apparatus.checks if not check.passed]
+
+    def stated_deviations(self, size: float, draws: int) -> list[float]:
+        """Deviations where sizes are drawn from what scans state as a standard uncertainty."""
+        z = []
+        for seed in range(draws):
+            drawn = size * abs(np.random.default_rng([35, seed]).normal())
+            sign = self.signs[seed % len(self.signs)]
+            scan = self.stated(perturbed_scan(self.world(sign * drawn), seed), size)
+            z.append(self.deviation(memscal.calibrate(scan, other=False).apparatus))
+        return z
 
     def deviation(self, apparatus: ApparatusFunction) -> float:
         """Error of the parameter over its standard uncertainty."""
@@ -96,8 +115,21 @@ class Outcome:
     two: float
     three: float
     alarmed: float  # share of runs at the latter with a failed check
-    counted: float | None  # rms of error over uncertainty, where the scan states the size
+    check: str  # that fails most often
+    counted: tuple[float, ...]  # rms of error over uncertainty where the scan states the sizes
     named: float | None  # the size of two uncertainties as named, over that found
+
+    @property
+    def told_by(self) -> tuple[str, ...]:
+        """What tells the row, of counted, alarmed and named."""
+        told = []
+        if self.counted and max(self.counted) <= COUNTED:
+            told.append("counted")
+        if self.alarmed >= ALARMED:
+            told.append("alarmed")
+        if self.named is not None and self.row.shown_by and 1 / NAMED < self.named < NAMED:
+            told.append("named")
+        return tuple(told)
 
 
 @lru_cache
@@ -105,18 +137,16 @@ def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
     """Run one row of the study."""
     two = row.size_at(2.0)
     three = row.size_at(3.0)
-    failed = []
+    failed: Counter[str] = Counter()
+    alarmed = math.nan
     if math.isfinite(three):
-        failed = [not row.calibrated(three, seed).passed for seed in range(runs)]
-    counted = None
-    if row.stated is not None and math.isfinite(two):
-        z = []
-        for seed in range(draws):
-            size = two * abs(np.random.default_rng([35, seed]).normal())
-            sign = row.signs[seed % len(row.signs)]
-            scan = row.stated(perturbed_scan(row.world(sign * size), seed), two)
-            z.append(row.deviation(memscal.calibrate(scan, other=False).apparatus))
-        counted = float(np.sqrt(np.mean(np.square(z))))
+        by_run = [row.failed(three, seed) for seed in range(runs)]
+        alarmed = sum(map(bool, by_run)) / runs
+        for names in by_run:
+            failed.update(names)
+    sizes = [size for size in (two, three) if math.isfinite(size)]
+    by_size = [row.stated_deviations(size, draws) for size in sizes] if row.stated else []
+    counted = [float(np.sqrt(np.mean(np.square(z)))) for z in by_size]
     named = None
     if row.assumption and math.isfinite(two):
         assumptions = {each.name: each for each in row.calibrated(0.0).assumptions}
@@ -124,7 +154,8 @@ def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
         # Of an offset the error grows with the square.
         factor = math.sqrt(2) if row.assumption == "line_offset" else 2.0
         named = factor * size / row.named(two)
-    return Outcome(row, two, three, float(np.mean(failed)) if failed else math.nan, counted, named)
+    check = failed.most_common(1)[0][0] if failed else ""
+    return Outcome(row, two, three, alarmed, check, tuple(counted), named)
 
 
 def _ratio_of_lobe(distance: float) -> float:
@@ -157,6 +188,7 @@ ROWS = {
             0.3e-3,
             "mm",
             1e3,
+            lambda scan, size: replace(scan, roundness_uncertainty=_ratio_of_lobe(size)),
             assumption="roundness",
             named=_ratio_of_lobe,
             shown_by="a raster",
@@ -208,6 +240,8 @@ ROWS = {
             0.002,
             "%",
             100.0,
+            # From edge to centre a cosine changes by twice its amplitude.
+            lambda scan, size: replace(scan, baseline_curvature_uncertainty=2 * size),
             # From edge to centre it is twice its amplitude.
             lambda scan, size: replace(scan, baseline_curvature_uncertainty=2 * size),
         ),

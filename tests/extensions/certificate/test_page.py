@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from memscal.extensions.certificate.certificate import Certificate, certify
 from memscal.extensions.certificate.page import certificate_page
+from memscal.model.assumptions import MOVED, NAMES, Assumption
 from memscal.model.checks import QualityCheck
 
 NO_ACCREDITATION = "This is no accredited certificate"
@@ -38,6 +39,13 @@ def test_it_is_no_accredited_certificate_unless_the_laboratory_says_otherwise(ce
     text = text_of(stating(certificate, "laboratory", accreditation="body X, number 5"))
     assert NO_ACCREDITATION not in text
     assert "as the laboratory states it: body X, number 5" in text
+
+
+def test_what_the_values_take_for_granted_is_listed_with_its_sizes(apparatus, laboratory):
+    assumed = tuple(Assumption(name, "assumed", dict.fromkeys(MOVED, 0.05)) for name in NAMES)
+    text = text_of(certify(replace(apparatus, assumptions=assumed), laboratory))
+    assert text.count("Assumed; ") == len(NAMES)
+    assert "The sensor is round. Assumed; axis ratio less one: 0.05." in text
 
 
 def test_hostile_names_stay_text(certificate):
