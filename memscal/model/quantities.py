@@ -166,6 +166,11 @@ def required(*quantities: Quantity) -> list[Quantity]:
     return [replace(quantity, required=True) for quantity in quantities]
 
 
+def along(axes: tuple[str, ...], *quantities: Quantity) -> list[Quantity]:
+    """Return quantities as arrays that run along the same axes."""
+    return [replace(quantity, axes=axes) for quantity in quantities]
+
+
 def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Quantity]:
     """Return a number and its standard uncertainty, ``NAME_errors`` in files."""
     spread = replace(

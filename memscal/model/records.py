@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from memscal.model.assumptions import SIZE_KEYS
-from memscal.model.quantities import ESTIMATED, Quantity, Record, measured, record, required
+from memscal.model.quantities import ESTIMATED, Quantity, Record, along, measured, record, required
 from memscal.model.scan import STATED_ERRORS
 
 _L = "length"
@@ -117,12 +117,15 @@ SCAN_DATA = record(
     Quantity("u_zz", _U, "voltage of the normal channel", "U_zz", _X, required=True),
     Quantity("u_zz_errors", _U, "noise of the normal channel", axes=_X),
     Quantity("u_zz_correlation", _ONE, "correlation of the noise", axes=("point", "point_prime")),
-    Quantity("normal_load", "force", "load at each point", "P", _X),
-    Quantity("normal_load_errors", "force", "standard uncertainty of the load", axes=_X),
-    Quantity("u_xz", _U, "voltage of the channel xz", "U_xz", _X),
-    Quantity("u_xz_errors", _U, "noise of the channel xz", axes=_X),
-    Quantity("u_yz", _U, "voltage of the channel yz", "U_yz", _X),
-    Quantity("u_yz_errors", _U, "noise of the channel yz", axes=_X),
+    *along(
+        _X,
+        Quantity("normal_load", "force", "load at each point", "P"),
+        Quantity("normal_load_errors", "force", "standard uncertainty of the load"),
+        Quantity("u_xz", _U, "voltage of the channel xz", "U_xz"),
+        Quantity("u_xz_errors", _U, "noise of the channel xz"),
+        Quantity("u_yz", _U, "voltage of the channel yz", "U_yz"),
+        Quantity("u_yz_errors", _U, "noise of the channel yz"),
+    ),
     signal="u_zz",
 )
 TAKEN_FOR_GRANTED = record(
@@ -141,12 +144,15 @@ SYNTHETIC = record(
 
 PROFILE = record(
     "NXdata",
-    *required(
-        Quantity("r", _L, "distance from the indenter's axis", "r", _R),
-        Quantity("sigma_zz", _P, "normal stress at the base", "σ_zz", _R),
+    *along(
+        _R,
+        *required(
+            Quantity("r", _L, "distance from the indenter's axis", "r"),
+            Quantity("sigma_zz", _P, "normal stress at the base", "σ_zz"),
+        ),
+        Quantity("sigma_rz", _P, "radial traction on the film", "σ_rz"),
+        Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress"),
     ),
-    Quantity("sigma_rz", _P, "radial traction on the film", "σ_rz", _R),
-    Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress", axes=_R),
     signal="sigma_zz",
 )
 IDEAL_REFERENCE = record(
@@ -198,13 +204,16 @@ FIELD = record(
 )
 RADIAL = record(
     "NXdata",
-    *required(
-        Quantity("r", _L, "distance from the sensor", "r", _R),
-        Quantity("g", _PER_AREA, "apparatus function", "G", _R),
-        Quantity("g_errors", _PER_AREA, _OF_G, axes=_R),
-        Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R),
+    *along(
+        _R,
+        *required(
+            Quantity("r", _L, "distance from the sensor", "r"),
+            Quantity("g", _PER_AREA, "apparatus function", "G"),
+            Quantity("g_errors", _PER_AREA, _OF_G),
+            Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan"),
+        ),
+        Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A"),
     ),
-    Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A", axes=_R),
     signal="g",
 )
 RADIAL_COVARIANCE = record(
@@ -244,21 +253,23 @@ TRANSFER = record(
 )
 RECONVOLUTION = record(
     "NXdata",
-    *required(
-        Quantity("x", _L, "position", "x", _X),
-        Quantity("u_zz", _U, "voltage", "U", _X),
-        Quantity("u_zz_errors", _U, "noise of the voltage", axes=_X),
-        Quantity("u_zz_predicted", _U, "predicted with the deconvolved G", axes=_X),
-        Quantity("u_zz_gaussian", _U, "predicted with the Gaussian", axes=_X),
-        Quantity("residual", _U, "measured minus predicted", axes=_X),
+    *along(
+        _X,
+        *required(
+            Quantity("x", _L, "position", "x"),
+            Quantity("u_zz", _U, "voltage", "U"),
+            Quantity("u_zz_errors", _U, "noise of the voltage"),
+            Quantity("u_zz_predicted", _U, "predicted with the deconvolved G"),
+            Quantity("u_zz_gaussian", _U, "predicted with the Gaussian"),
+            Quantity("residual", _U, "measured minus predicted"),
+        ),
+        Quantity("offset_x", _L, "position from the centre along x"),
+        Quantity("offset_y", _L, "position from the centre along y"),
+        Quantity("load", "force", "load at each point", "P", stored="normal_load"),
+        Quantity("background", _U, "baseline and drift"),
     ),
-    Quantity("offset_x", _L, "position from the centre along x", axes=_X),
-    Quantity("offset_y", _L, "position from the centre along y", axes=_X),
-    Quantity("load", "force", "load at each point", "P", _X, stored="normal_load"),
-    Quantity("background", _U, "baseline and drift", axes=_X),
     signal="u_zz",
 )
-
 CHECK = record(
     "NXcollection",
     Quantity("name", "text", "check"),
@@ -299,14 +310,17 @@ PROCESS = record(
 # Along r; x and y are the indenter's positions.
 STRESS_PROFILE = record(
     "NXdata",
-    *required(
-        Quantity("r", _L, "distance from the centre", "r", _R),
-        Quantity("x", _L, "position along x", "x", _R),
-    ),
-    Quantity("y", _L, "position along y", "y", _R),
-    *required(
-        Quantity("s_zz", _P, "measured normal stress", "S_zz", _R),
-        Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R),
+    *along(
+        _R,
+        *required(
+            Quantity("r", _L, "distance from the centre", "r"),
+            Quantity("x", _L, "position along x", "x"),
+        ),
+        Quantity("y", _L, "position along y", "y"),
+        *required(
+            Quantity("s_zz", _P, "measured normal stress", "S_zz"),
+            Quantity("s_zz_errors", _P, "standard uncertainty of S_zz"),
+        ),
     ),
     signal="s_zz",
 )
@@ -348,19 +362,21 @@ MEASURED_SCAN = record(
 def points_record(channel: str) -> Record:
     """Return the record of the measured points of a channel: ``zz``, ``xz`` or ``yz``."""
     u = f"u_{channel}"
-    point = ("point",)
     return record(
         "NXdata",
-        *required(
-            Quantity("x", _L, "position along x", axes=point),
-            Quantity("y", _L, "position along y", axes=point),
-            Quantity("x_errors", _L, axes=point),
-            Quantity("u", _U, "voltage", axes=point, stored=u),
-            Quantity("weight", _ONE, axes=point, stored="outlier_weight"),
-            Quantity("load", "force", axes=point, stored="normal_load"),
-            Quantity("load_errors", "force", axes=point, stored="normal_load_errors"),
+        *along(
+            ("point",),
+            *required(
+                Quantity("x", _L, "position along x"),
+                Quantity("y", _L, "position along y"),
+                Quantity("x_errors", _L),
+                Quantity("u", _U, "voltage", stored=u),
+                Quantity("weight", _ONE, stored="outlier_weight"),
+                Quantity("load", "force", stored="normal_load"),
+                Quantity("load_errors", "force", stored="normal_load_errors"),
+            ),
+            Quantity("noise", _U, stored=f"{u}_errors"),
         ),
-        Quantity("noise", _U, axes=point, stored=f"{u}_errors"),
         Quantity("correlation", _ONE, axes=("point", "point_prime"), stored=f"{u}_correlation"),
         signal=u,
     )
