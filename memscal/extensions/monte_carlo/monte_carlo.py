@@ -422,8 +422,6 @@ def _compared(
     # Beyond what the number of draws allows: two standard errors.
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
     agrees = abs(spread - u) <= _TOLERANCE * u + 2 * error and same_mean
-    low, high = np.quantile(column, _TAILS)
-    first, last = shortest_interval(column)
     return BudgetComparison(
         name=name,
         value=parameters[name],
@@ -431,8 +429,8 @@ def _compared(
         mean=mean,
         uncertainty=spread,
         sampling_error=error,
-        symmetric=(float(low), float(high)),
-        shortest=(float(first), float(last)),
+        symmetric=tuple(np.quantile(column, _TAILS).tolist()),
+        shortest=tuple(shortest_interval(column).tolist()),
         first_order=u,
         stated=parameters.uncertainty(name),
         reason="" if agrees else _NOT_LINEAR.format(spread / u, (mean - expected) / u),
