@@ -96,7 +96,7 @@ def artifact_tree(data: ApparatusData) -> Group:
     if data.kernel_changes:
         names, changes = zip(*data.kernel_changes.items(), strict=True)
         group = write_record(records.KERNEL_CHANGES, {"kernel_changes": np.stack(changes)})
-        listed = to_json("inputs", list(names))
+        listed = to_json(list(names))
         radii = si(data.radial_profile.r, "length", ("r",))
         group = replace(group, children={"names": listed, **group.children, "r": radii})
         children["kernel_changes"] = group

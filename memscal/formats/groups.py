@@ -50,7 +50,7 @@ class Kind:
 
 
 def _write_json_note(quantity: Quantity, value: Any) -> Group:
-    text = to_json(quantity.name, value)
+    text = to_json(value, quantity.name)
     return writer.note(text, media_type="application/json", description=quantity.words)
 
 
@@ -208,7 +208,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
             why="The group of the parameters holds something else of that name.",
             cure="Give it another name.",
         )
-    children: dict[str, Node] = {"names": to_json("parameter names", parameters.names)}
+    children: dict[str, Node] = {"names": to_json(parameters.names)}
     for name, dimension in dimensions.items():
         children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
@@ -261,7 +261,7 @@ def estimated_record(file: SafeFile, path: str) -> Record:
 
 def named_collection(children: Mapping[str, Node]) -> Group:
     """Return nodes as an NXcollection; ``names`` keeps their order."""
-    return Group("NXcollection", {"names": to_json("names", list(children)), **children})
+    return Group("NXcollection", {"names": to_json(list(children)), **children})
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:

@@ -258,7 +258,7 @@ def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
         name: value if isinstance(value, str) else si(value, groups.parameter_dimension(name))
         for name, value in truth.items()
     }
-    children["names"] = writer.to_json("names of the synthetic truth", list(truth))
+    children["names"] = writer.to_json(list(truth))
     return Group("NXcollection", children)
 
 

@@ -183,12 +183,12 @@ def _entry(measured: MeasuredStress) -> Group:
     digests = {"content_sha256": digest} if digest else {}
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
-        "profiles": to_json("profiles", list(profiles)),
+        "profiles": to_json(list(profiles)),
         **profiles,
         **_parts_of_profiles(measured.profiles),
         "sensor": write_record(records.CONVERSION.read_in(first.reading), measured, **digests),
         "quality": groups.quality_group(measured.checks),
-        "overridden": to_json("overridden", measured.overridden),
+        "overridden": to_json(measured.overridden),
         # Those of the first scan; each scan states its own beside them.
         "sample": groups.sample_group(first.film),
         "instrument": groups.instrument_group(first.sensor, first.load_cell),
@@ -246,7 +246,7 @@ def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
 
 def _roots_group(profile: MeasuredProfile) -> Group:
     children: dict[str, Node] = {
-        "sources": to_json("sources", list(profile.roots)),
+        "sources": to_json(list(profile.roots)),
         "r": si(profile.r, "length", ("r",)),
     }
     for source, root in profile.roots.items():

@@ -91,7 +91,7 @@ def note(text: str, *, media_type: str = "text/plain", description: str = "") ->
     return Group("NXnote", children)
 
 
-def to_json(subject: str, value: Any) -> str:
+def to_json(value: Any, subject: str = "A list") -> str:
     """Write plain values as JSON; numbers that are not finite become strings."""
     return json.dumps(_json_value(subject, value), sort_keys=True, allow_nan=False)
 
@@ -182,7 +182,7 @@ def file_tree(schema: str, entry: Group) -> Group:
     listed = _with_contents(root, "")
     # The list names itself, so it is made once with a place for itself and once in full.
     contents = {path: sorted(_attributes(node)) for path, node in walk(listed)}
-    listed = _with_contents(root, to_json("contents", contents))
+    listed = _with_contents(root, to_json(contents))
     nodes = sorted(walk(listed), key=lambda item: item[0])
     digest = content_digest((path, node, _attributes(node)) for path, node in nodes)
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
