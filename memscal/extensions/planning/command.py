@@ -12,6 +12,7 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FREE_OR_STUCK,
     PAPER_FILM,
+    NonNegative,
     Quantity,
     figure_option,
     film_from,
@@ -71,7 +72,7 @@ def _target(value: str) -> tuple[str, float]:
 @click.command("design", epilog=EXAMPLES)
 @kernel_options
 @option("--load", Quantity("N"), 1.0)("Normal load, in N.")
-@option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
+@option("--load-uncertainty", NonNegative("percent"), 1.0)(
     "Standard uncertainty (k = 1) of the load, in percent."
 )
 @radius_options(default=0.25, uncertainty=0.0025)
@@ -88,13 +89,13 @@ def _target(value: str) -> tuple[str, float]:
     "Expected position of the sensor along the scan, in mm."
 )
 @rod_friction_option(f"{FREE_OR_STUCK} Default: the scan will not state it.")
-@option("--position-scale-uncertainty", Quantity("percent", open_low=False))(
+@option("--position-scale-uncertainty", NonNegative("percent"))(
     "Standard uncertainty (k = 1) of the stage's scale, in percent."
 )
-@option("--line-offset-uncertainty", Quantity("mm", open_low=False))(
+@option("--line-offset-uncertainty", NonNegative("mm"))(
     "That of the distance at which the line passes the sensor's centre, in mm."
 )
-@option("--roundness-uncertainty", Quantity("ratio", open_low=False))(
+@option("--roundness-uncertainty", NonNegative("ratio"))(
     "That of the sensor's axis ratio less one."
 )
 @option("--method", default="bayesian")(

@@ -16,6 +16,7 @@ from memscal.cli.options import (
     FILE,
     FREE_OR_STUCK,
     PAPER_FILM,
+    NonNegative,
     Quantity,
     film_from,
     film_options,
@@ -52,10 +53,10 @@ _sphere_options = options_of(
         "Sphere: load of the lubricated contacts, in N. May be repeated."
     ),
     option("--sphere-radius", Quantity("mm"), 128.8)("Sphere: radius of curvature, in mm."),
-    option("--sphere-radius-uncertainty", Quantity("mm", open_low=False), 0.5)(
+    option("--sphere-radius-uncertainty", NonNegative("mm"), 0.5)(
         "Sphere: standard uncertainty (k = 1) of its radius, in mm."
     ),
-    option("--friction", Quantity("ratio", open_low=False, infinite=True), 0.2, metavar="MU")(
+    option("--friction", NonNegative("ratio", infinite=True), 0.2, metavar="MU")(
         "Sphere: friction coefficient of the dry contacts; inf: they stick wherever they touch."
     ),
     option("--loading", click.Choice(["incremental", "total"]), "incremental")(
@@ -64,14 +65,14 @@ _sphere_options = options_of(
     interface_options,
     option("--contacts", click.IntRange(min=2, max=4096), 33)("Sphere: contacts in a row."),
     option("--spacing", Quantity("mm"), 0.5)("Sphere: distance of neighbouring contacts, in mm."),
-    option("--load-scatter", Quantity("percent", high=10.0, open_low=False), 2.0)(
+    option("--load-scatter", NonNegative("percent", high=10.0), 2.0)(
         "Sphere: standard deviation of each contact's own load, in percent."
     ),
     option("--record-loads", is_flag=True)(
         "Sphere: record the load that each contact had, read to 0.2 percent, in place of "
         "the nominal one."
     ),
-    option("--position-error", Quantity("um", open_low=False), 10.0)(
+    option("--position-error", NonNegative("um"), 10.0)(
         "Sphere: standard deviation of each contact's own position, in um."
     ),
     option("--draw-inputs", is_flag=True)(
@@ -227,7 +228,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Repeats at each load; with a sphere, of its contacts."
 )
 @option("--raster", is_flag=True)("Rod scan alone: a square instead of a line.")
-@option("--noise", Quantity("percent", open_low=False), 0.5)(
+@option("--noise", NonNegative("percent"), 0.5)(
     "Standard deviation of the noise, in percent of the largest signal."
 )
 @option("--centre", Quantity("mm", low=-math.inf), 0.14)(
@@ -240,7 +241,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @option("--drift", Quantity("percent", low=-math.inf), 0.5)(
     "Change of the offset across the scan, in percent of the largest signal."
 )
-@option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
+@option("--load-uncertainty", NonNegative("percent"), 1.0)(
     "Standard uncertainty to state for the load, in percent."
 )
 @option("--state-noise/--no-state-noise", default=True)(
