@@ -424,7 +424,6 @@ def compare_measured(
         joint_fits = {loading: fit_friction(normal[loading], sheared[loading]) for loading in fits}
     loads = _loads(measured, fits)
     joint = fit_together(measured, joint_fits, lubricated_friction)
-    joint = {lubrication: with_loading(by_loading) for lubrication, by_loading in joint.items()}
 
     first = next(iter(channels.values()))
     frictionless = first.at(first.family.values[0])
@@ -470,7 +469,7 @@ def channels_of(
 def _loads(
     measured: MeasuredStress, fits: Mapping[str, FrictionFit]
 ) -> dict[str, tuple[LoadComparison, ...]]:
-    """Compare each load by each loading; what the other would have given counts as uncertainty."""
+    """Compare each load by each loading; its coefficients are the middle of both."""
     loads: dict[str, list[LoadComparison]] = {loading: [] for loading in fits}
     for i, profile in enumerate(measured.profiles):
         by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
@@ -497,13 +496,12 @@ def fit_together(
     }
     held = indices.pop("lubricated", [])
     first = next(iter(fits.values())).channel.family.values[0]
-    if not held or lubricated_friction is None or first > 0:
-        return joint
-    for lubrication, chosen in indices.items():
-        for loading, fit in fits.items():
-            estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
-            joint[lubrication][loading] = estimate
-    return joint
+    if held and lubricated_friction is not None and first == 0:
+        for lubrication, chosen in indices.items():
+            for loading, fit in fits.items():
+                estimate = fit.coefficient_beside(chosen, held, lubricated_friction)
+                joint[lubrication][loading] = estimate
+    return {lubrication: with_loading(by_loading) for lubrication, by_loading in joint.items()}
 
 
 def _compared_by_shear(
@@ -520,15 +518,16 @@ def _compared_by_shear(
     channels = channels_of(measured, apparatus, families)
     fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     overridden = override_messages(measured.overridden)
-    by_shear = {}
-    for loading, fit in fits.items():
-        loads = range(len(measured.profiles))
-        by_shear[loading] = tuple(fit.coefficient([i]) for i in loads)
+    by_shear: dict[str, list[BoundedEstimate]] = {loading: [] for loading in fits}
+    for i in range(len(measured.profiles)):
+        counted = with_loading({loading: fit.coefficient([i]) for loading, fit in fits.items()})
+        for loading, estimate in counted.items():
+            by_shear[loading].append(estimate)
     return FrictionComparison(
         measured=measured,
         friction=next(iter(families.values())).values,
         loads={},
-        by_shear=by_shear,
+        by_shear={loading: tuple(each) for loading, each in by_shear.items()},
         joint=fit_together(measured, fits),
         messages=(*overridden, *notes, *synthetic_messages(measured)),
         shear=apparatus,

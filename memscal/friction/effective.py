@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc, erf
@@ -68,12 +69,24 @@ class FrictionFit:
         both = replace(along, loads=(*along.loads, *beside.loads))
         estimate = self._estimate(both, -2 * logs, chi_square, near)
         budget = dict(estimate.budget)
+        interval = estimate.interval
         share = budget.pop(LUBRICATED_FRICTION, None)
-        if friction > 0 and share is not None:
-            budget[LUBRICATED_FRICTION] = share
-        # More friction of the lubricated loads reads as less of the others.
-        moved = None if share is None else -share / spread
-        return replace(estimate, beside=len(lubricated), by_lubricated=moved, budget=budget)
+        if friction > 0:
+            # No friction is at the end of its prior: where it is true, the average alone would
+            # exclude the truth in one of five.
+            none = self.coefficient_beside(chosen, lubricated, 0.0).interval
+            interval = replace(interval, low=min(interval.low, none.low))
+            if share is not None:
+                budget[LUBRICATED_FRICTION] = share
+        return replace(
+            estimate,
+            interval=interval,
+            reason=friction_reason(interval, float(family.values[-1])),
+            beside=len(lubricated),
+            # More friction of the lubricated loads reads as less of the others.
+            by_lubricated=None if share is None else -share / spread,
+            budget=budget,
+        )
 
     def _near(self, chosen: Sequence[int]) -> Callable[[float], Likelihood]:
         """Return the likelihood of some of the loads at any one value."""
@@ -150,8 +163,9 @@ def _stretch(value: float, scale: float) -> float:
     return float(scale / (1 - bounded(value, scale)) ** 2)
 
 
-#: Standard deviation of half a normal distribution over its width.
+#: Standard deviation of half a normal distribution over its width, and mean over the former.
 _HALF_NORMAL_DEVIATION = math.sqrt(1 - 2 / math.pi)
+HALF_NORMAL_MEAN = math.sqrt(2 / math.pi) / _HALF_NORMAL_DEVIATION
 #: A friction that is held has this width.
 _LEAST_WIDTH = 1e-6
 #: Values of the lubricated friction over which the likelihood is averaged, and how many widths
@@ -177,31 +191,30 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
 
 
 def with_loading(by_loading: Mapping[str, BoundedEstimate]) -> dict[str, BoundedEstimate]:
-    """Count the standard uncertainty of a rectangle between both loadings, width / sqrt(12)."""
-    counted = dict(by_loading)
-    values = [estimate.value for estimate in by_loading.values() if estimate.value is not None]
-    if len(values) == 2:
-        apart = abs(values[0] - values[1]) / math.sqrt(12)
-        for loading, estimate in by_loading.items():
-            counted[loading] = _widened(estimate, apart)
-    return counted
-
-
-def _widened(estimate: BoundedEstimate, apart: float) -> BoundedEstimate:
-    """Count one more standard uncertainty, by the loading, in a coefficient and its interval."""
-    value = estimate.best
-    u = estimate.standard_uncertainty
-    interval = estimate.interval
-    low = value - math.hypot(value - interval.low, EXPANDED * apart)
-    high = interval.high
-    if high is not None:
-        high = value + math.hypot(high - value, EXPANDED * apart)
-    return replace(
-        estimate,
-        standard_uncertainty=None if u is None else math.hypot(u, apart),
-        interval=replace(interval, low=max(low, 0.0), high=high),
-        budget={**estimate.budget, "loading": apart},
-    )
+    """Take the middle of both loadings; a rectangle between them, width / sqrt(12), is left."""
+    estimates = list(by_loading.values())
+    values = [estimate.value for estimate in estimates if estimate.value is not None]
+    if len(values) < 2:
+        return dict(by_loading)
+    middle = sum(values) / 2
+    apart = abs(values[0] - values[1]) / math.sqrt(12)
+    lows = []
+    highs = []
+    for estimate, value in zip(estimates, values, strict=True):
+        below = math.hypot(value - estimate.interval.low, EXPANDED * apart)
+        # What the data do not exclude by one of the loadings is not excluded.
+        lows.append(max(middle - below, 0.0) if estimate.interval.low > 0 else 0.0)
+        highs.append(middle + math.hypot(estimate.interval.upper - value, EXPANDED * apart))
+    widest = max(estimates, key=lambda estimate: estimate.standard_uncertainty or math.inf)
+    u = widest.standard_uncertainty
+    counted: dict[str, Any] = {
+        "value": middle,
+        "standard_uncertainty": None if u is None else math.hypot(u, apart),
+        "interval": replace(widest.interval, low=min(lows), high=max(highs)),
+        "budget": {**widest.budget, "loading": apart},
+        "by_lubricated": widest.by_lubricated,
+    }
+    return {loading: replace(estimate, **counted) for loading, estimate in by_loading.items()}
 
 
 def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> LoadComparison:

@@ -169,6 +169,7 @@ def test_lubricated_loads_are_fitted_beside_the_dry_ones(made, apparatus, famili
     assert found.joint["dry"]["incremental"].interval == usual.interval
     # Without friction the dry coefficient is less by what moves it; the unknown is in the budget.
     assert held.value < usual.value < wide.value
+    assert usual.interval.low <= held.interval.low
     assert apart.by_lubricated is None
     assert "lubricated_friction" not in held.budget
     assert usual.budget["lubricated_friction"] < wide.budget["lubricated_friction"]
@@ -194,6 +195,16 @@ def test_how_far_lubricated_friction_moves_the_dry_coefficient(
     change = (estimate(little).value - none.value) / little
     # One that is held at none though it is there lowers the coefficient by as much.
     assert none.by_lubricated == pytest.approx(-change, rel=0.2)
+
+
+def test_what_passes_the_check_moves_the_dry_coefficient_by_one_uncertainty(found) -> None:
+    limit = next(one.limit for one in found.checks if one.name == "lubricated_frictionless")
+    moved = []
+    for loading, dry in found.joint["dry"].items():
+        known = np.linalg.norm([*found.joint["lubricated"][loading].budget.values()])
+        beyond = known * np.sqrt(limit) - 0.015 * np.sqrt(2 / np.pi)
+        moved.append(-dry.by_lubricated * beyond / dry.standard_uncertainty)
+    assert max(moved) == pytest.approx(1.0)
 
 
 def test_a_failed_check_leaves_the_fit_as_it_is(made, apparatus, families) -> None:

@@ -67,10 +67,15 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
     assert abs(np.sqrt(np.mean(np.square(apart))) - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
 
 
-def test_the_other_loading_adds_a_rectangle() -> None:
-    first = found(0.1)[0]
-    second = found(0.2)[0]
-    expected = abs(first.value - second.value) / np.sqrt(12)
-    both = with_loading({"incremental": first, "total": second})
-    assert [each.budget["loading"] for each in both.values()] == pytest.approx(2 * [expected])
-    assert "loading" not in with_loading({"incremental": first})["incremental"].budget
+def test_of_two_loadings_the_middle_is_the_value_and_a_rectangle_is_left() -> None:
+    ends = {"incremental": found(0.1)[0], "total": found(0.2)[0]}
+    both = with_loading(ends)
+    low, high = (end.value for end in ends.values())
+    apart = (high - low) / np.sqrt(12)
+    for each in both.values():
+        assert each.value == pytest.approx((low + high) / 2)
+        assert each.budget["loading"] == pytest.approx(apart)
+        assert np.hypot.reduce(list(each.budget.values())) == pytest.approx(
+            each.standard_uncertainty
+        )
+    assert with_loading({"total": ends["total"]}) == {"total": ends["total"]}
