@@ -103,9 +103,7 @@ def at_least(count: int, of: int, share: float) -> bool:
 def test_the_interval_of_all_loads_holds_the_truth_and_misses_on_both_sides(beside: bool) -> None:
     # Lubricated loads beside the dry ones, or apart.
     found = [(one.truth, one.joint if beside else one.apart) for one in outcomes(*FRICTIONS)]
-    # Where a check finds friction in the lubricated ones, one of a thousand times, they are apart.
-    alone = sum(not joint.beside for _, joint in found)
-    assert not beside or alone <= binom.ppf(1 - CHANCE, len(found), 1e-3)
+    assert all(bool(joint.beside) == beside for _, joint in found)
     held = [joint.interval.holds(truth) for truth, joint in found]
     low, high = binom.ppf([CHANCE, 1 - CHANCE], len(held), [0.93, 0.98])
     assert low <= sum(held) <= high
@@ -185,9 +183,13 @@ def test_dry_and_lubricated_differ_where_there_is_friction_only() -> None:
 
 def test_checks_of_friction_pass_where_nothing_is_wrong() -> None:
     found = outcomes(*FRICTIONS)
-    ours = {"profile_chi_square", "bracketing", "lubricated_frictionless"}
-    failing = [bool({name for name in one.failed() if name in ours}) for one in found]
-    assert sum(failing) <= binom.ppf(1 - CHANCE, len(failing), 0.05)
+    # What moves the dry coefficient by its uncertainty is found, and one of ten times by chance.
+    for names, share in (
+        ({"profile_chi_square", "bracketing"}, 0.05),
+        ({"lubricated_frictionless"}, 0.1),
+    ):
+        failing = [bool(names & one.failed()) for one in found]
+        assert sum(failing) <= binom.ppf(1 - CHANCE, len(failing), share)
 
 
 @pytest.mark.full_study

@@ -9,7 +9,7 @@ double Fourier sum over the plane, so that G and the line may be anything.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -27,7 +27,8 @@ PERIOD = 64e-3
 """Length of the plane's Fourier sums, in m, and their largest wavenumber, in rad/m."""
 LARGEST = 12.5e3
 DEEP = 25.0
-"""Wavenumbers times thickness from which on nothing reaches the base."""
+HALF_SPACE = 12.0
+"""Wavenumbers times thickness from which on nothing reaches the base, or comes back from there."""
 _DEPTHS = 401
 
 
@@ -73,12 +74,10 @@ class World:
 
     def voltages(self, x: FloatArray, *, y: float = 0.0, along: str = "x") -> FloatArray:
         """Voltages (n,) without noise at stated positions along a line, in V."""
-        count = int(LARGEST * PERIOD / (2 * np.pi))
-        k = 2 * np.pi / PERIOD * np.arange(-count, count + 1)
+        k, modulus, places = plane()
         kx, ky = np.meshgrid(k, k, indexing="ij")
-        modulus, places = np.unique(np.round(np.hypot(kx, ky), 6), return_inverse=True)
         normal, shear = self.base(modulus)
-        stress = (normal - self.shear_sensitivity * modulus * shear)[places.reshape(kx.shape)]
+        stress = (normal - self.shear_sensitivity * modulus * shear)[places]
         g = sum(part.transform(kx, ky) for part in self.parts)
         spectrum = A * self.load * self.load_scale * stress * g / PERIOD**2
         if along == "y":
@@ -106,27 +105,55 @@ class World:
         return inside * parts[:, 0], inside * parts[:, 1]
 
 
+@cache
+def plane() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Wavenumbers of each axis, their distinct moduli, and which each of the plane has."""
+    count = int(LARGEST * PERIOD / (2 * np.pi))
+    k = 2 * np.pi / PERIOD * np.arange(-count, count + 1)
+    lengths = np.round(np.hypot(*np.meshgrid(k, k)), 6)
+    modulus, places = np.unique(lengths, return_inverse=True)
+    return k, modulus, places.reshape(lengths.shape)
+
+
 @lru_cache
 def layer(nu: float, *, slides: bool) -> CubicSpline:
     """Normal stress and shear at the base of a film, per surface pressure, by k times thickness."""
     depths = np.linspace(0.0, DEEP, _DEPTHS)
-    at_base = np.zeros((_DEPTHS, 2))
+    _, base = answers(nu, depths, slides=slides)
+    return CubicSpline(depths, base[:, ::-1, 1])
+
+
+def answers(nu: float, q: FloatArray, *, slides: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Displacements (outward, down) and base stress (shear, normal), by surface shear and pressure.
+
+    At wavenumbers times thickness q (n,), each (n, 2, 2), for a film of unit thickness and modulus.
+    """
+    surface = np.zeros((q.size, 2, 2))
+    base = np.zeros_like(surface)
+    # Where nothing comes back from the base the film is a half-space.
+    half_space = np.array([[1 - nu, nu - 0.5], [nu - 0.5, 1 - nu]])
     # Lengths in thicknesses, stresses in shear moduli: y' = matrix y from base to surface.
     stiffness = nu / (1 - nu)
     free = [0, 3] if slides else [2, 3]
-    for i, q in enumerate(depths):
+    for i, wavenumber in enumerate(q):
         # At rest a film that slides may be moved as a whole.
-        q = max(q, 1e-4)
-        strain = np.array([stiffness * q, 0.0, 0.0, (1 - 2 * nu) / (2 * (1 - nu))])
+        x = max(float(wavenumber), 1e-4)
+        surface[i] = half_space / x
+        if x > DEEP:
+            continue
+        strain = np.array([stiffness * x, 0.0, 0.0, (1 - 2 * nu) / (2 * (1 - nu))])
         matrix = np.zeros((4, 4))
-        matrix[0] = [0.0, -q, 1.0, 0.0]
+        matrix[0] = [0.0, -x, 1.0, 0.0]
         matrix[1] = strain
-        matrix[2] = q * (np.array([2 * q, 0.0, 0.0, -1.0]) + 2 * strain)
-        matrix[3] = [0.0, 0.0, q, 0.0]
+        matrix[2] = x * (np.array([2 * x, 0.0, 0.0, -1.0]) + 2 * strain)
+        matrix[3] = [0.0, 0.0, x, 0.0]
         carried = expm(matrix)
-        unknown = np.linalg.solve(carried[2:][:, free], [0.0, 1.0])
-        at_base[i] = unknown[1], 0.0 if slides else unknown[0]
-    return CubicSpline(depths, at_base)
+        unknown = np.linalg.inv(carried[2:][:, free])
+        if x < HALF_SPACE:
+            surface[i] = carried[:2][:, free] @ unknown
+        base[i] = unknown
+        base[i, 0] *= not slides
+    return surface, base
 
 
 def line(half_range: float = HALF_RANGE, step: float = 0.25e-3) -> FloatArray:
