@@ -100,10 +100,7 @@ def _state(solution: Solution, name: str) -> str:
             stated.append(getattr(scan.film, f"{name}_uncertainty", None) is not None)
         else:
             stated.append(getattr(scan, _STATEMENTS.get(name, ""), None) is not None)
-    if all(stated):
-        return STATED
-    # Fitted with a prior.
-    return MEASURED if name == "baseline_curvature" else ASSUMED
+    return STATED if all(stated) else ASSUMED
 
 
 def _sizes(effect: Influence, results: Results) -> dict[str, float]:

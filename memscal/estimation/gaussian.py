@@ -256,7 +256,7 @@ class GaussianFit:
     def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
         """Covariance of the parameters for a noise (V) and relative weights."""
         standardised = self.points.standardised(self.jacobian, weights)
-        prior = self.points.prior_rows(self.jacobian.shape[1])
+        prior = self.prior[0]
         information = standardised.T @ standardised + prior.T @ prior
         scale = np.sqrt(np.diag(information))
         inverse = np.linalg.inv(information / np.outer(scale, scale))

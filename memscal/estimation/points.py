@@ -280,9 +280,7 @@ def calibration_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     rise = np.sort(np.abs(rise_of(points.x, points.y, points.u)))
     largest = float(np.median(rise[-3:]))
     deviation = largest * (CURVATURE if relative is None else relative)
-    # Noise that is not stated is found together with the profile.
-    unit = 1.0 if points.u_errors is not None else deviation
-    return replace(points, curvature=np.array([deviation]), unit=unit)
+    return replace(points, curvature=np.array([deviation]))
 
 
 def measured_mask(scan: Scan, channel: str = "zz") -> BoolArray:

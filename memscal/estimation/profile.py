@@ -262,7 +262,10 @@ def estimate_profile(
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
-        unit = max(weighed.noise, noise)
+        # The noise of the voltages alone: a curvature beyond its prior is none.
+        left = points.standardised(residual, weights)
+        freedom = max(count - fit.jacobian.shape[1], 1.0)
+        unit = max(float(np.sqrt(left @ left / freedom)), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
         # By the noise the prior of a curvature is weighed.

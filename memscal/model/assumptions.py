@@ -32,7 +32,7 @@ _KNOWN = {
         False,
     ),
     "baseline_curvature": (
-        "The baseline is a straight line.",
+        "The baseline is straight, but for a curvature that is counted.",
         "edge to centre over the largest signal",
         False,
     ),
@@ -77,8 +77,9 @@ class Assumption:
     name : str
         Such as ``roundness``; see docs/assumptions.md.
     state : str
-        ``"assumed"``: taken for granted, and in no uncertainty; ``"stated"``: the scan states its
-        uncertainty, which is in the budget; ``"measured"``: the scan itself determines it.
+        ``"assumed"``: taken for granted, and in no uncertainty (of a curved baseline: beyond its
+        prior, which is in the budget); ``"stated"``: the scan states its uncertainty, which is in
+        the budget; ``"measured"``: the scan itself determines it.
     sizes : mapping of str to float
         By parameter (``conversion_constant``, ``gaussian_sigma``, ``fwhm``) the size, in m of a
         length, that moves it by one standard uncertainty; infinite where none does.

@@ -60,7 +60,7 @@ def test_a_curved_baseline_is_fitted_with_a_prior_and_counts() -> None:
     for size in (None, 0.002, 0.0):
         found = memscal.calibrate(stated(baseline_curvature=size)).apparatus
         states = {assumption.name: assumption.state for assumption in found.assumptions}
-        assert states[name] == ("measured" if size is None else "stated")
+        assert states[name] == ("assumed" if size is None else "stated")
         # Held straight, there is nothing to fit.
         assert (name in found.parameters.names) == (size != 0)
         lines.append(found.budget["conversion_constant"][name])
