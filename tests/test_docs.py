@@ -193,7 +193,7 @@ def test_the_way_from_contacts_to_friction_prints_what_is_shown(
     """The whole chain, from files only; unless in full, by fewer contacts in one process."""
     if not FULL:
         monkeypatch.setattr(os, "cpu_count", lambda: 1)
-        few = (0.0, 0.1, 0.2, 0.3, math.inf)
+        few = (0.0, 0.05, 0.1, 0.2, 0.3, math.inf)
         monkeypatch.setattr("memscal.friction.compare.FRICTIONS", few)
     printed = follow("measured_stress.md", run) | follow("friction.md", run)
     assert {"contacts.stress.h5", "contacts.png", "friction.png"} <= set(os.listdir(folder))
