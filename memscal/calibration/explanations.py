@@ -48,7 +48,7 @@ MISFITS = (
     "reconvolution",
     "noise_as_stated",
     "chi_square",
-    "residual_runs",
+    "residual_steps",
     "residual_correlation",
     "symmetry",
     "baseline_curvature",

@@ -27,7 +27,7 @@ reconvolution: scan against G convolved with the reference, or the restored stre
 constraint: rise of chi-square by --option nonnegative=true or monotone=true
     the scan contradicts the constraint: leave it out
 gaussian_misfit: scan against the best Gaussian convolved with the reference
-    G is not Gaussian, or something is not as stated: the check names what explains the scan
+    G or a statement is wrong: the check says
 method_agreement: division against Bayesian estimate, in A and G(r), over what noise explains
     one follows a feature that the other does not: compare both G(r) and the residuals
 width_agreement: width of G against that of the Gaussian, in standard uncertainties without misfit
@@ -65,7 +65,7 @@ residual_steps: largest step of the residuals, in standard deviations
 residual_correlation: correlation of neighbouring residuals
     as residual_steps; or state a known correlation of the noise (u_zz_correlation)
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
-    as gaussian_misfit; the check names the kind of departure, too
+    as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear
     look for a tilted rod, an uneven film, a drifting load
 axisymmetry: ellipticity of the sensor or of the contact (rasters)
