@@ -71,7 +71,7 @@ def assemble(
         load=scan.load if prepared.reading.per == "Pa" else None,
         reference=reference,
         process=Process.of_now(
-            configuration=_configuration(prepared, solution, laws, explanations),
+            configuration=_configuration(prepared, solution, results, laws, explanations),
             messages=calibration_messages(prepared, solution, results, checks, laws, assumptions),
             input_scan=scan.source,
             input_reference=reference.source,
@@ -87,6 +87,7 @@ def assemble(
 def _configuration(
     prepared: Prepared,
     solution: Solution,
+    results: Results,
     laws: FilmLawComparison | None,
     explanations: list[dict[str, Any]],
 ) -> dict[str, Any]:
@@ -127,6 +128,7 @@ def _configuration(
         "correlations": {" ".join(pair): c for pair, c in request.correlations.items()} or None,
         "grid": solution.choice.reasons,
         "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
+        "effective_degrees": results.effective_degrees or None,
         "direction": "y" if solution.scan.direction == "y" else None,
         "further_scans": further or None,
     }

@@ -10,6 +10,8 @@ from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import Results
 from memscal.estimation.influences import Influence, influences, measured_by
 from memscal.estimation.points import measured_mask
+from memscal.estimation.residuals import residuals_of
+from memscal.estimation.slow_noise import slow_noise
 from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
 
@@ -87,10 +89,20 @@ def less_mean_offset(solution: Solution) -> Solution:
     return replace(corrected, apart=solution.apart)
 
 
+def with_slow_noise(solution: Solution) -> Solution:
+    """Count what correlation the noise may have, where a scan states no noise."""
+    estimate = solution.estimate
+    rounding = estimate.noise_scale > estimate.weighed.noise
+    if rounding or estimate.points.u_errors is not None:
+        return solution
+    slow = slow_noise(estimate, residuals_of(estimate))
+    return replace(solution, estimate=replace(estimate, slow=slow))
+
+
 def _state(solution: Solution, name: str) -> str:
     """Say whether something is assumed, stated by every scan, or measured by them."""
     points = solution.estimate.points
-    if name in measured_by(points):
+    if name in measured_by(points) or (name == "noise_correlation" and solution.estimate.slow):
         return MEASURED
     stated = []
     for scan in solution.scans:

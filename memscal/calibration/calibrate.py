@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
-from memscal.calibration.assumptions import assumptions_of, at_offsets, less_mean_offset
+from memscal.calibration.assumptions import (
+    assumptions_of,
+    at_offsets,
+    less_mean_offset,
+    with_slow_noise,
+)
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.explanations import MISFITS, explained
@@ -239,7 +244,7 @@ def calibrate(
     prepared = prepare(scans, request)
     if free:
         prepared = _with_thickness(prepared)
-    solution = less_mean_offset(at_offsets(_solved(prepared)))
+    solution = with_slow_noise(less_mean_offset(at_offsets(_solved(prepared))))
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")

@@ -9,7 +9,12 @@ from scipy.special import chdtrc, logsumexp
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Solution
-from memscal.calibration.uncertainty import DivisionMap, Results, route_difference
+from memscal.calibration.uncertainty import (
+    DivisionMap,
+    Results,
+    route_difference,
+    slow_noise_text,
+)
 from memscal.estimation import model_tests
 from memscal.estimation import residuals as unexplained
 from memscal.estimation.band import RESOLVED
@@ -17,6 +22,7 @@ from memscal.estimation.bayesian import HYPOTHESES, Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import carried_force
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
+from memscal.estimation.slow_noise import slow_noise
 from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
@@ -72,7 +78,7 @@ def quality_checks(
     if estimate.points.u_errors is not None:
         checks.append(quality.noise_check(estimate.weighed.noise, estimate.points.channel))
     checks += [
-        *_unexplained(estimate),
+        *_unexplained(estimate, results),
         _bayes_factor(estimate),
         _symmetry(estimate),
         *_steadiness(solution),
@@ -295,7 +301,7 @@ def _indentation(
     return check("indentation", change, 1.0, meaning)
 
 
-def _unexplained(estimate: ProfileEstimate) -> list[QualityCheck]:
+def _unexplained(estimate: ProfileEstimate, results: Results) -> list[QualityCheck]:
     """Test what no G explains: its size against the noise, and its order along the scan."""
     model = unexplained.free_model(estimate)
     residuals = unexplained.residuals_of(estimate, model)
@@ -322,8 +328,11 @@ def _unexplained(estimate: ProfileEstimate) -> list[QualityCheck]:
     cause = (
         "a baseline that steps or bends, a wrong reference, or noise that is correlated from point "
         "to point (a slow amplifier, creep, temperature). Look at the residual; state a known "
-        "correlation as u_zz_correlation; uncertainties are too small until then."
+        "correlation as u_zz_correlation"
     )
+    cause += "." if estimate.slow else "; uncertainties are too small until then."
+    slow = estimate.slow or slow_noise(estimate, residuals)
+    found = f" {slow_noise_text(estimate, slow, results)}" if slow else ""
     stepped = (
         "Largest step of the residuals along the scan, in standard deviations. A failure means "
         f"that readings changed from one point on by what no radial G explains: {cause}"
@@ -331,7 +340,7 @@ def _unexplained(estimate: ProfileEstimate) -> list[QualityCheck]:
     alike = (
         "Correlation of each residual with its neighbours along the scan, halved for each step "
         f"farther, over what chance gives on average. A failure means that residuals are "
-        f"alike: {cause}"
+        f"alike: {cause}{found}"
     )
     neighbours = unexplained.neighbour_correlation_test(residuals)
     checks.append(_tested("residual_steps", unexplained.steps_test(residuals), stepped))

@@ -8,7 +8,7 @@ from memscal.calibration.drawn_scatter import LINEAR_METHODS, draw_count
 from memscal.calibration.film_inference import FilmLawComparison
 from memscal.calibration.prepare import Prepared
 from memscal.calibration.stages import Solution
-from memscal.calibration.uncertainty import Results
+from memscal.calibration.uncertainty import Results, slow_noise_text
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate, point_messages
@@ -70,13 +70,7 @@ def calibration_messages(
         messages.append(Message("line_offset", text))
     messages += point_messages(estimate)
     if estimate.points.u_errors is None:
-        text = (
-            f"u_{channel}_errors is absent: a noise of "
-            f"{estimate.points.reading.text(estimate.noise_scale)} "
-            "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
-            "misfit of the same size, and has no p-value."
-        )
-        messages.append(Message(quality.NOISE_UNSTATED, text))
+        messages.append(_noise(estimate, results))
     messages += _tails(estimate) + _directions(estimate, checks) + _method(solution)
     form = stress.form
     if form is not None:
@@ -111,6 +105,20 @@ def _centres(solution: Solution) -> Message:
         f"centres are up to {apart * 1e6:.3g} um apart."
     )
     return Message(quality.REPEAT_CENTRES, text)
+
+
+def _noise(estimate: ProfileEstimate, results: Results) -> Message:
+    points = estimate.points
+    slow = "Its correlation is not estimated."
+    if estimate.slow:
+        slow = slow_noise_text(estimate, estimate.slow, results)
+    text = (
+        f"u_{points.channel}_errors is absent: a noise of "
+        f"{points.reading.text(estimate.noise_scale)} "
+        "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
+        f"misfit of the same size, and has no p-value. {slow}"
+    )
+    return Message(quality.NOISE_UNSTATED, text)
 
 
 def _directions(estimate: ProfileEstimate, checks: tuple[QualityCheck, ...]) -> list[Message]:

@@ -29,6 +29,7 @@ from memscal.calibration.fields import RasterFields, cosine_taper
 from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
+from memscal.estimation.decorrelation import SlowNoise
 from memscal.estimation.influences import influences, measured_by
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
@@ -200,6 +201,7 @@ class Results:
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
     by_voltage: VoltageMap  # (p, n): derivatives of the parameters
+    effective_degrees: Mapping[str, float]  # by parameter, where noise is estimated
     # (n,) by input, where none are correlated: of A G(r) over A by one uncertainty, in 1/m^2
     kernel_changes: Mapping[str, FloatArray]
     division: DivisionMap | None = None  # that was propagated
@@ -295,6 +297,7 @@ def propagate(
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(scatter[count:stop], axis=1),
         by_voltage=by_voltage[:count],
+        effective_degrees=_effective_degrees(estimate, names, columns["noise"], stored),
         kernel_changes=kernel_changes,
         division=division,
     )
@@ -310,6 +313,38 @@ def _curvature_columns(
     for i, deviation in enumerate(deviations.tolist()):
         errors[names.index(_CURVATURE + _suffix(points.curved[i])), i] -= deviation
     return errors
+
+
+def _effective_degrees(
+    estimate: ProfileEstimate, names: Sequence[str], noise: FloatArray, covariance: FloatArray
+) -> dict[str, float]:
+    """Degrees of freedom of each uncertainty, of which an estimated noise alone has few."""
+    # Welch and Satterthwaite: GUM (JCGM 100:2008), G.4.1.
+    if estimate.points.u_errors is not None:
+        return {}
+    readings = float(estimate.outlier_weight.sum()) + estimate.points.curved.size
+    degrees = max(readings - estimate.basis.flat, 1.0)
+    variances = np.diag(covariance)[: len(names)]
+    shares = np.sum(noise[: len(names)] ** 2, axis=1) / variances
+    return dict(zip(names, (degrees / shares**2).tolist(), strict=True))
+
+
+def slow_noise_text(estimate: ProfileEstimate, slow: SlowNoise, results: Results) -> str:
+    """Say what correlation of the noise is found, and what it does to the uncertainties."""
+    parameters = results.parameters
+    rows = [parameters.names.index(name) for name in ("conversion_constant", "gaussian_sigma")]
+    numbers = results.by_voltage[rows]
+    found = np.sum(replace(estimate, slow=slow).scattered(numbers) ** 2, axis=1)
+    white = np.sum(replace(estimate, slow=None).scattered(numbers) ** 2, axis=1)
+    counted = found if estimate.slow else white
+    others = np.maximum(np.diag(parameters.covariance)[rows] - counted, 0.0)
+    a, sigma = np.sqrt((others + found) / (others + white))
+    verb = "makes" if estimate.slow else "is not counted, as the noise is stated, but would make"
+    return (
+        f"The noise is correlated along the scan with a probability of {slow.probability:.0%}; "
+        f"{slow.share:.0%} of its variance would then fall off over {slow.length:.2g} steps. This "
+        f"{verb} the uncertainty of A {a:.3g} and that of sigma {sigma:.3g} times as large."
+    )
 
 
 def changes_by(

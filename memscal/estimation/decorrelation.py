@@ -57,6 +57,16 @@ class Decorrelation:
         return values + self.common @ (along.T * (self.growth**-power - 1)).T
 
 
+@dataclass(frozen=True, eq=False)
+class SlowNoise:
+    """What correlation along each pass is found in noise."""
+
+    probability: float  # that the noise is correlated
+    length: float  # if it is: steps over which that falls off, and share of the variance
+    share: float
+    covariance: Decorrelation  # averaged by probability, over the variance of white noise
+
+
 def _solved(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
     """Solve L x = values, or L' x = values."""
     if not is_banded(root):

@@ -12,6 +12,7 @@ from memscal.errors import FitError
 from memscal.estimation import bayesian
 from memscal.estimation.angular import AngularRings, angular_departures
 from memscal.estimation.bayesian import WeighedFit
+from memscal.estimation.decorrelation import Decorrelation, SlowNoise
 from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.ellipse import elliptic_departure
 from memscal.estimation.forward import ForwardModel, forward_model
@@ -53,6 +54,7 @@ class ProfileEstimate:
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
     departures: DepartureBasis  # all kernels, of negligible probability too
     raster_noise: float | None = None  # of one reading of a raster that states none, in V
+    slow: SlowNoise | None = None  # that is counted beside the estimate, which takes noise as white
 
     @property
     def points(self) -> ScanPoints:
@@ -64,15 +66,20 @@ class ProfileEstimate:
         """Adopted noise of each voltage, shape (n,), in V, uncertain positions included."""
         return self.noise_scale / np.sqrt(self.weights / self.outlier_weight)
 
+    @property
+    def correlation(self) -> Decorrelation | None:
+        """Correlation of the noise: as stated, or as found where none is."""
+        return self.slow.covariance if self.slow else self.points.decorrelation
+
     def drawn_noise(self, standard: FloatArray) -> FloatArray:
         """Noise of the voltages, in V, of independent standard normal draws, (n,) or (n, m)."""
-        factor = self.points.decorrelation
+        factor = self.correlation
         correlated = standard if factor is None else factor.correlate(standard)
         return (self.noise / self.outlier_weight**0.5 * correlated.T).T
 
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
-        factor = self.points.decorrelation
+        factor = self.correlation
         noise = self.noise / self.outlier_weight**0.5
         if noise.size > DENSE:
             return square_root(numbers.covariance(noise, factor))
@@ -96,7 +103,8 @@ class ProfileEstimate:
     @cached_property
     def hidden_root(self) -> FloatArray:
         """Square root of what of the covariance neither noise nor a curved baseline makes."""
-        known = np.hstack([self.scattered(self.weighed.gain), self.curving])
+        white = replace(self, slow=None).scattered(self.weighed.gain)
+        known = np.hstack([white, self.curving])
         covariance = self.weighed.covariance
         return square_root(covariance - known @ known.T, np.diag(covariance))
 

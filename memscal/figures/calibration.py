@@ -297,11 +297,11 @@ def values_text(data: ApparatusData) -> str:
     parameters = data.parameters
     names = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
     values = [
-        f"{ESTIMATED[name].symbol} = {measured_text(parameters, name, EXPANDED)}"
+        f"{ESTIMATED[name].symbol} = {measured_text(parameters, name, data.coverage_factor(name))}"
         for name in names
         if name in parameters
     ]
-    return f"{',  '.join(values)};  ±, bars and bands: U = 2u (k = 2)"
+    return f"{',  '.join(values)};  ±: 95 %;  bars and bands: U = 2u (k = 2)"
 
 
 def _text_lines(data: ApparatusData, loads: Loads) -> list[_Line]:

@@ -8,6 +8,7 @@ from dataclasses import field as dataclass_field
 from functools import cached_property
 
 import numpy as np
+from scipy.special import stdtrit
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, FrozenArrays
@@ -277,6 +278,17 @@ class ApparatusData(Checked):
                 why="The stress of its calibration was not known, and no reading tells another.",
                 cure="Calibrate with a known load and a stress in Pa, without --relative.",
             )
+
+    @property
+    def effective_degrees(self) -> Mapping[str, float]:
+        """Degrees of freedom of each parameter's uncertainty, where the noise was estimated."""
+        return dict(self.process.configuration.get("effective_degrees", {}))
+
+    def coverage_factor(self, name: str) -> float:
+        """Return k of a parameter's expanded uncertainty k u: Student's, of 95.45 %."""
+        # GUM (JCGM 100:2008), G.3.2 and table G.2; two, where no noise was estimated.
+        degrees = self.effective_degrees.get(name)
+        return 2.0 if degrees is None else float(stdtrit(degrees, 0.97725))
 
     @property
     def conversion_constant(self) -> float:

@@ -63,7 +63,7 @@ chi_square: residuals that no radial G, or no radial stress, explains, against t
 residual_steps: largest step of the residuals, in standard deviations
     look for a step or bend of the baseline, a wrong reference, slow noise
 residual_correlation: correlation of neighbouring residuals
-    as residual_steps; or state a known correlation of the noise (u_zz_correlation)
+    as residual_steps; or state u_zz_correlation; the meaning says what correlation it finds
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear

@@ -50,6 +50,9 @@ def tables(result: Calibrated) -> list[Table]:
     method = _method(apparatus)
     if method:
         rows.insert(-1, ("method", "", method))
+    if apparatus.effective_degrees:
+        factors = [f"{apparatus.coverage_factor(name):.3g}" for name in MOVED[:2]]
+        rows.append(("coverage factors of 95 % of A and σ", "k", " and ".join(factors)))
     if isinstance(result, Calibration):
         misfit = result.solution.deconvolution.misfit
         rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
@@ -155,6 +158,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
             "gaussian_chi2_reduced": finite(gaussian.chi2_reduced),
         }
     values["assumptions"] = [assumption.to_dict() for assumption in apparatus.assumptions]
+    values["effective_degrees"] = dict(apparatus.effective_degrees)
     values["checks"] = checks_json(apparatus.checks)
     values["warnings"] = texts_of(apparatus.process.messages)
     return values

@@ -29,7 +29,7 @@ from memscal.model.quantities import MM, Quantity, parameter_quantity
 
 COVERAGE_FACTOR = 2.0
 COVERAGE_PROBABILITY = 0.95
-"""k of every expanded uncertainty U = k u, and about what a normal distribution has within."""
+"""k of U = k u of many degrees of freedom, and about what a normal distribution has within."""
 
 #: Parameters of the sensor; the others are those of one scan.
 _SENSOR_PARAMETERS = (
@@ -58,11 +58,12 @@ class CertifiedValue:
     quantity: Quantity
     value: float
     uncertainty: float
+    factor: float = COVERAGE_FACTOR  # k: larger where an estimated noise has few degrees of freedom
 
     @property
     def expanded(self) -> float:
         """The expanded uncertainty U = k u."""
-        return COVERAGE_FACTOR * self.uncertainty
+        return self.factor * self.uncertainty
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,10 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
     values = []
     for name in parameters.names:
         quantity = parameter_quantity(parameters, name)
-        values.append(CertifiedValue(quantity, parameters[name], parameters.uncertainty(name)))
+        u = parameters.uncertainty(name)
+        values.append(
+            CertifiedValue(quantity, parameters[name], u, apparatus.coverage_factor(name))
+        )
     artifact = tree_to_bytes(artifact_tree(apparatus.compact()))
     derived = apparatus.content_digest[:_NUMBER_DIGITS].upper()
     stated = sections["laboratory"]

@@ -134,6 +134,7 @@ def _listed(
     units: Sequence[str],
     covariance: FloatArray | None = None,
     labels: Iterable[str] = (),
+    factors: float | FloatArray = COVERAGE_FACTOR,
 ) -> Tree:
     """Return a quantity of several values, with expanded uncertainties and covariance if given."""
     stated: dict[str, Any] = {
@@ -144,8 +145,8 @@ def _listed(
     if covariance is not None:
         u = np.sqrt(np.diag(covariance))
         expanded = {
-            "si:valueExpandedMUXMLList": _numbers(COVERAGE_FACTOR * u),
-            "si:coverageFactorXMLList": _numbers(np.full_like(u, COVERAGE_FACTOR)),
+            "si:valueExpandedMUXMLList": _numbers(factors * u),
+            "si:coverageFactorXMLList": _numbers(np.broadcast_to(factors, u.shape)),
             "si:coverageProbabilityXMLList": _numbers(np.full_like(u, COVERAGE_PROBABILITY)),
         }
         region = _region(covariance, units)
@@ -185,6 +186,7 @@ def _values(certificate: Certificate) -> Tree:
         [quantity.unit for quantity in quantities],
         certificate.covariance / np.multiply.outer(scale, scale),
         [quantity.name for quantity in quantities],
+        np.array([value.factor for value in values]),
     )
     words = _words("Wavenumber up to which the scan determines G")
     resolved = _real(certificate.apparatus.resolved_wavenumber / PER_MM, "rad/mm")

@@ -189,17 +189,21 @@ def _values(certificate: Certificate) -> str:
     rows = []
     for i, value in enumerate(certificate.values):
         quantity = value.quantity
+        scale = quantity.scale
         symbol = f", {quantity.symbol}" if quantity.symbol else ""
         share = 100 * value.expanded / abs(value.value) if value.value else np.inf
         row = [
             f"({i + 1}) {quantity.words}{symbol}",
-            _expanded(value.value, value.uncertainty, quantity.scale, quantity.unit),
+            format_measured(value.value / scale, value.expanded / scale, quantity.unit),
             f"{share:.2g} %" if share < 99 else "–",
             *(f"{round(r, 2) + 0:.2f}" for r in certificate.correlation[i, :i]),
         ]
         rows.append([*row, "1", *[""] * (count - i - 1)])
     numbers = [f"({i + 1})" for i in range(count)]
-    head = ("Quantity y", "y ± U (k = 2)", "U / y", *numbers)
+    # Two; more where the noise was estimated from few readings.
+    factors = [value.factor for value in certificate.values]
+    ends = dict.fromkeys([f"{min(factors):.3g}", f"{max(factors):.3g}"])
+    head = ("Quantity y", f"y ± U (k = {' to '.join(ends)})", "U / y", *numbers)
     title = f"Right: correlation coefficients of the values {numbers[0]} to {numbers[-1]}"
     return Table(title, head, rows).html("numbers")
 

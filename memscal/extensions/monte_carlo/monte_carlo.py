@@ -78,8 +78,8 @@ class DrawnScans:
         estimate = self.solution.estimate
         points = estimate.points
         noise: FloatArray = rng.standard_normal(points.u.size)
-        if points.decorrelation is not None:
-            noise = points.decorrelation.correlate(noise)
+        if estimate.correlation is not None:
+            noise = estimate.correlation.correlate(noise)
         residual = points.u - drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise

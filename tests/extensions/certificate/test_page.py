@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 from memscal.extensions.certificate.certificate import Certificate, certify
+from memscal.extensions.certificate.dcc import certificate_xml
 from memscal.extensions.certificate.page import certificate_page
 from memscal.model.assumptions import MOVED, NAMES, Assumption
 from memscal.model.checks import QualityCheck
@@ -32,6 +33,18 @@ def test_the_page_states_every_value_of_the_file_and_ends_with_its_mark(certific
     stated += ["(23.00 ± 0.60) °C", "(45.0 ± 6.0) %"]
     assert [value for value in stated if value not in text] == []
     assert text.strip().endswith(f"— End of certificate {certificate.number} —")
+
+
+def test_a_factor_of_coverage_is_that_of_its_degrees_of_freedom(apparatus, laboratory):
+    configuration = {"effective_degrees": {"conversion_constant": 10.0}}
+    process = replace(apparatus.process, configuration=configuration)
+    certificate = certify(replace(apparatus, process=process), laboratory)
+    # u(A) is 0.0180e-4 mV/Pa, and k = 2.28 by table G.2 of the GUM.
+    text = text_of(certificate)
+    assert "y ± U (k = 2 to 2.28)" in text
+    assert "(1.017 ± 0.041)×10⁻⁴ mV/Pa" in text
+    listed = re.findall(r"coverageFactorXMLList>([^<]+)<", certificate_xml(certificate).decode())
+    assert [round(float(factor), 2) for factor in listed[0].split()[:2]] == [2.28, 2.0]
 
 
 def test_it_is_no_accredited_certificate_unless_the_laboratory_says_otherwise(certificate):
