@@ -20,11 +20,11 @@ from helpers.outside_study import ROWS, SYMBOLS, outcome
 if TYPE_CHECKING:
     from helpers.outside_study import Outcome
 
-RUNS = 30
-DRAWS = 60
+RUNS = 10
+DRAWS = 20
 HEAD = [
-    *("not as stated", "wrong by 2 u", "at", "wrong by 3 u at", "alarmed there"),
-    *("z where stated", "named over found", "else shown by"),
+    *("not as stated", "wrong", "by 2 u at", "by 3 u at", "counted: rms z", "alarmed at 3 u"),
+    *("named over found", "told by", "shown by"),
 ]
 
 
@@ -35,13 +35,17 @@ def cells(found: Outcome) -> list[str]:
     for size in (found.two, found.three):
         shown = f"{size * row.per_unit:.2g} {row.unit}".strip()
         sizes.append(shown if math.isfinite(size) else "never")
+    alarmed = ""
+    if found.check:
+        alarmed = f"{100 * found.alarmed:.0f} %: {found.check}"
     return [
         row.name,
         SYMBOLS[row.parameter],
         *sizes,
-        "" if math.isnan(found.alarmed) else f"{100 * found.alarmed:.0f} %",
-        "" if found.counted is None else f"{found.counted:.2f}",
+        " / ".join(f"{z:.1f}" for z in found.counted),
+        alarmed,
         "" if found.named is None else f"{found.named:.2f}",
+        ", ".join(found.told_by) or "nothing",
         row.shown_by,
     ]
 

@@ -233,15 +233,20 @@ ROWS = {
             shown_by="a film of another thickness",
             signs=(1.0,),
         ),
-        Row("tail of G of 3 mm", tail, 0.02, "%", 100.0),
+        Row(
+            "tail of G of 3 mm",
+            tail,
+            0.02,
+            "%",
+            100.0,
+            shown_by="noise of 0.1 % and a baseline stated as straight",
+        ),
         Row(
             "baseline, one cosine",
             lambda size: replace(ROUND, cosine=size),
             0.002,
             "%",
             100.0,
-            # From edge to centre a cosine changes by twice its amplitude.
-            lambda scan, size: replace(scan, baseline_curvature_uncertainty=2 * size),
             # From edge to centre it is twice its amplitude.
             lambda scan, size: replace(scan, baseline_curvature_uncertainty=2 * size),
         ),
@@ -301,6 +306,7 @@ ROWS = {
             0.05e-3,
             "mm",
             1e3,
+            shown_by="the line scanned back: its centre moves by twice the lag",
             parameter="gaussian_sigma",
         ),
     )
