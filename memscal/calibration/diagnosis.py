@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 
@@ -24,7 +24,7 @@ from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -108,7 +108,7 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Trial:
     """Gaussian fitted to the scans with one length scaled; none where the fit fails."""
 
@@ -130,7 +130,7 @@ class _Trial:
         return self.fit.conversion_constant > LEAST_SIGNIFICANCE * float(np.sqrt(variance))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Length:
     """One stated length that can be scaled."""
 
@@ -154,7 +154,7 @@ class _Length:
         return f"{self.place} of {limit}{value:.3g} mm in place of {stated:.4g} mm{unit}"
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Search:
     """Scans whose stated lengths are scaled, one at a time."""
 

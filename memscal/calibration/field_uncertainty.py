@@ -20,7 +20,6 @@ is counted beside that, as it is for the profile (``window``).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -32,7 +31,7 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.calibration.uncertainty import InputEffect, correlation_matrix
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, square_root
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.progress import Task
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
@@ -124,7 +123,7 @@ def _posterior_variances(
     return np.array(variances) / deconvolution.conversion_constant**2
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Filter:
     """A division as a filter: Fourier sums of the few components that it passes, by matrices."""
 

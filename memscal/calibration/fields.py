@@ -20,7 +20,7 @@ from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.places import EvenAxis
 from memscal.readings.find_places import even_lattice
 
@@ -75,7 +75,7 @@ def cosine_taper(radius: FloatArray, support: float) -> FloatArray:
     return (1 + np.cos(np.pi * np.clip(2 * radius / support - 1, 0.0, 1.0))) / 2
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class LineFields:
     """Both profiles, lifted to a quarter plane; of a vector field its potential."""
 
@@ -129,7 +129,7 @@ class LineFields:
         return Field(self.inside, kernel[:count, :count])
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class RasterFields:
     """A measured raster on its own lattice, continued by the fitted profile around it."""
 

@@ -23,6 +23,7 @@ from memscal.estimation.set_up import (
     with_film_of,
 )
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
+from memscal.model.arrays import array_record
 from memscal.model.film import LINEAR
 from memscal.model.notation import Reading
 from memscal.model.provenance import accepted_alterations
@@ -60,7 +61,7 @@ class Request:
     relative: bool
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Prepared:
     """What a calibration starts from: scans with the film and loads that count, and references."""
 

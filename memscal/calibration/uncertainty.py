@@ -14,7 +14,7 @@ load scales A; on a film at finite strain it changes the base stress per newton 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
 
@@ -75,7 +75,7 @@ _LEAST_REACH = 0.5
 NOT_RANDOM = ("regularisation", "window", "misfit")
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class InputEffect:
     """What one standard uncertainty of an input does."""
 
@@ -189,7 +189,7 @@ def correlation_matrix(
     return matrix
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Results:
     """Everything a calibration states with an uncertainty."""
 
@@ -208,7 +208,7 @@ class Results:
     field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class DrawnScatter:
     """Columns of m draws less their mean over sqrt(m - 1): their squares add up to variances."""
 
@@ -218,7 +218,7 @@ class DrawnScatter:
     transfer: FloatArray  # (q, m): of the transfer function at the grid's wavenumbers
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Derivatives:
     """Derivatives of results, one row each, and what the regularisation hides of them."""
 
@@ -560,7 +560,7 @@ def _posterior_kernel(
     return _Derivatives(rows @ estimate.weighed.gain, rows, nothing)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class DivisionMap:
     """A division of fields as a linear map from voltages less background to A, G and transfer."""
 

@@ -23,7 +23,7 @@ import scipy.fft
 from memscal.axisymmetry.grids import FieldGrid
 from memscal.errors import InputError
 from memscal.estimation.bayesian import Bayesian
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -33,7 +33,7 @@ NOISE_RATIO = 0.1
 _CLOSED = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class DivisionProblem:
     """The two fields of the paper's Eq. (2), and which of their components are relevant."""
 
@@ -76,7 +76,7 @@ class DivisionProblem:
         return Division(field, np.clip(window, 0.0, 1.0))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Division:
     """The quotient of the fields."""
 

@@ -1,14 +1,12 @@
 """Widths of G: of the nearest Gaussian, at half maximum, and its noise-equivalent area."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from memscal.axisymmetry.hankel import radial_spline, ring_areas
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.estimation.gaussian import gauss_newton
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 #: Points per step of the profile between which the half maximum is interpolated.
 _FINE = 20
@@ -74,7 +72,7 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     return float(bounded.x[0] * start)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Functional:
     """A number read off G: its parameter's name, its value, and its derivative by G(r)."""
 

@@ -20,15 +20,13 @@ size of each order is the root mean square over its posterior, its logarithm wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import ive
 
 from memscal.axisymmetry.hankel import bessel
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 ORDERS = (1, 2, 3, 4)
 #: In units of the Gaussian's width: blur of the rings, their distance, and where the envelope of
@@ -48,7 +46,7 @@ _FIRST = 0.1
 _SWEEPS = 2
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class AngularRings:
     """Blurred rings of unit amplitude: of each order those with a cosine, then with a sine."""
 
@@ -72,7 +70,7 @@ class AngularRings:
         return blurred * bessel(m, np.multiply.outer(k, self.radius))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class AngularDepartures:
     """Kernels of unit prior variance: of each order those with a cosine, then those with a sine."""
 

@@ -5,14 +5,12 @@ G is resolved while the posterior standard uncertainty of its transfer function 
 of the fitted Gaussian's, which has no zeros and no lobes.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 #: A spectral component is relevant while it stands this many times above its noise: with the
 #: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
@@ -23,7 +21,7 @@ RELEVANT_OF_RASTER = 5.0
 RESOLVED = 3.0
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Band:
     """Signal and noise of the voltage's transform, and the relevant and resolved wavenumbers."""
 

@@ -37,7 +37,7 @@ from memscal.estimation.departures import (
     Shape,
 )
 from memscal.estimation.voltage_map import VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 
 #: The smallest noise, over the largest residual of a Gaussian, that is distinct from rounding.
 _ROUNDING = 1e-9
@@ -63,7 +63,7 @@ class Bayesian:
         return self.nonnegative or self.monotone
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Sensors:
     """Weighted data and columns of flat prior about f sensors: each fit's Gaussian and families."""
 
@@ -120,7 +120,7 @@ class _Noise(NamedTuple):
     stated: float
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Conditionals:
     """Marginal likelihoods and posteriors, each given one of h hypotheses of m amplitudes.
 
@@ -289,7 +289,7 @@ HYPOTHESES = tuple(_hypotheses())
 _PRIORS = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class WeighedFit:
     """Posterior of corrections to the Gaussian fit, averaged over the hypotheses."""
 
@@ -346,7 +346,7 @@ def weigh_departures(
     return Weighing(reduced, basis, given, noise.added, log_marginals)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Weighing:
     """The hypotheses about a fit, weighed; they are averaged when that is asked for."""
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import solve_banded, solve_triangular
 
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.correlation import is_banded
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Decorrelation:
     r"""Makes noise of covariance :math:`(1 + S S^T) C` or :math:`C`, block by block, white."""
 
@@ -57,7 +55,7 @@ class Decorrelation:
         return values + self.common @ (along.T * (self.growth**-power - 1)).T
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class SlowNoise:
     """What correlation along each pass is found in noise."""
 

@@ -31,7 +31,7 @@ from memscal.estimation.angular import AngularDepartures, AngularRings
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 #: Rings are never narrower than this many steps: a width below the sampling is not resolved.
 _SMALLEST_WIDTH_IN_STEPS = 0.5
@@ -147,7 +147,7 @@ def _sensors(
     return columns
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class FamilyFit:
     """The sensor of a family that fits the scan best."""
 
@@ -156,7 +156,7 @@ class FamilyFit:
     width: float  # in m
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ReducedScan:
     """Standardised voltages and their derivatives, Q' times those at the points (n), (r, ...)."""
 
@@ -228,7 +228,7 @@ class ReducedScan:
 _KEPT = 4
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class DepartureBasis:
     """The kernels that an estimate is a combination of, about the best Gaussian."""
 

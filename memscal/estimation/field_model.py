@@ -16,7 +16,7 @@ import scipy.fft
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.estimation.forward import ForwardModel, Geometry
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.stress import StressField
 
 #: Points of the grid for each half wave of the last wavenumber, and at most for each step.
@@ -24,14 +24,14 @@ _OVERSAMPLING = 2.0
 _PER_STEP = 4.0
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class PlaneGeometry(Geometry):
     """Places of the points about trial centres; no Bessel functions."""
 
     places: FloatArray  # (2, n): rows and columns of the grid
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Plane:
     """Grid on which voltages are transformed, and the part of its wavenumbers that is used."""
 
@@ -44,7 +44,7 @@ class _Plane:
     stress: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class FieldModel(ForwardModel):
     """Voltages at the points of scans through fields."""
 

@@ -20,7 +20,7 @@ the sensor to the indenter,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
@@ -30,7 +30,7 @@ from scipy.special import ive, j1
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, bessel
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import BLOCK, DENSE
-from memscal.model.arrays import BoolArray, FloatArray
+from memscal.model.arrays import BoolArray, FloatArray, array_record
 from memscal.model.sizes import too_large
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _wave(wave: int, r: FloatArray, k: FloatArray, across: bool) -> FloatArray:
     return bessel(wave, x)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class WaveTable:
     """Waves on even radii, (t,), for all nodes, and the splines through them."""
 
@@ -90,7 +90,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
     return WaveTable(radii, values, make_interp_spline(radii, values, k=_DEGREE))
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Geometry:
     """Distances of the points from a trial centre, and sums of waves there."""
 
@@ -135,7 +135,7 @@ class Geometry:
 _HARMONICS = 5
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ForwardModel:
     """Voltages at the points of a scan, for kernels given by their transforms."""
 

@@ -6,7 +6,7 @@ It is fitted by weighted least squares, with A, centre, baseline and linear drif
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -223,7 +223,7 @@ _NARROWEST = 0.05
 _NO_WIDTH = 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class GaussianFit:
     """Best Gaussian in data space, and the model linearised about it."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import difference, spectrum_difference
 from memscal.mechanics.film_response import base_normal, base_shear
 from memscal.mechanics.press_rod import is_tabulated, press_rod, stick_and_slide
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -38,7 +38,7 @@ _LIGHT = 1e-4
 _LARGEST_KH = 38.0
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Influence:
     """What a size of one thing does to the voltages, (n,), in V: by one unit, and by its square."""
 

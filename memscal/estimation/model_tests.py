@@ -19,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.checks import FALSE_ALARM
 
 #: More groups than this are held out several at a time.
@@ -201,7 +201,7 @@ def _left_over(root: FloatArray, size: FloatArray) -> tuple[float, int]:
     return float(rest @ rest), basis.shape[1]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ExtraColumns:
     """Outcome of adding columns to the model."""
 

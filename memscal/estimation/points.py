@@ -9,7 +9,7 @@ the voltage falls where the indenter stands at larger x than the sensor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.correlation import is_banded, of_points, root_of
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.places import Places
@@ -86,7 +86,7 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
 MINIMUM_POSITIONS = 6
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ScanPoints:
     """Every measured point of a scan, missing ones left out."""
 

@@ -1,7 +1,7 @@
 """Estimate of a radial profile from the points of scans: centre, baseline, noise and outliers."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,7 @@ from memscal.estimation.gaussian import (
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -42,7 +42,7 @@ class CentreError(FitError):
     """A scan that does not cross the centre of its sensor."""
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ProfileEstimate:
     """Posterior of the radial profile A G in data space, before any division."""
 

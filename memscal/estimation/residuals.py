@@ -18,7 +18,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
@@ -29,7 +29,7 @@ _DEPENDENT = 1e-10
 _COLUMNS = 8
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class FreeModel:
     """The scan's data and the linear model of every apparatus function that it can resolve."""
 
@@ -116,7 +116,7 @@ class TestOutcome:
     p_value: float
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Residuals:
     """Residuals after projection, in the order of the scan."""
 

@@ -22,7 +22,7 @@ For given centre, weights and :math:`\lambda` the result is linear in the voltag
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache, reduce
 from operator import add
 from typing import TYPE_CHECKING, TypeAlias
@@ -35,7 +35,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, outlier_weights
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import BLOCK, DENSE, VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -68,7 +68,7 @@ _SECTIONS = 14
 _LEAST = 1e-14
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class SmoothedProfile:
     """The radial profile of the voltages, per newton, as a linear function of them."""
 
@@ -171,7 +171,7 @@ def _fitted(
     return spline.transform @ fitted.gain, fitted.predicted, weight
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _FittedSpline:
     """Splines fitted to values y at n points."""
 
@@ -180,7 +180,7 @@ class _FittedSpline:
     freedom: FloatArray  # (n,): share of each residual's variance that is left
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _RadialSpline:
     """Even splines on [0, R], continued by the reference's tail."""
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from memscal.estimation.decorrelation import Decorrelation
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -33,7 +32,7 @@ Tall: TypeAlias = "FloatArray | csr_array"
 """Columns over the points, (n, r)."""
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class VoltageMap:
     """Derivatives (m, n) of m numbers by n voltages: a sum of products L R'."""
 

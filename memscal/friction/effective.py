@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from memscal.friction.likelihood import (
     predict,
 )
 from memscal.friction.results import BoundedEstimate, LoadComparison
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.measured_stress import MeasuredProfile
 
 EXPANDED = 1.96
@@ -30,7 +30,7 @@ _FINE = 200
 _SYSTEMATIC = {"conversion_constant", "apparatus", "film", "position_scale", "load"}
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class FrictionFit:
     """Measured loads against calculated contacts: the likelihood of each along the friction."""
 

@@ -25,7 +25,13 @@ from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import FloatArray, FrozenArrays, finite_vector, require_positive
+from memscal.model.arrays import (
+    FloatArray,
+    FrozenArrays,
+    array_record,
+    finite_vector,
+    require_positive,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
@@ -57,7 +63,7 @@ def unbounded(coordinates: ArrayLike, scale: float) -> FloatArray:
 _NUMBERS = ("depths", "contact_radii", "convergence")
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ProfileFamily(FrozenArrays):
     """Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers."""
 

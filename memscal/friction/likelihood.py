@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,12 +33,12 @@ from memscal.measurement.posterior import (
     sensor_changes,
     shared_changes,
 )
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class LoadPoints:
     """Voltages (n,) of one load of one scan, and what is known about each."""
 
@@ -182,7 +182,7 @@ _NEGLIGIBLE = 1e-4
 _RADII = 64
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Sensor:
     """A sensor at the nodes of a family."""
 
@@ -244,7 +244,7 @@ def _one_chain(apparatus: ApparatusFunction, scans: Sequence[MeasuredScan | Scan
         yield "gain"
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Predicted:
     """Voltages (V) of the n points of one load at V values of a family's parameter, (V, n)."""
 
@@ -358,7 +358,7 @@ def stacked(
     return together, Predicted(**arrays, columns=padded)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Noise:
     """Independent kinds of noise of the n readings of one load, at V values of the parameter."""
 
@@ -397,7 +397,7 @@ class Noise:
         return shares
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Standardised:
     """One load at V parameter values: noise of unit variance, flat nuisances projected out."""
 
@@ -469,7 +469,7 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
 LUBRICATED_FRICTION = "lubricated_friction"
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Likelihood:
     """Likelihood of one load or several along V values of one parameter."""
 
@@ -571,7 +571,7 @@ class Likelihood:
         return {source: share for source, share in shares.items() if share > 0}
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Channel:
     """What one channel of a sensor reads of several loads, and their calculated contacts."""
 

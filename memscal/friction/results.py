@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from memscal.apparatus import ApparatusFunction
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
@@ -157,7 +157,7 @@ def _rounded(value: float, low: float, high: float) -> str:
     return f"{value:.{places}f} [{lower}, {high:.{places}f}]"
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class LoadComparison:
     """One load of one scan against calculated profiles of one definition of the loading.
 
@@ -213,7 +213,7 @@ class LoadComparison:
         return self.profile.lubrication
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class DryAgainstLubricated:
     """The difference of dry and lubricated stress at one load: A and G nearly cancel.
 

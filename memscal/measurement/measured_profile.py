@@ -11,7 +11,7 @@ only where the scan does not determine it.
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import Load
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.correlation import is_banded
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
@@ -55,7 +55,7 @@ _DISTANCES = 401
 _LARGEST_END = 0.05
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ContactSignal:
     """The contact at a nominal load as the sensor reports it, without friction and sticking."""
 
@@ -187,7 +187,7 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
 _TRIED = np.geomspace(0.02, 2.0, 120)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Found:
     """Centre and signal of a scan, and what they leave of its n points; lengths in m, else V."""
 
@@ -222,7 +222,7 @@ def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints)
     return _Found(fit.centre[0], distance, signal, rest, weight, count)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class PreparedScan:
     """A scan whose points were brought to its nominal load."""
 

@@ -44,7 +44,7 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.scan import Scan, SetUp
@@ -147,7 +147,7 @@ _SMALLER = 0.4
 _NEGLIGIBLE = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _Basis(DepartureBasis):
     """The kernels about a fitted pressure: by force and width, and rings in units of its width."""
 
@@ -158,7 +158,7 @@ class _Basis(DepartureBasis):
         return kernel, self.conversion_constant * slope
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class _PressureEstimate:
     """Average of departures from the fit of one shape of pressure, or of several shapes."""
 
@@ -304,7 +304,7 @@ _RESOLVED = 3.0
 _REACH = 1.5
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Posterior:
     """Base stress, centre and baseline as one state with its covariance."""
 

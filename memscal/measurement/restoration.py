@@ -17,7 +17,7 @@ from memscal.formats.reference import read_reference
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_changes
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.checks import Checked, Message, QualityCheck
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
@@ -38,7 +38,7 @@ _NEGLIGIBLE = 1e-3
 _OF_RESTORED = "Measured, not calculated: restored with an apparatus function."
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class StressComparison:
     """How a calculated stress agrees with a scan and with the stress restored from it."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, FrozenArrays
+from memscal.model.arrays import FloatArray, FrozenArrays, array_record
 from memscal.model.assumptions import Assumption
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
@@ -22,7 +22,7 @@ from memscal.model.provenance import Process
 from memscal.model.stress import StressProfile
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ApparatusField(FrozenArrays):
     """The apparatus function on a Cartesian grid, with unit integral over it.
 
@@ -56,7 +56,7 @@ class ApparatusField(FrozenArrays):
         return cls(axis, axis, np.where(radius <= profile.r[-1], g, 0.0), errors)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ApparatusRadial(FrozenArrays):
     """The radial profile of the apparatus function.
 
@@ -81,7 +81,7 @@ class ApparatusRadial(FrozenArrays):
     conversion_correlation: FloatArray | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class TransferFunction(FrozenArrays):
     """Modulus of the apparatus function's 2-D Fourier transform along a radius.
 
@@ -105,7 +105,7 @@ class TransferFunction(FrozenArrays):
     resolved_wavenumber: float
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Reconvolution(FrozenArrays):
     """The scan beside what the calibration predicts for it; all in V against ``x`` in m.
 
@@ -136,7 +136,7 @@ class Reconvolution(FrozenArrays):
     background: FloatArray | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ParameterSet(FrozenArrays):
     """Estimated scalars with their joint covariance, in SI units.
 
@@ -199,7 +199,7 @@ class ParameterSet(FrozenArrays):
         return self.names.index(name)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class OtherEstimate:
     """A and G of the same scan by the route that was not chosen: a division, or ``bayesian``.
 

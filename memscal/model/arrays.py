@@ -100,7 +100,7 @@ def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
     return array
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class FrozenArrays:
     """Base of a frozen dataclass whose arrays are read-only copies of what it was made of."""
 

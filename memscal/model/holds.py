@@ -1,17 +1,16 @@
 """Holds that were found in the log of an instrument."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.notation import Reading
 from memscal.model.result import Result
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Holds(Result):
     """Holds that were found in a log of n rows, m of them, in SI units."""
 

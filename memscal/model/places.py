@@ -1,13 +1,11 @@
 """Places of a scan's readings, and even lattices of them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from memscal.model.arrays import IndexArray
+from memscal.model.arrays import IndexArray, array_record
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Places:
     """Places of the points of one scan."""
 
@@ -27,7 +25,7 @@ class Places:
         return np.bincount(self.index)[self.index]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class EvenAxis:
     """An even lattice along one axis: ``start`` and ``step`` in m, ``index`` (n,) of each point."""
 

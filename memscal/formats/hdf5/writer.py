@@ -5,7 +5,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from io import BytesIO
 from typing import Any
 
@@ -17,6 +17,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.limits import most_held
 from memscal.formats.units import from_si
+from memscal.model.arrays import array_record
 from memscal.model.notation import printable
 from memscal.model.sizes import too_large
 
@@ -38,7 +39,7 @@ CONTENTS_PATH = "/entry/contents/data"
 Attribute = str | int | tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Number:
     """A scalar or array in the unit of the file; ``axes`` names its axes, found in its group."""
 
@@ -48,7 +49,7 @@ class Number:
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Text:
     """A string with attributes; one without is a plain ``str``."""
 
@@ -56,7 +57,7 @@ class Text:
     attributes: Mapping[str, Attribute]
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class Group:
     """A NeXus group: its class, children by name, and attributes."""
 

@@ -10,7 +10,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.text_table import Wanted
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
@@ -24,7 +24,7 @@ _DECAYED = 0.01
 _ABSURD = 1e30
 
 
-@dataclass(frozen=True, eq=False)
+@array_record
 class ImportedProfile:
     """A stress profile that was imported, and what was done on the way."""
 
