@@ -50,8 +50,8 @@ def fleet() -> FleetResults:
 
 FIGURES: dict[str, Callable[..., Figure]] = {
     "failed": lambda make: calibration_figure(make(failed=1, meaning="They are 31 um apart.")),
-    "raster": lambda make: calibration_figure(make("radii", 25)),
-    "loads": lambda make: calibration_figure(make(loads=(0.5, 1.0, 2.0), points=33)),
+    "raster": lambda make: calibration_figure(make(raster=True, points=25)),
+    "loads": lambda make: calibration_figure(make(load=(0.5, 1.0, 2.0), points=33)),
     "stress": lambda _: measured(lubrication="dry").plot(),
     "restoration": lambda _: memscal.restore(
         sphere_scan(pressed(), seed=1), known_apparatus(), expected=pressed()
