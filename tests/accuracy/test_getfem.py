@@ -68,7 +68,7 @@ def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> l
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    states = json.loads(done.stdout)["states"]
+    states = json.loads(done.stdout)
     return [
         {name: np.array(v) if isinstance(v, list) else v for name, v in s.items()} for s in states
     ]
@@ -142,13 +142,3 @@ def test_getfem_agrees_on_the_sphere_with_friction(python: str, friction: float)
 def test_smaller_steps_bring_getfem_closer(python: str, friction: float) -> None:
     errors = [worst(friction, by_getfem(python, friction, n))["base stress"] for n in STEPS]
     assert all(fine < coarse / 1.3 for coarse, fine in itertools.pairwise(errors))
-
-
-def test_friction_moves_getfem_by_far_more_than_the_two_differ(python: str) -> None:
-    slippery, rough = (by_getfem(python, mu, STEPS[-1])[-1] for mu in (0.3, 1.0))
-    frictionless = by_memscal(0.0)[-1]
-    highest = frictionless.base_stress([0.0])[0] * 1e-6
-    for state in (slippery, rough):
-        assert state["base_normal"].max() > 1.2 * highest
-        assert state["depth"] * 1e-3 < 0.95 * frictionless.depth
-    assert rough["base_normal"].max() > 1.003 * slippery["base_normal"].max()

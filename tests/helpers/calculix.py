@@ -1,4 +1,4 @@
-"""Films for CalculiX: axisymmetric second-order elements, from the mesh to the parsed results.
+"""A film under a rod for CalculiX: axisymmetric second-order elements, from mesh to results.
 
 All in mm, N and MPa.  The elements are eight-noded with reduced integration (CAX8R), which do
 not lock close to incompressibility.  CalculiX solves a sector of two degrees: forces are scaled
@@ -15,15 +15,13 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from helpers.getfem_sphere import REACH, grid
+from helpers.getfem_sphere import REACH
 from numpy.typing import NDArray
 
-__all__ = ["Film", "Mesh", "PressedRod", "PressedSphere", "press_rod", "press_sphere"]
+from memscal import ElasticFilm
 
 FloatArray = NDArray[np.float64]
 SECTORS = 180.0
-# N/mm of a contact spring: the sphere enters the film by less than 1e-7 mm.
-CONTACT_STIFFNESS = 1e4
 
 
 @dataclass(frozen=True)
@@ -55,15 +53,6 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Film:
-    """A bonded film of a finite radius with a free edge."""
-
-    young_modulus: float
-    poisson_ratio: float
-    thickness: float
-
-
-@dataclass(frozen=True)
 class PressedRod:
     """Stiffness in N/mm, and stress at the base in MPa for a load of 1 N, at radii in mm."""
 
@@ -72,25 +61,12 @@ class PressedRod:
     base_normal: FloatArray
 
 
-@dataclass(frozen=True)
-class PressedSphere:
-    """Load in N at a depth in mm, forces of the interface's nodes in N, stress at the base."""
-
-    depth: float
-    load: float
-    r: FloatArray
-    forces: FloatArray
-    areas: FloatArray
-    base_r: FloatArray
-    base_normal: FloatArray
-
-
 def press_rod(
-    film: Film, radius: float, halvings: int, folder: Path, *, sticking: bool
+    film: ElasticFilm, radius: float, halvings: int, folder: Path, *, sticking: bool
 ) -> PressedRod:
     """Press a flat rod down by a tenth of a millimetre; the problem is linear."""
     depth = 0.1
-    mesh = rod_mesh(radius, film.thickness, halvings)
+    mesh = rod_mesh(radius, film.thickness * 1e3, halvings)
     deck = [
         *_film_deck(film, mesh),
         *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]),
@@ -108,51 +84,6 @@ def press_rod(
     tables = run(deck, folder)
     load = -SECTORS * sum(force[1] for force in tables["ROD", 1.0].values())
     return PressedRod(load / depth, mesh.r[:, 0], _base_stress(mesh, tables["BASE", 1.0]) / load)
-
-
-def press_sphere(
-    film: Film, radius: float, depths: list[float], step: float, layers: int, folder: Path
-) -> list[PressedSphere]:
-    """Press a sphere down without friction, on springs that resist compression only (GAPUNI).
-
-    One spring stands on every node that may be touched, with the sphere's height over it as its
-    clearance: the gap is linear in the displacements, as it is in memscal, and no surface of
-    facets stands in for the sphere.
-    """
-    r, z = np.meshgrid(*grid(step, layers, 4.2, film.thickness), indexing="ij")
-    mesh = Mesh.of_corners(r, z)
-    top = mesh.nodes[:, -1]
-    r = mesh.r[:, -1]
-    # On the axis itself a consistent force is zero.
-    touchable = (r > 0) & (r < 4.2)
-    deck = _film_deck(film, mesh)
-    first = top.max() + 1
-    deck += ["*NODE, NSET=SPHERE"]
-    deck += [f"{first + i}, {x:.13g}, {film.thickness + 1}, 0" for i, x in enumerate(r[touchable])]
-    number = len(mesh.elements) + 1
-    for i, (node, x) in enumerate(zip(top[touchable], r[touchable], strict=True)):
-        deck += [
-            f"*ELEMENT, TYPE=GAPUNI, ELSET=GAP{i}",
-            f"{number + i}, {node}, {first + i}",
-            f"*GAP, ELSET=GAP{i}",
-            f"{radius - np.sqrt(radius**2 - x**2):.13g}, 0, 1, 0, , {CONTACT_STIFFNESS}, 1e-9",
-        ]
-    deck += _to_make_it_iterate(first + r.size, number + r.size)
-    deck += ["*BOUNDARY", "SPHERE, 1, 1", "SPHERE, 3, 3"]
-    for depth in depths:
-        deck += ["*STEP, INC=100", "*CONTROLS, PARAMETERS=FIELD", "1e-6, 1e-4"]
-        deck += ["*STATIC", "1, 1, 1e-5, 1", "*BOUNDARY", f"SPHERE, 2, 2, {-depth:.13g}"]
-        deck += ["*NODE PRINT, NSET=SPHERE", "RF", "*NODE PRINT, NSET=BASE", "RF", "*END STEP"]
-    tables = run(deck, folder)
-    areas = trace_mass(r).sum(axis=1)[touchable]
-    states = []
-    for time, depth in enumerate(depths, start=1):
-        sphere = tables["SPHERE", time]
-        forces = -SECTORS * np.array([sphere[first + i][1] for i in range(areas.size)])
-        stress = _base_stress(mesh, tables["BASE", time])
-        load = float(forces.sum())
-        states.append(PressedSphere(depth, load, r[touchable], forces, areas, r, stress))
-    return states
 
 
 def rod_mesh(radius: float, thickness: float, halvings: int) -> Mesh:
@@ -236,7 +167,7 @@ def _with_middles(corners: FloatArray) -> FloatArray:
     return corners
 
 
-def _film_deck(film: Film, mesh: Mesh) -> list[str]:
+def _film_deck(film: ElasticFilm, mesh: Mesh) -> list[str]:
     exists = mesh.nodes > 0
     nodes = mesh.nodes
     points = zip(nodes[exists], mesh.r[exists], mesh.z[exists], strict=True)
@@ -247,7 +178,7 @@ def _film_deck(film: Film, mesh: Mesh) -> list[str]:
         *(f"{i}, {', '.join(map(str, e))}" for i, e in enumerate(mesh.elements, start=1)),
         "*MATERIAL, NAME=ELASTIC",
         "*ELASTIC",
-        f"{film.young_modulus}, {film.poisson_ratio}",
+        f"{film.young_modulus * 1e-6}, {film.poisson_ratio}",
         "*SOLID SECTION, ELSET=FILM, MATERIAL=ELASTIC",
         *_node_set("BASE", nodes[:, 0]),
         *_node_set("AXIS", nodes[0]),
@@ -259,28 +190,6 @@ def _film_deck(film: Film, mesh: Mesh) -> list[str]:
 
 def _node_set(name: str, nodes: NDArray[np.int64]) -> list[str]:
     return [f"*NSET, NSET={name}", *(f"{node}," for node in nodes if node > 0)]
-
-
-def _to_make_it_iterate(node: int, element: int) -> list[str]:
-    """A held brick apart, of a material with a yield stress.
-
-    Without it CalculiX 2.20 takes a film on gap elements for a linear problem.
-    """
-    corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
-    return [
-        "*NODE, NSET=HELD",
-        *(f"{node + i}, {100 + x}, {y}, {z}" for i, (x, y, z) in enumerate(corners)),
-        "*ELEMENT, TYPE=C3D8, ELSET=BRICK",
-        f"{element}, {', '.join(str(node + i) for i in range(8))}",
-        "*MATERIAL, NAME=YIELDING",
-        "*ELASTIC",
-        "1., 0.",
-        "*PLASTIC",
-        "1e6, 0.",
-        "*SOLID SECTION, ELSET=BRICK, MATERIAL=YIELDING",
-        "*BOUNDARY",
-        "HELD, 1, 3",
-    ]
 
 
 def _base_stress(mesh: Mesh, base: dict[int, FloatArray]) -> FloatArray:
