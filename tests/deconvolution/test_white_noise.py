@@ -38,24 +38,6 @@ def truncated_mean_bound(count: int, cut: float) -> float:
     return float(np.sqrt(2) * bernstein + 2 * np.sqrt(2 / np.e) * cut**2)
 
 
-@pytest.mark.parametrize("ratio", [0.4, 0.8, 1.2, 2.0])
-def test_the_window_is_the_mean_reciprocal_over_circular_noise(ratio, seed):
-    grid = EvenGrid(9, 0.5)
-    delta = np.zeros((9, 9))
-    delta[0, 0] = ratio / grid.cell_area
-    window = WhiteNoise().divide(DivisionProblem(grid, delta, delta, 1.0, 10.0)).window
-    rng = np.random.default_rng(seed)
-    count = 2_000_000
-    cut = 0.02
-    noise = (rng.normal(size=count) + 1j * rng.normal(size=count)) / np.sqrt(2)
-    phase = np.exp(2j * np.pi * rng.random())
-    total = ratio * phase + noise
-    mean = np.sum(1 / total[np.abs(total) > cut]) / count
-    bound = truncated_mean_bound(count, cut)
-    assert bound < 0.03
-    assert abs(ratio * phase * mean - window[0, 0]) < ratio * bound
-
-
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
 def test_a_draw_scatters_around_the_expectation(ratio, seed):
     # Both fields are spikes: every component of the quotient is another draw of z/(z + n).
