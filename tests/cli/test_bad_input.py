@@ -115,12 +115,3 @@ def test_a_reference_shorter_than_the_scan_is_refused(refused: Refused, scan: Pa
     for further in ([], ["--dry-run"]):
         words = ("ends at r = 2 mm", "Extend the reference")
         refused(scan, "--reference", "short.h5", *further, words=words)
-
-
-def test_a_scan_is_no_reference_and_a_missing_scan_is_named(refused: Refused, scan: Path):
-    refused(scan, "--reference", scan, words=("memscal-reference",))
-    refused("missing.h5", words=("missing.h5 cannot be read: No such file",))
-
-
-def test_a_name_that_would_steer_the_terminal_is_shown_without_its_controls(run: Run, folder: Path):
-    assert "\x1b" not in run("calibrate", "\x1b[2Jscan.h5").exits(3).err

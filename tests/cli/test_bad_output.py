@@ -41,13 +41,6 @@ def no_computing(monkeypatch: Patch) -> None:
 
 
 @pytest.mark.usefixtures("no_computing")
-@pytest.mark.parametrize("name", ["--output", "--report", "--figure", "--sweep-figure"])
-def test_every_output_is_proven_writable_before_computing(run: Run, scan: Path, folder: Path, name):
-    run("calibrate", scan, name, "missing/out.png").exits(4, "missing", "Create the folder")
-    assert names(folder) == ["scan.h5"]
-
-
-@pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("spelling", ["scan.h5", "./scan.h5", "link.h5", "twin.h5"])
 def test_an_output_is_never_an_input_even_if_forced(run: Run, scan: Path, folder: Path, spelling):
     before = scan.read_bytes()

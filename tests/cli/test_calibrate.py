@@ -49,12 +49,6 @@ def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Ru
     assert [f"Overridden: {text}." for text in process.configuration["override"]] == [message.text]
 
 
-def test_a_reference_that_is_a_table_is_sent_to_import(run: Run, scan: Path):
-    Path("fem.csv").write_text("r,s\n0,1\n1,0\n")
-    refused = run("calibrate", scan, "--reference", "fem.csv")
-    refused.exits(3, "memscal import fem.csv --format reference")
-
-
 def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path):
     options = ["--method", "tikhonov", "--option", "amplitude=0.5", "-o", "out.h5"]
     assert run("calibrate", scan, *options, "--json").json["method"] == "tikhonov"

@@ -102,12 +102,6 @@ def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_h
     assert "Effective friction coefficient" in done.out
 
 
-def test_a_folder_is_proven_writable_before_computing(compare: Run, monkeypatch: Patch):
-    reached = "The comparison was reached."
-    monkeypatch.setattr("memscal.friction.compare.compare", lambda *_, **__: pytest.fail(reached))
-    assert compare("--figures", "no/such/folder").code == NOT_WRITTEN
-
-
 def test_the_cache_is_the_users_own(monkeypatch: Patch, tmp_path: Path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert user_cache_folder() == tmp_path / "memscal" / "contacts"

@@ -16,13 +16,6 @@ def test_a_depth_gives_the_load_that_gives_the_depth(run: Run):
     assert loaded["depth"]["value"] == pytest.approx(100)
 
 
-def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
-    Path("tip.csv").write_text("r,z\n0,0\n1,nan\n2,4\n3,9\n", encoding="utf-8")
-    run("reference", "profile", "--profile-table", "tip.csv").exits(3, "tip.csv")
-    Path("tip.csv").write_text("r,z\n1,0\n2,1\n3,4\n4,9\n", encoding="utf-8")
-    assert "first at the axis" in run("reference", "profile", "--profile-table", "tip.csv").err
-
-
 @pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])
 def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path, law):
     done = run("reference", "rod", "--load", 0.02, *law, "-o", "finite.h5").exits(0)

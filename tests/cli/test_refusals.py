@@ -1,16 +1,36 @@
 """Command lines that are refused: by exit code, with words that lead on, and nothing written."""
 
 import shlex
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+from string import Template
 
 import pytest
-from helpers.console import Run, names
+from helpers.console import Run
+
+MESH = Path(__file__).parents[1] / "data" / "vtk_film.vtu"
+TABLES = {
+    "film.frd": "    1C\n",
+    "left.csv": "path,wafer_x,wafer_y\na.h5,left,0\n",
+    "no_path.csv": "sensor,path\n7,\n",
+    "no_tip.csv": "r,z\n1,0\n2,1\n3,4\n4,9\n",
+    "not_finite.csv": "r,z\n0,0\n1,nan\n2,4\n3,9\n",
+    "semicolons.csv": "path;wafer_x\na.h5;0\n",
+    "table.csv": "x,u\n0,1\n1,2\n2,1\n",
+    "um.csv": "path,wafer_x (um)\na.h5,0\n",
+}
+#: What stands in many of the commands.
+PARTS = {
+    "columns": "import table.csv -o a.h5 --x x --x-unit mm --u u --u-unit mV",
+    "film": "--load 1 --radius 0.25 --young-modulus 2.2 --poisson-ratio 0.5",
+    "reference": "-o a.h5 --format reference --r-unit mm --sigma-unit MPa --load 1",
+}
 
 TWICE = "Two outputs"
 WANT = "--want and --vary go together"
 
-#: Of a folder with a scan and an artifact: commands, each with what its refusal says.
+#: Of a folder with a scan, an artifact and tables: commands, each with what its refusal says.
 WRONG_USAGE = {
     "--verbose": "--version",
     "apply sensor.apparatus.h5": "",
@@ -43,6 +63,12 @@ WRONG_USAGE = {
     "compare sensor.apparatus.h5 scan.h5 --reference a.h5 --friction 0 --friction inf": (
         "--reference"
     ),
+    "batch . -o new --workers 1 --scheduler tcp://a:1": "exclude each other",
+    "certificate sensor.apparatus.h5 --lab lab.toml": "--output",
+    "certificate sensor.apparatus.h5 --lab lab.toml -o a.xml -o a.xml": "same name",
+    "certificate sensor.apparatus.h5 --lab lab.toml -o c.txt": (
+        "'c.txt' does not end in .html, .pdf, .xml"
+    ),
     "completion tcsh": "fish",
     "design --figure design.gif": ".png",
     "design --noise 0": "--noise",
@@ -56,7 +82,18 @@ WRONG_USAGE = {
     "design --want sigma=much% --vary step": "is no target",
     "design --weight 0.5 --weight 0.5": "--weight",
     "explain gausian_misfit": "Did you mean gaussian_misfit?",
+    "import film.vtu -o a.h5": "film.vtu is a mesh, and no scan: add --format reference",
+    "import film.vtu -o a.h5 --format reference": "--sigma, --load, --r-unit, --sigma-unit",
+    "import film.vtu $reference --sigma S --r x": "A mesh has no use for --r",
     "import t.csv -o a.h5 --x-units mm": "--x-unit",
+    "import table.csv -o a.h5": "add --x, --u.",
+    "import table.csv -o a.h5 --format reference": "add --sigma, --load, --r.",
+    "import table.csv $reference --r x --sigma u --base 0": "A table has no use for --base",
+    "$columns --figure a.png": "--holds",
+    "$columns --load 1 --indenter sphere": "--radius",
+    "$columns --shear-sign -1": "--shear-sign",
+    "$columns --sigma s": "--sigma belong to --format reference",
+    "$columns --thickness 1": "add --young-modulus, --poisson-ratio",
     "reference cone -o out.h5": "needs --inclination",
     "reference cone --inclination 5 --radius 1 -o out.h5": "--radius does not describe a cone",
     "reference profile -o out.h5": "needs --profile-table",
@@ -105,21 +142,51 @@ INVALID = {
     "apply scan.h5 scan.h5": "memscal-artifact",
     "apply sensor.apparatus.h5 absent.h5": "absent.h5",
     "apply sensor.apparatus.h5 sensor.apparatus.h5": "memscal-scan",
+    "batch left.csv -o new": "left.csv, line 2: could not convert string to float: 'left'",
+    "batch no_path.csv -o new": "line 2 has no path",
+    "batch none.csv -o new": "neither a folder nor",
+    "batch semicolons.csv -o new": "None of the 2 scans",
+    "batch um.csv -o new": "'wafer_x (um)'",
+    "calibrate '\x1b[2Jscan.h5'": "[2Jscan.h5 cannot be read: No such file",
+    "calibrate scan.h5 --channel xz --method wiener --dry-run": "bayesian",
+    "calibrate scan.h5 --reference scan.h5": "memscal-reference",
+    "calibrate scan.h5 --reference table.csv": "memscal import table.csv --format reference",
     "compare scan.h5 scan.h5": "memscal-artifact",
     "design --method magic": "magic",
     "design --radius 1.5": "rod's width is 3 mm",
     "design --want sigma=1% --vary repeats": "the best is",
+    "import film.frd $reference --sigma S": ".vtu",
+    "import film.vtu $reference --sigma S --base 0.1": "--base",
+    "import film.vtu $reference --sigma Stress": "at the nodes: S (6); in the cells: S33 (1)",
+    "$columns $film --thickness 0.02": "times the film's thickness of 0.02 mm",
+    "$columns $film --thickness 1500": "Probably 1.5 mm was meant",
+    "$columns --load 1 --sheet A": "--sheet) has no effect on a text",
+    "$columns --load 80 --load-unit g": "80 g weigh 0.785 N",
+    "inspect table.csv": "table.csv is not",
     "reference profile --profile-table absent.csv -o out.h5": "absent.csv",
+    "reference profile --profile-table no_tip.csv -o out.h5": "first at the axis",
+    "reference profile --profile-table not_finite.csv -o out.h5": "not_finite.csv",
     "reference rod --depth 3000 -o out.h5": "would sink 3000 um",
     "reference sphere --backend fem --film-radius 1 -o out.h5": "the film's edge at 1 mm",
     "reference sphere --strain finite --friction 0.3 -o out.h5": "slides freely (friction 0) or",
     "restore scan.h5 scan.h5": "memscal-artifact",
     "simulate --experiment sphere --load 1e6": "film",
     "simulate --sigma 700 --weight 0.5": "",
+    "summary .": "holds no results of a batch",
 }
 
+CREATE = "Create the folder first"
+INPUT = "also an input"
 NOT_WRITTEN = {
-    "simulate --experiment sphere -o no/such/folder": "Create the folder first",
+    "apply sensor.apparatus.h5 scan.h5 -o scan.h5 --force": INPUT,
+    "calibrate scan.h5 -o no/out.h5": CREATE,
+    "calibrate scan.h5 --figure no/out.png": CREATE,
+    "calibrate scan.h5 --report no/out.html": CREATE,
+    "calibrate scan.h5 --sweep-figure no/out.png": CREATE,
+    "certificate sensor.apparatus.h5 --lab lab.toml -o no/c.xml": CREATE,
+    "compare sensor.apparatus.h5 scan.h5 --figures no/such/folder": CREATE,
+    "$columns $film --thickness 2 -o table.csv --force": INPUT,
+    "simulate --experiment sphere -o no/such/folder": CREATE,
     "simulate --experiment sphere -o scan.h5": "not a folder",
 }
 
@@ -127,11 +194,16 @@ NOT_WRITTEN = {
 @pytest.fixture
 def refused(run: Run, scan: Path, artifact: Path, folder: Path) -> Callable[..., None]:
     """Run a command that is refused, in a folder that stays as it was."""
+    shutil.copy(MESH, "film.vtu")
+    for name, text in TABLES.items():
+        Path(name).write_text(text, encoding="utf-8")
 
     def refused_(code: int, line: str, *words: str) -> None:
-        before = names(folder)
-        assert run(*shlex.split(line)).exits(code, *words).out == ""
-        assert names(folder) == before
+        before = {path: path.read_bytes() for path in folder.iterdir()}
+        done = run(*shlex.split(Template(line).substitute(PARTS))).exits(code, *words)
+        assert done.out == ""
+        assert "\x1b" not in done.err
+        assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
     return refused_
 
@@ -141,11 +213,15 @@ def test_wrong_usage_is_exit_code_2_with_a_hint(refused, line: str) -> None:
     refused(2, line, WRONG_USAGE[line], "--help")
 
 
+@pytest.mark.filterwarnings("default::memscal.errors.UnitWarning")
 @pytest.mark.parametrize("line", INVALID)
 def test_an_input_that_cannot_be_used_is_exit_code_3(refused, line: str) -> None:
     refused(3, line, INVALID[line])
 
 
 @pytest.mark.parametrize("line", NOT_WRITTEN)
-def test_an_output_that_cannot_be_written_is_exit_code_4(refused, line: str) -> None:
+def test_an_output_that_cannot_be_written_is_exit_code_4(refused, line, monkeypatch) -> None:
+    computing = "The calibration was reached."
+    name = "memscal.calibration.calibrate.calibrate"
+    monkeypatch.setattr(name, lambda *_, **__: pytest.fail(computing))
     refused(4, line, NOT_WRITTEN[line])

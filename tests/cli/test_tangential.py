@@ -32,12 +32,6 @@ def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run: Run,
     assert names(sheared.parent) == ["scan.apparatus.h5", "scan.h5", "scan.xz.apparatus.h5"]
 
 
-def test_a_method_that_divides_fields_is_refused_by_a_dry_run(run: Run, sheared: Path):
-    done = run("calibrate", sheared, "--channel", "xz", "--method", "wiener", "--dry-run")
-    done.exits(3, "bayesian")
-    assert names(sheared.parent) == ["scan.h5"]
-
-
 def test_the_shear_of_a_contact_is_compared_with_its_channel_s_artifact(
     run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -40,14 +40,6 @@ def test_missing_fields_are_all_named_and_nothing_is_written(run, inputs):
     assert names(Path()) == ["lab.toml", "scan.apparatus.h5"]
 
 
-@pytest.mark.parametrize(("arguments", "code", "words"), [
-    (("-o", "c.txt"), 2, "'c.txt' does not end in .html, .pdf, .xml"), ((), 2, "--output"),
-    (("-o", "a.xml", "-o", "a.xml"), 2, "same name"), (("-o", "nowhere/c.xml"), 4, "nowhere"),
-])  # fmt: skip
-def test_wrong_outputs_are_refused_first(run, inputs, arguments, code, words):
-    run("certificate", *inputs, *arguments).exits(code, words)
-
-
 def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     run("certificate", *inputs, "-o", "c.pdf").exits(3, "memscal[certificate]")

@@ -64,31 +64,6 @@ def test_the_file_that_holds_the_numbers_of_a_mesh_is_an_input_too(run, folder):
     assert names(folder) == ["film.h5", "film.xdmf", "link.h5"]
 
 
-@pytest.mark.parametrize(("options", "code", "words"), [
-    ([*MESH, "--sigma", "Stress"], 3, ["at the nodes: S (6)", "in the cells: S33 (1)"]),
-    ([*MESH, "--sigma", "S", "--base", 0.1], 3, ["--base", "0.1 mm"]),
-    ([*MESH, "--sigma", "S", "--r", "x"], 2, ["A mesh has no use for --r"]),
-    (["--format", "reference"], 2, ["--r-unit", "--sigma", "--sigma-unit", "--load"]),
-    ([], 2, ["film.vtu is a mesh", "--format reference"]),
-])  # fmt: skip
-def test_what_is_wrong_with_a_mesh_is_said(run, mesh, options, code, words):
-    refused = run("import", mesh, "-o", "film.h5", *options).exits(code)
-    assert all(word in refused.err for word in words), refused.err
-    assert names(mesh.parent) == ["film.vtu"]
-
-
-def test_the_options_of_meshes_mean_nothing_for_a_table(run, folder):
-    Path("fem.csv").write_text("r,s\n0,1\n1,0.5\n")
-    columns = ["--r", "r", "--sigma", "s", "--base", 0]
-    refused = run("import", "fem.csv", "-o", "fem.h5", *MESH, *columns)
-    refused.exits(2, "A table has no use for --base")
-
-
-def test_a_mesh_of_another_kind_is_not_taken_for_a_table(run, folder):
-    Path("film.frd").write_text("    1C\n")
-    run("import", "film.frd", "-o", "film.h5", *MESH, "--sigma", "STRESS").exits(3, ".vtu")
-
-
 def test_without_meshio_it_is_named(run, mesh, monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
     refused = run("import", mesh, "-o", "film.h5", *MESH, "--sigma", "S")
