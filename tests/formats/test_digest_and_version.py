@@ -71,21 +71,10 @@ def test_a_copy_made_by_another_program_still_fits_its_digest(artifact: Path, tm
 def test_what_other_programs_add_is_ignored(artifact: Path):
     with h5py.File(artifact, "r+") as file:
         file["/entry/my_notes"] = "added later"
+        file["/entry/parameters/budget/added"] = 1.0
         file["/entry/loop"] = file["/entry"]
         file["/entry/apparatus_function"].attrs["colour"] = "red"
     assert load_apparatus(artifact).load == 1.0
-
-
-def test_what_was_added_at_a_path_that_is_read_is_refused(artifact: Path):
-    """A number that the digest does not cover must not be taken for ours."""
-    with h5py.File(artifact, "r+") as file:
-        file["/entry/parameters/budget/added"] = 1.0  # unknown to the reader: left unread
-    assert load_apparatus(artifact).load == 1.0
-    with h5py.File(artifact, "r+") as file:
-        file["/entry/sample/film/name"] = "another film"
-    with pytest.raises(FormatError, match="after it was written: /entry/sample/film/name was add"):
-        load_apparatus(artifact)
-    assert not all(finding.passed for finding in check(artifact))
 
 
 ADDITIONS = {

@@ -69,11 +69,6 @@ def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
         assert "1 approach, 2 retreat" in file["/entry/data/branch"].attrs["meaning"]
 
 
-def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):
-    write_scan(make_scan(**BARE), tmp_path / "scan.h5")
-    assert_same(read_scan(tmp_path / "scan.h5"), make_scan(**BARE), but=("source",))
-
-
 SPHERE = Sphere(radius=128.8e-3, radius_uncertainty=1e-5)
 ABSENT = "sigma_rz depth contact_radius stick_radius friction_coefficient film indenter convergence"
 

@@ -112,6 +112,14 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "a.stress.h5"
 
 
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    """A file of version 1.0."""
+    path = tmp_path / "old.stress.h5"
+    path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
+    return path
+
+
 def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path: Path):
     found = memscal.read_stress(path)
     assert found == make_stress()
@@ -119,9 +127,7 @@ def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path: Path):
     assert len(repr(found)) < 200
 
 
-def test_a_file_of_version_1_0_is_read_with_what_it_holds(tmp_path: Path):
-    old = tmp_path / "old.stress.h5"
-    old.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
+def test_a_file_of_version_1_0_is_read_with_what_it_holds(old: Path, tmp_path: Path):
     found = memscal.read_stress(old)
     [profile] = found.profiles
     assert (profile.load, profile.force, profile.lubrication) == (0.5, 0.505, "dry")
@@ -180,26 +186,22 @@ def test_a_root_of_another_shape_or_not_finite_is_refused_by_its_path(path: Path
 
 
 @pytest.mark.parametrize("factor", [-1.0, 1e200, np.nan])
-def test_a_covariance_of_an_older_file_must_be_one(tmp_path: Path, factor: float):
-    path = tmp_path / "old.stress.h5"
-    path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
-    with h5py.File(path, "r+") as file:
+def test_a_covariance_of_an_older_file_must_be_one(old: Path, factor: float):
+    with h5py.File(old, "r+") as file:
         stored = file["entry/profile_1/covariance_noise"]
         stored[0, 1:] = factor * np.abs(stored[0, 0]) * (1 + np.arange(stored.shape[0] - 1))
     with pytest.raises(FormatError, match=r"covariance_noise (is no covariance|should hold)"):
-        read_stress(path, accept_altered=True)
+        read_stress(old, accept_altered=True)
 
 
-def test_covariances_beside_the_profiles_are_read_like_those_within(tmp_path: Path):
-    path = tmp_path / "old.stress.h5"
-    path.write_bytes(gzip.decompress((DATA / "stress_1_0.h5.gz").read_bytes()))
-    [within] = memscal.read_stress(path).profiles
-    with h5py.File(path, "r+") as file:
+def test_covariances_beside_the_profiles_are_read_like_those_within(old: Path):
+    [within] = memscal.read_stress(old).profiles
+    with h5py.File(old, "r+") as file:
         expected = file["entry/profile_1/covariance"][()]
         for name in [n for n in file["entry/profile_1"] if n.startswith(("covariance", "sources"))]:
             file.require_group("entry/covariances/profile_1")
             file.move(f"entry/profile_1/{name}", f"entry/covariances/profile_1/{name}")
-    [beside] = memscal.read_stress(path, accept_altered=True).profiles
+    [beside] = memscal.read_stress(old, accept_altered=True).profiles
     for profile in (within, beside):
         close = 1e-9 * np.abs(expected).max()
         np.testing.assert_allclose(profile.covariance, expected, rtol=0, atol=close)

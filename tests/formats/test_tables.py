@@ -14,7 +14,6 @@ from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, import_table
 from memscal.formats.tables.stated import TableLayout
-from memscal.formats.tables.text_table import TextTable
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan
@@ -96,19 +95,50 @@ def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path: Path):
     assert (step_x, step_y) == (pytest.approx(0.5, rel=0.01), pytest.approx(0.25, rel=0.01))
 
 
-TWO_ROWS = "x,u\n0,1\n1,2\n"
-NO_TABLES = ("", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0")
+ROWS = "\n0,1\n1,2\n2,1\n"
+LINE = "\n".join(f"{x},{x % 3}" for x in range(-8, 9))
+FORCES = "x,u,f\n0,1,0.050\n1,2,0.051\n2,2,0.049\n"
+LONG = "x,u\n" + "\n".join(f"{x},{np.exp(-((x / 1e3) ** 2))}" for x in range(-8000, 8001, 250))
+NO_UNITS = {"x_unit": None, "u_unit": None}
 
 
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        *((TWO_ROWS, {"u": column}, r"columns are: x, u\.") for column in ("volts", "0", "3", -1)),
-        *((TWO_ROWS, {"u_unit": unit}, f'"{unit}"') for unit in ("parsnip", "degC", "9/")),
-        (TWO_ROWS, {"u_unit": None}, r"column 'u' states no unit(.|\n)*--u-unit"),
-        (TWO_ROWS, {"load": None, "load_scatter": 0.1}, "no load"),
-        *((text, {}, r"table\.csv") for text in NO_TABLES),
+        *((f"x,u{ROWS}", {"u_unit": unit}, f'"{unit}"') for unit in ("parsnip", "degC", "9/")),
+        *((f"x,u{ROWS}", {"u": u}, r"columns are: x, u\.") for u in ("volts", "0", "3", -1)),
+        *((text, {}, r"table\.csv") for text in ("", "\n\n", "# a comment\n", "x,u\n", "\0\0\0")),
+        (f"x,u{ROWS}", {"u_unit": None}, r"column 'u' states no unit(.|\n)*--u-unit"),
+        (f"x,u{ROWS}", {"load": None, "load_scatter": 0.1}, "no load"),
+        (f"x,u{ROWS}", {"u_sign": 2}, "Give 1 or -1"),
+        (f"x,u{ROWS}", {"load_unit": "g"}, "80 g weigh"),
+        (f"x,u{ROWS}", {"noise": 1, "u_errors": "x"}, "one uncert"),
+        (f"x,u{ROWS}", {"noise": 1, "holds": True}, "one uncertainty"),
+        (f"x,u{ROWS}", {"load": None, "load_uncertainty": 1.0}, "belongs to a load"),
+        (f"x,u{ROWS}", {"load_column": "u", "load_unit": "g"}, 'unit "g", but it must be a force'),
+        (f"x [um],u{ROWS}", {}, r"'x' states the unit 'um', but x_unit \(--x-unit\) is 'mm'"),
+        (f"x,u (uV){ROWS}", {}, "'uV', but u_unit"),
+        (f"x,u [mm]{ROWS}", {}, "'mm', but u_unit"),
+        (f"x [mm],u/V{ROWS}", {"u_unit": "parsnip"}, "'V', but u_unit"),
+        (f"x,u [channel 1]{ROWS}", {"u_unit": None}, "states no unit that is known"),
         ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
+        ("x,u,b\n0,1,down\n1,2,up\n", {"branch": "b"}, r"approach or retreat in line 2 \('down'"),
+        (
+            FORCES,
+            {"load": 0.5, "load_column": "f"},
+            r"as 0\.5 N, but those recorded go from 0\.049",
+        ),
+        (FORCES, {"load": 0.05, "load_uncertainty": 5.0}, r"is 5 N, but the load is 0\.05"),
+        (LONG, {"film": make_film(thickness=1.5e-3)}, r"step is 250 mm(.|\n)*um as mm\?"),
+        (LONG, {"indenter": Sphere(radius=0.1)}, r"positions span 1\.6e\+04 mm"),
+        ("x;u\n-8.000;0,05\n-500;0,1\n0;12,1\n500;0,1\n", {"decimal": ","}, r"'-8\.000'"),
+        ("x/mm,u/mV\n" + LINE.replace(",", ",0,0,"), NO_UNITS, "line 2 has 4 cells, the header 2"),
+        (f"x/mm,u/mV\n{LINE}\n9,ok,1\n", NO_UNITS, "line 19 has 3 cells"),
+        ("x/mm u/mV t\n" + "0 1 2\n" * 9 + "1 2\n", NO_UNITS, "line 11 has 2"),
+        ('x/mm,u/mV,n\n0,1,"5 inch\n1,2,n\n2,3,end"\n' + LINE, NO_UNITS, "no end in it"),
+        (f"x [mm],u [mV]\nmm,V\n{LINE}", NO_UNITS, "'mV' in its head, and 'V'"),
+        ("x (um);u (mV)\n-6,000;1\n-750;2\n0;3\n1,000;5\n", NO_UNITS, "may separate thousands"),
+        (f"x/mm,u (mV),u (V)\n{LINE}", NO_UNITS, r"columns 'u': u \(mV\), u \(V\)"),
     ],
 )
 def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
@@ -116,19 +146,25 @@ def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
         scan_table(tmp_path, text, **options)
 
 
-@pytest.mark.parametrize(("unit", "si", "factor"), [
-    ("uT", "T", 1e-6), ("pA", "A", 1e-12), ("kPa", "Pa", 1e3), ("counts", "1", 1.0),
-    ("a.u.", "1", 1.0), ("percent", "1", 0.01), ("mV", "V", 1e-3), ("mV/s", "V/s", None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("unit", "si", "factor"),
+    [
+        ("uT", "T", 1e-6),
+        ("pA", "A", 1e-12),
+        ("kPa", "Pa", 1e3),
+        ("counts", "1", 1.0),
+        ("a.u.", "1", 1.0),
+        ("percent", "1", 0.01),
+        ("mV", "V", 1e-3),
+        ("mV/s", "kg*m^2/A/s^4", 1e-3),
+    ],
+)
 @pytest.mark.parametrize("head", ["u/{}", "u ({})", "u[{}]"])
 def test_readings_of_any_unit_state_it_in_their_head(tmp_path: Path, unit, si, factor, head):
     text = f"x,{head.format(unit)}\n0,1\n1,2\n"
     found = scan_table(tmp_path, text, u_unit=None, film=None, indenter=None, load=None)
-    if factor is not None:
-        assert found.unit == si
-        np.testing.assert_allclose(found.u_zz, [factor, 2 * factor], rtol=1e-15)
-    else:
-        np.testing.assert_allclose(found.u_zz, [1e-3, 2e-3], rtol=1e-15)
+    assert found.unit == si
+    np.testing.assert_allclose(found.u_zz, [factor, 2 * factor], rtol=1e-15)
     assert (found.film, found.indenter, found.load) == (None, None, None)
 
 
@@ -138,15 +174,7 @@ def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Pa
     assert found.load == 1.0
     np.testing.assert_allclose(found.normal_load, [0.99, 1.0, 1.03])
     assert scan_table(tmp_path, text, load=None).load is None
-
-
-def test_a_load_beyond_those_recorded_is_refused(tmp_path: Path):
-    text = "x,u,f\n0,1,0.050\n1,2,0.051\n2,2,0.049\n"
-    with pytest.raises(InputError, match=r"stated as 0\.5 N, but those recorded go from 0\.049"):
-        scan_table(tmp_path, text, load=0.5, load_column="f")
-    assert scan_table(tmp_path, text, load=0.05, load_column="f").load == 0.05
-    with pytest.raises(InputError, match=r"of the load is 5 N, but the load is 0\.05"):
-        scan_table(tmp_path, text, load=0.05, load_uncertainty=5.0)
+    assert scan_table(tmp_path, text, load_column="f", load_unit="mN").load == 1.0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -169,27 +197,28 @@ def test_rows_without_a_position_are_left_out_and_named_and_a_header_may_be(tmp_
     assert any("they have no position: line" in note.text for note in found.messages)
 
 
-@pytest.mark.parametrize(("text", "decimal"), [
-    ("x;u\n0,5;1,25\n1,5;2,5\n", ","), ("x\tu\n0.5\t1.25\n1.5\t2.5\n", "."),
-    ("x u\n0.5   1.25\n 1.5 2.5\n", "."),
-    ("# made by a stage\n% in mm\nx,u\n0.5,1.25\n1.5,2.5\n", "."),
-    ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', "."), ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
-    ("x|u\n5D-1|1.25\n1.5|2.5d0\n", "."),
-], ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"])  # fmt: skip
-def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, decimal):
-    found = scan_table(tmp_path, text)
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("x;u\n0,5;1,25\n1,5;2,5\n", {}),
+        ("x\tu\n0.5\t1.25\n1.5\t2.5\n", {}),
+        ("x u\n0.5   1.25\n 1.5 2.5\n", {}),
+        ("# made by a stage\n% in mm\nx,u\n0.5,1.25\n1.5,2.5\n", {}),
+        ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', {}),
+        ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", {}),
+        ("x|u\n5D-1|1.25\n1.5|2.5d0\n", {}),
+        ("Rate;10\nLoad;1,0\nx;u\n0,5;1,25\n1,5;2,5\n", {}),
+        ("x u\n0,5 1,25\n1,5 2,5\n", {}),
+        ("# rod\n# x/mm u/mV\n0.5 1.25\n1.5 2.5\n", {"x_unit": None, "u_unit": None}),
+        ("7,8\n9,9\nx,u\n0.5,1.25\n1.5,2.5\n", {"skip_rows": 2}),
+        ("t,x,u\n12:01,0.5,1.25\n12:02,1.5,2.5\n", {}),
+        ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
+    ],
+)
+def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, options):
+    found = scan_table(tmp_path, text, film=None, **options)
     assert found.x.tolist() == [0.5e-3, 1.5e-3]
     assert found.u_zz.tolist() == [1.25e-3, 2.5e-3]
-    assert TextTable(tmp_path / "table.csv").decimal == decimal
-
-
-def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
-    with pytest.raises(FormatError, match=r"column 'u' holds .* line 3 \('overload'\)\."):
-        scan_table(tmp_path, "x,u\n0,1\n1,overload\n")
-    with pytest.raises(
-        FormatError, match=r"not a number or approach or retreat in line 2 \('down'"
-    ):
-        scan_table(tmp_path, "x,u,b\n0,1,down\n1,2,approach\n", branch="b")
 
 
 EXPORT = (
@@ -220,24 +249,6 @@ def test_an_export_with_preamble_and_units_is_read_as_it_is(tmp_path: Path, enco
         assert scan.source.sha256 == hashlib.sha256(mark + content).hexdigest()
 
 
-@pytest.mark.parametrize(
-    ("text", "options"),
-    [
-        ("Rate;10\nLoad;1,0\nx;u\n0,5;1,25\n1,5;2,5\n", {}),
-        ("x u\n0,5 1,25\n1,5 2,5\n", {}),
-        ("# rod\n# x/mm u/mV\n0.5 1.25\n1.5 2.5\n", {"x_unit": None, "u_unit": None}),
-        ("7,8\n9,9\nx,u\n0.5,1.25\n1.5,2.5\n", {"skip_rows": 2}),
-        ("t,x,u\n12:01,0.5,1.25\n12:02,1.5,2.5\n", {}),
-        ('a,b,c\n"2 m/s","",""\nt,x,u\ns,mm,mV\n0,.5,1.25\n1,1.5,2.5\n', {"x_unit": None}),
-    ],
-    ids=["pairs", "decimal comma", "savetxt", "skip", "time", "units"],
-)
-def test_the_header_is_found_below_what_stands_above_it(tmp_path: Path, text, options):
-    scan = scan_table(tmp_path, text, film=None, **options)
-    np.testing.assert_allclose(scan.x, [0.5e-3, 1.5e-3])
-    np.testing.assert_allclose(scan.u_zz, [1.25e-3, 2.5e-3])
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_path: Path, seed):
     """Wherever they stand, the first row of numbers included, and in blocks read in either way."""
@@ -253,21 +264,6 @@ def test_wrong_cells_are_counted_and_the_first_five_named_by_their_lines(tmp_pat
     expected = ", ".join(f"{n} \\('OVL'\\)" for n in named) + " and 7 more"
     with pytest.raises(FormatError, match=expected):
         scan_table(tmp_path, text, film=None)
-
-
-@pytest.mark.parametrize(("head", "options", "words"), [
-    ("x [um],u", {}, r"'x' states the unit 'um', but x_unit \(--x-unit\) is 'mm'"),
-    ("x,u (uV)", {}, "'uV', but u_unit"), ("x,u [mm]", {}, "'mm', but u_unit"),
-    ("x [mm],u/V", {"u_unit": "parsnip"}, "'V', but u_unit"),
-    ("x,u [channel 1]", {"u_unit": None}, "states no unit that is known"),
-    ("x,u", {"load_unit": "g"}, "80 g weigh"), ("x,u", {"noise": 1, "u_errors": "x"}, "one uncert"),
-    ("x,u", {"noise": 1, "holds": True}, "one uncertainty"),
-    ("x,u", {"load": None, "load_uncertainty": 1.0}, "belongs to a load"),
-    ("x,u", {"load_column": "u", "load_unit": "g"}, 'unit "g", but it must be a force'),
-])  # fmt: skip
-def test_what_contradicts_or_has_no_effect_is_refused(tmp_path: Path, head, options, words):
-    with pytest.raises(InputError, match=words):
-        scan_table(tmp_path, f"{head}\n0,1\n1,2\n2,1\n", **options)
 
 
 def test_the_same_unit_in_other_letters_does_not_contradict(tmp_path: Path):
@@ -298,14 +294,8 @@ def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path: Path, o
     np.testing.assert_allclose(scan.x, [-2e-3, 0, 3e-3])
 
 
-def test_positions_are_held_against_film_and_rod_and_the_unit_is_named(tmp_path: Path):
-    x = np.linspace(-8e3, 8e3, 65)  # 250 mm apart, were they mm
-    text = rows(x.tolist(), np.exp(-((x / 1e3) ** 2)).tolist(), header="x,u")
-    with pytest.raises(InputError, match=r"step is 250 mm(.|\n)*um as mm\?"):
-        scan_table(tmp_path, text, film=make_film(thickness=1.5e-3))
-    with pytest.raises(InputError, match=r"positions span 1\.6e\+04 mm"):
-        scan_table(tmp_path, text, indenter=Sphere(radius=0.1))
-    scan = scan_table(tmp_path, text, x_unit="um")
+def test_notes_state_rod_and_film(tmp_path: Path):
+    scan = scan_table(tmp_path, LONG, x_unit="um")
     assert "Rod: radius 0.25 mm" in scan.notes
     assert "Young's modulus (2.20 ± 0.10) MPa" in scan.notes
 
@@ -413,8 +403,6 @@ def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
     assert found.u_zz.tolist() == [1e-3, 2e-3]
     assert found.channels["u_xz"].tolist() == [5e-3, 6e-3]
     assert "The sign of u_zz was changed." in found.notes
-    with pytest.raises(InputError, match="Give 1 or -1"):
-        scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_sign=2)
 
 
 def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
@@ -428,35 +416,6 @@ def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
     assert "24 more lines above the table were left out." in lines
     assert "within the table" not in found.notes
     assert max(map(len, lines)) < 400
-
-
-LINE = "\n".join(f"{x},{x % 3}" for x in range(-8, 9))
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x (mm),u (mV)\n" + LINE.replace(",", ",0,0,"), "line 2 has 4 cells, the header 2"),
-        ("x (mm),u (mV)\n" + LINE + "\n9,ok,1\n", "line 19 has 3 cells"),
-        ("x/mm u/mV t\n" + "\n".join(f"{x} 1 2" for x in range(9)) + "\n1 2\n", "line 11 has 2"),
-        ('x (mm),u (mV),n\n0,1,"5 inch\n1,2,n\n2,3,end"\n' + LINE, "no end in it"),
-        ("x [mm],u [mV]\nmm,V\n" + LINE, "'mV' in its head, and 'V'"),
-        ("x (um);u (mV)\n-6,000;1\n-750;2\n0;3\n750;4\n1,000;5\n", "may separate thousands"),
-        ("x (mm),u (mV),u (V)\n" + LINE, "several columns 'u': u (mV), u (V)"),
-    ],
-)
-def test_a_table_that_would_be_misread_is_refused(tmp_path: Path, text: str, words: str):
-    table = tmp_path / "table.csv"
-    table.write_text(text, encoding="utf-8")
-    given = {"x": "x", "u": "u", "load": 1.0, "film": make_film(), "indenter": Rod(radius=0.25e-3)}
-    with pytest.raises((FormatError, InputError), match=re.escape(words)):
-        imported(table, **given)
-
-
-def test_a_point_under_a_decimal_comma_is_no_decimal_mark(tmp_path: Path):
-    text = "x;u\n-8.000;0,05\n-500;0,1\n0;12,1\n500;0,1\n"
-    with pytest.raises(FormatError, match=r"'-8\.000'"):
-        scan_table(tmp_path, text, decimal=",", x_unit="um")
 
 
 def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tmp_path: Path):
