@@ -343,7 +343,7 @@ def slow_noise_text(estimate: ProfileEstimate, slow: SlowNoise, results: Results
     return (
         f"The noise is correlated along the scan with a probability of {slow.probability:.0%}; "
         f"{slow.share:.0%} of its variance would then fall off over {slow.length:.2g} steps. This "
-        f"{verb} the uncertainty of A {a:.3g} and that of sigma {sigma:.3g} times as large."
+        f"{verb} the uncertainty of A {a:.2f} and that of sigma {sigma:.2f} times as large."
     )
 
 

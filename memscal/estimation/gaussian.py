@@ -247,6 +247,9 @@ class GaussianFit:
 
     def has_width(self, weights: FloatArray, noise: float) -> bool:
         """Whether the width is distinct from zero, where its slopes vanish."""
+        # At the end of its range a width or an ellipticity changes no voltage.
+        if not self.jacobian.any(axis=0).all():
+            return False
         try:
             variance = self.covariance(weights, noise)[1, 1]
         except np.linalg.LinAlgError:

@@ -1,12 +1,11 @@
 """``memscal calibrate --channel``: the tangential channel on the command line."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.console import Run, names
-from helpers.scans import LINEAR_FILM, shear_scan, simulate_experiment
+from helpers.scans import shear_scan, simulate_experiment
 
 import memscal
 
@@ -15,7 +14,7 @@ import memscal
 def sheared(folder: Path) -> Path:
     """A scan with a tangential channel."""
     path = folder / "scan.h5"
-    memscal.write_scan(shear_scan(seed=1, film=replace(LINEAR_FILM, law="")), path)
+    memscal.write_scan(shear_scan(seed=1, load=0.05), path)
     return path
 
 
