@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import chdtrc, logsumexp
+from scipy.special import chdtrc, fdtri, logsumexp
 
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
@@ -108,12 +108,23 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     if solution.estimate.points.u_errors is not None:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
     # Both are of the same points.
-    limit = chi_square_limit(fitted.degrees) / fitted.degrees
+    limit = _misfit_limit(solution.estimate, fitted.degrees)
     chi2 = solution.deconvolution.misfit.chi2_reduced
     return [
         check("reconvolution", chi2, limit, division),
         check("gaussian_misfit", fitted.chi2_reduced, limit, gaussian, p_value),
     ]
+
+
+def _misfit_limit(estimate: ProfileEstimate, degrees: float) -> float:
+    """Limit of a reduced chi-square, whose noise is stated or is known by degrees of its own."""
+    noise = estimate.raster_noise
+    if noise is None:
+        return chi_square_limit(degrees) / degrees
+    # What the noise was estimated from is a part of the misfit: the rest of it is independent.
+    rest = max(degrees - noise.degrees, 1.0)
+    largest = float(fdtri(rest, noise.degrees, 1 - quality.FALSE_ALARM))
+    return (noise.degrees + rest * largest) / degrees
 
 
 def _constraint(solution: Solution) -> QualityCheck | None:

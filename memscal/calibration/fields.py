@@ -186,7 +186,7 @@ class RasterFields:
             voltage += grid.convolve(on_grid(estimate.radial, central, step), stress - round_)
         if rows.size:
             # A point that is missing keeps what was fitted; an outlier keeps most of it.
-            departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight
+            departure = (smoothed.signal - smoothed.predicted) * estimate.outlier_weight
             total = np.zeros(voltage.shape)
             number = np.zeros(voltage.shape)
             np.add.at(total, (rows, columns), departure / points.load)
@@ -220,7 +220,8 @@ class RasterFields:
         """What each reading (n,) adds to its node, over its voltage, in 1/N."""
         readings = np.zeros(self.voltage.values.shape)
         np.add.at(readings, self.index, 1.0)
-        weight = smoothed.outlier_weight / smoothed.estimate.points.load
+        estimate = smoothed.estimate
+        weight = estimate.outlier_weight / estimate.points.load
         return weight / readings[self.index]
 
     def gain(self, smoothed: SmoothedProfile) -> VoltageMap:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from memscal.estimation.points import ScanPoints, grouped
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.checks import OUTLIER_WEIGHT
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
-#: Residuals below this share of the largest voltage are of rounding, and show no outliers.
-_ROUNDING = 1e-10
+#: Residuals below this share of the largest voltage are the model's own, and show no outliers.
+_MODEL = 5e-5
 #: Fewer differences, or degrees of freedom among repeats, say nothing of the noise.
 _FEWEST_DIFFERENCES = 30
 #: Points of which a third difference is taken are at most so unevenly spaced.
@@ -36,35 +39,50 @@ def point_weights(
     points: ScanPoints, residual: FloatArray, stated: FloatArray, threshold: float
 ) -> FloatArray:
     """Weights of the points by their residuals; over the plane by what neighbours do not share."""
-    least = _ROUNDING * float(np.abs(points.u).max() * np.sqrt(stated).max())
+    least = _MODEL * float(np.abs(points.u).max() * np.sqrt(np.median(stated)))
     if points.planar:
         least = robust_scale(residual * np.sqrt(stated), least)
         residual = isolated(points, residual)
     return outlier_weights(residual * np.sqrt(stated), threshold, least)
 
 
-def raster_noise(points: ScanPoints, residual: FloatArray) -> float | None:
-    """Noise of one reading (V) by its repeats, or by third differences of residuals (n,) in V."""
-    # Both leave out what is smooth over the plane: a sensor that is not round adds nothing.
-    # ``None`` where noise is stated, or where there are too few of either.
+class RasterNoise(NamedTuple):
+    """Noise of one reading of a raster that states none, and how well that is known."""
+
+    deviation: float  # in V
+    degrees: float  # of freedom of its square
+
+
+def raster_noise(
+    points: ScanPoints, residual: FloatArray, outlier: FloatArray
+) -> RasterNoise | None:
+    """Noise of one reading by its repeats, or by third differences of residuals (n,) in V."""
+    # Both leave out what is smooth over the plane: a sensor that is not round adds nothing; and
+    # points of little ``outlier`` weight.  ``None`` where noise is stated, or of too few of either.
     if points.u_errors is not None or not points.planar:
         return None
-    group = grouped(points.scan, points.place_numbers("index"), points.load)
-    readings = np.bincount(group)
-    degrees = group.size - int(group.max()) - 1
+    ordinary = np.flatnonzero(outlier >= OUTLIER_WEIGHT)
+    group = grouped(points.scan, points.place_numbers("index"), points.load)[ordinary]
+    places, group = np.unique(group, return_inverse=True)
+    degrees = group.size - places.size
     if degrees < _FEWEST_DIFFERENCES:
-        return _third_difference_noise(points, residual)
-    left = (residual - (np.bincount(group, residual) / readings)[group])[readings[group] > 1]
-    # Deviations from a mean of few are smaller than the noise.
-    return robust_scale(left) * float(np.sqrt(left.size / degrees))
+        return _third_difference_noise(points, residual, ordinary)
+    left = residual[ordinary]
+    left = left - (np.bincount(group, left) / np.bincount(group))[group]
+    return RasterNoise(float(np.sqrt(left @ left / degrees)), degrees)
 
 
-def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float | None:
+def _third_difference_noise(
+    points: ScanPoints, residual: FloatArray, ordinary: IndexArray
+) -> RasterNoise | None:
     """Noise of one reading by divided third differences along the rows of a raster."""
     # sum c_i r_i / (sum c_i^2)^(1/2), 1/c_i the product of all x_i - x_j, is zero for every
     # parabola, and has the variance of the noise.
+    from scipy.sparse import csr_array
+
     keys = np.stack([points.x, points.place_numbers("row"), points.repeat, points.scan])
-    four = np.lib.stride_tricks.sliding_window_view(np.lexsort(keys), 4)
+    order = ordinary[np.lexsort(keys[:, ordinary])]
+    four = np.lib.stride_tricks.sliding_window_view(order, 4)
     gaps = np.diff(points.x[four], axis=1)
     together = np.all(keys[1:, four[:, :1]] == keys[1:, four], axis=(0, 2))
     four = four[together & (gaps.max(axis=1) < _UNEVEN * gaps.min(axis=1))]
@@ -73,7 +91,13 @@ def _third_difference_noise(points: ScanPoints, residual: FloatArray) -> float |
     apart = points.x[four][:, :, None] - points.x[four][:, None, :] + np.eye(4)
     coefficients = 1 / apart.prod(axis=2)
     coefficients /= np.linalg.norm(coefficients, axis=1)[:, None]
-    return robust_scale(np.sum(coefficients * residual[four], axis=1))
+    rows = np.repeat(np.arange(len(four)), 4)
+    shape = (len(four), residual.size)
+    differences = csr_array((coefficients.ravel(), (rows, four.ravel())), shape=shape)
+    square = np.sum((differences @ residual) ** 2)
+    # Differences that share readings are correlated (Satterthwaite, Biometrics Bull. 2, 1946).
+    degrees = len(four) ** 2 / (differences @ differences.T).power(2).sum()
+    return RasterNoise(float(np.sqrt(square / len(four))), float(degrees))
 
 
 def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:

@@ -20,7 +20,12 @@ from memscal.estimation.gaussian import (
     GaussianFit,
     fit_gaussian_to_points,
 )
-from memscal.estimation.outliers import OUTLIER_THRESHOLD, point_weights, raster_noise
+from memscal.estimation.outliers import (
+    OUTLIER_THRESHOLD,
+    RasterNoise,
+    point_weights,
+    raster_noise,
+)
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray, IndexArray, array_record
@@ -53,7 +58,7 @@ class ProfileEstimate:
     weights: FloatArray  # (n,): relative weight of each point, the outliers' below one included
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
     departures: DepartureBasis  # all kernels, of negligible probability too
-    raster_noise: float | None = None  # of one reading of a raster that states none, in V
+    raster_noise: RasterNoise | None = None
     slow: SlowNoise | None = None  # that is counted beside the estimate, which takes noise as white
 
     @property
@@ -116,7 +121,7 @@ class ProfileEstimate:
     def adopted_noise(self, scatter: float) -> float:
         """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
         if self.raster_noise is not None:
-            scatter = self.raster_noise
+            scatter = self.raster_noise.deviation
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
@@ -265,7 +270,8 @@ def estimate_profile(
         fit = fit_gaussian_to_points(model, weights, start=fit)
         done_with("Gaussian fit")
         if angular:
-            noise = raster_noise(points, residual) or noise
+            found = raster_noise(points, residual, outlier)
+            noise = found.deviation if found else noise
         count = outlier.sum()
         basis, weighed = _weighed(fit, model, weights, count, noise, angular=angular)
         residual = weighed.residual
@@ -288,7 +294,7 @@ def estimate_profile(
         break
     done_with("departures")
     within, averaged = bayesian.supported(basis, weighed)
-    raster = raster_noise(points, residual) if angular else None
+    raster = raster_noise(points, residual, outlier) if angular else None
     estimate = ProfileEstimate(model, fit, within, averaged, weights, outlier, basis, raster)
     _require_determined(estimate)
     return estimate
@@ -338,7 +344,9 @@ def log_marginal_likelihood(
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(model, fit, reduced, angular)
-    least = max(_least_noise(fit), estimate.raster_noise or 0.0)
+    least = _least_noise(fit)
+    if estimate.raster_noise is not None:
+        least = max(least, estimate.raster_noise.deviation)
     count = estimate.outlier_weight.sum()
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=least)
     return weighing.log_marginal_likelihoods - volume / 2

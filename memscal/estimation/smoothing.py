@@ -32,9 +32,8 @@ from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum, Wavenumbers, gauss_between
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.outliers import OUTLIER_THRESHOLD, outlier_weights
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.voltage_map import BLOCK, DENSE, VoltageMap
+from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray, IndexArray, array_record
 
 if TYPE_CHECKING:
@@ -57,11 +56,6 @@ _FLOOR = 0.01
 _NEXT_TO_NOTHING = 1e-6
 #: Nodes of the quadrature in each interval.
 _NODES = 8
-_ROUNDS = 4
-#: Residuals of less than this share of the noise show no outliers.
-_LEAST_SCALE = 0.5
-#: A residual is divided by the root of what its own point leaves free, at least this.
-_LEAST_FREEDOM = 0.05
 #: Rounds in which the smoothing parameter's logarithm is found, each to a ninth.
 _SECTIONS = 14
 #: Misfit of a scan without noise, relative to its signal.
@@ -77,7 +71,6 @@ class SmoothedProfile:
     gain: VoltageMap  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
     spectrum: RadialSpectrum  # transform of the profile per newton, in V m^2/N
     predicted: FloatArray  # (n,): the smoothed signal at the points, in V
-    outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
 
     @cached_property
     def noise(self) -> FloatArray:
@@ -99,18 +92,17 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     # Less the background and what of sensor and reference is not round.
     signal = points.u - estimate.background - estimate.oval - estimate.uneven
     predicted = np.zeros(points.u.size)
-    weight = np.ones(points.u.size)
     gains = []
     for scans in alike.values():
         reference = references[scans[0]]
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
-        gain, smoothed, weight[rows] = _fitted(estimate, signal[rows], reference, rows)
+        gain, smoothed = _fitted(estimate, signal[rows], reference, rows)
         predicted[rows] = load * smoothed
         gains.append((reference.values, gain.over(1 / load, rows, points.u.size)))
     gain = _joined(gains, estimate) if len(gains) > 1 else gains[0][1]
     spectrum = replace(references[0], values=gain @ signal)
-    return SmoothedProfile(estimate, signal, gain, spectrum, predicted, weight)
+    return SmoothedProfile(estimate, signal, gain, spectrum, predicted)
 
 
 def _joined(
@@ -133,13 +125,13 @@ def _joined(
 
 def _fitted(
     estimate: ProfileEstimate, signal: FloatArray, reference: RadialSpectrum, rows: IndexArray
-) -> tuple[VoltageMap, FloatArray, FloatArray]:
-    """Fit the points of one reference; outliers are found by the residuals of the spline."""
-    # By voltages per newton: derivative of the transform, prediction, weight of outliers.
+) -> tuple[VoltageMap, FloatArray]:
+    """Fit the points of one reference, at their weights: the transform by voltages, the fit."""
+    # By voltages per newton.
     points = estimate.points
     y = signal / points.load[rows]
-    noise = estimate.noise[rows] / points.load[rows]
-    stated = 1 / (noise**2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
+    noise = (estimate.noise / estimate.outlier_weight**0.5)[rows] / points.load[rows]
+    weight = 1 / (noise**2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
     if reference.source:
         # A source ends: what decays is G about it.
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
@@ -152,32 +144,8 @@ def _fitted(
     basis, intervals, *matrices = layout
     interval = np.minimum((radius / reach * intervals).astype(np.intp), intervals - 1)
     spline = _RadialSpline(basis(radius, 0), interval, *matrices)
-    weight = np.ones_like(y)
-    threshold = 2 * OUTLIER_THRESHOLD
-    for rounds_left in range(_ROUNDS - 1, -1, -1):
-        fitted = spline.fit(y, stated * weight)
-        if points.planar:
-            # Found by their neighbours in the plane.
-            updated = estimate.outlier_weight[rows]
-        else:
-            freedom = np.clip(fitted.freedom, _LEAST_FREEDOM, 1)
-            left = (y - fitted.predicted) * np.sqrt(stated / freedom)
-            updated = outlier_weights(left, threshold, _LEAST_SCALE)
-        threshold = OUTLIER_THRESHOLD
-        # A residual counts by the root of its weight.
-        if not rounds_left or np.allclose(updated**0.5, weight**0.5, atol=0.02):
-            break
-        weight = updated
-    return spline.transform @ fitted.gain, fitted.predicted, weight
-
-
-@array_record
-class _FittedSpline:
-    """Splines fitted to values y at n points."""
-
-    gain: VoltageMap  # (m, n): derivative of the coefficients by y
-    predicted: FloatArray  # (n,)
-    freedom: FloatArray  # (n,): share of each residual's variance that is left
+    gain, predicted = spline.fit(y, weight)
+    return spline.transform @ gain, predicted
 
 
 @array_record
@@ -190,8 +158,8 @@ class _RadialSpline:
     root: FloatArray  # (m, m): triangular root of the penalty
     transform: FloatArray  # (k, m): transforms of the splines
 
-    def fit(self, y: FloatArray, weight: FloatArray) -> _FittedSpline:
-        """Fit values y (n,) with weights, smoothed by the restricted likelihood."""
+    def fit(self, y: FloatArray, weight: FloatArray) -> tuple[VoltageMap, FloatArray]:
+        """Smooth y (n,) by the restricted likelihood: coefficients by y, and what is predicted."""
         from scipy.linalg import solve_triangular
 
         root = np.sqrt(weight)
@@ -210,12 +178,9 @@ class _RadialSpline:
         # The data, by the rows of the reduced design, to the coefficients.
         back = solve_triangular(self.root, (right.T * filters) @ left.T)
         predicted = self.points @ (self.free @ (back @ (left @ along)))
-        kept = values * filters
         if cells is None:
-            gain = VoltageMap(((back * root, None),))
-            return _FittedSpline(gain, predicted, 1 - (left**2 @ kept))
-        gain = VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),))
-        return _FittedSpline(gain, predicted, 1 - _leverage(cells, (left * kept) @ left.T))
+            return VoltageMap(((back * root, None),)), predicted
+        return VoltageMap(((back, cells.multiply(root[:, None]).tocsr()),)), predicted
 
 
 def _by_intervals(weighted: csr_array, interval: IndexArray) -> tuple[csr_array, FloatArray]:
@@ -243,24 +208,6 @@ def _by_intervals(weighted: csr_array, interval: IndexArray) -> tuple[csr_array,
     data, where, places = map(np.concatenate, zip(*parts, strict=True))
     orthonormal = csr_array((data, (where, places)), shape=(interval.size, width))
     return orthonormal, np.vstack(roots)
-
-
-def _leverage(cells: csr_array, hat: FloatArray) -> FloatArray:
-    """Diagonal of Q H Q' for sparse rows Q, (n,)."""
-    # All rows of one interval have the same places.
-    counts = np.diff(cells.indptr)
-    leverage = np.empty(counts.size)
-    for count in np.unique(counts):
-        rows = np.flatnonzero(counts == count)
-        inside = cells.indptr[rows][:, None] + np.arange(count)
-        places = cells.indices[inside]
-        values = cells.data[inside]
-        for start in range(0, rows.size, BLOCK):
-            block = slice(start, start + BLOCK)
-            at = places[block]
-            part = hat[at[:, :, None], at[:, None, :]]
-            leverage[rows[block]] = np.einsum("ij,ijk,ik->i", values[block], part, values[block])
-    return leverage
 
 
 def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, count: int) -> float:

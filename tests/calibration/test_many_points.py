@@ -129,7 +129,7 @@ def test_many_points_give_the_results_of_whole_matrices(name, method, monkeypatc
     for dense, block in ((10**9, 10**9), (10, 67)):
         for module in (forward, gaussian, profile, residuals, smoothing, fields):
             monkeypatch.setattr(module, "DENSE", dense)
-        for module in (forward, smoothing, voltage_map, field_uncertainty):
+        for module in (forward, voltage_map, field_uncertainty):
             monkeypatch.setattr(module, "BLOCK", block)
         apparatus.append(memscal.calibrate(scan, method=method, **options).apparatus)
     whole, reduced = apparatus

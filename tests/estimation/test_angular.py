@@ -74,7 +74,9 @@ def test_noise_of_a_raster_is_not_what_is_not_round(side: int) -> None:
         # What is not round is left over: many times the noise.
         estimate = estimated(scan)
         residual = estimate.weighed.residual + estimate.oval
-        ratios.append((raster_noise(points, residual) or np.nan) / scan.synthetic["noise"])
+        noise = raster_noise(points, residual, np.ones_like(residual))
+        assert noise is not None
+        ratios.append(noise.deviation / scan.synthetic["noise"])
         if seed == 0:
             assert np.abs(estimate.oval).max() > 10 * scan.synthetic["noise"]
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 * np.sqrt(10 / seeds))
@@ -94,8 +96,10 @@ def test_noise_by_repeats_is_that_within_each_place() -> None:
     # A gradient that third differences would not see either, and steps, which they would.
     points = measured_points(both)
     steps = np.where(points.x > 0, 1.0, 0.0) * points.u.max()
-    noise = raster_noise(points, points.u - points.u.mean() + steps)
-    assert noise == pytest.approx(scan.synthetic["noise"], rel=0.1)
+    noise = raster_noise(points, points.u - points.u.mean() + steps, np.ones_like(steps))
+    assert noise is not None
+    assert noise.degrees == scan.u_zz.size
+    assert noise.deviation == pytest.approx(scan.synthetic["noise"], rel=0.1)
 
 
 def test_a_spike_is_an_outlier_and_asymmetry_is_none() -> None:
