@@ -58,16 +58,17 @@ def solve(
     owners = tuple(owners or range(len(scans)))
     apart = None
     if centre != PER_REPEAT:
-        estimate = require_profile(scans, stresses, channel)
+        estimate = require_profile(scans, stresses, channel, owners)
         apart = repeat_centres_test(estimate)
     if centre == PER_REPEAT or (centre is None and apart and apart.p_value < FALSE_ALARM):
         try:
             separate, numbers = points.scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
-            estimate = require_profile(separate, of_repeats, channel)
+            parts = tuple(owners[i] for i in numbers)
+            estimate = require_profile(separate, of_repeats, channel, parts)
             scans = separate
             stresses = of_repeats
-            owners = tuple(owners[i] for i in numbers)
+            owners = parts
         except MemscalError:
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:
@@ -94,7 +95,10 @@ def solved(
 
 
 def require_profile(
-    scans: Sequence[Scan], stresses: Sequence[BaseStress], channel: str
+    scans: Sequence[Scan],
+    stresses: Sequence[BaseStress],
+    channel: str,
+    owners: Sequence[int] | None = None,
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     measured = [points.calibration_points(scan, channel) for scan in scans]
@@ -103,7 +107,8 @@ def require_profile(
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
-            outcome = estimate_profile(points.joined_points(measured), *references, angular=True)
+            joined = points.joined_points(measured, owners)
+            outcome = estimate_profile(joined, *references, angular=True)
         if outcome.gaussian.has_width(outcome.weights, outcome.noise_scale):
             return outcome
     except (FitError, np.linalg.LinAlgError) as failure:

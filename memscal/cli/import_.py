@@ -79,7 +79,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 _COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "repeat", "branch")
 _LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds")
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
-_UNCERTAINTIES = ("noise", "load_uncertainty")
+_UNCERTAINTIES = ("noise", "load_uncertainty", "new_position_errors")
 #: Powers of ten of the units in which what a scan takes for granted is stated.
 _TAKEN_FOR_GRANTED = {
     "position_scale_uncertainty": -2,
@@ -103,6 +103,7 @@ _ONLY = {
         *_TAKEN_FOR_GRANTED,
         "load_scatter",
         "position_error",
+        "new_position_errors",
         "figures",
         "laboratory",
         *_SENSOR_NAMES.values(),
@@ -164,8 +165,9 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
     "in percent, such as of weights set down by hand."
 )
 @option("--position-error", NonNegative("um"))(
-    "Scan: standard uncertainty of each position, independent from point to point, in um."
+    "Scan: standard uncertainty of each position, one for all repeats at it, in um."
 )
+@option("--new-position-errors", is_flag=True)("Scan: errors of positions are new in each repeat.")
 @option("--position-scale-uncertainty", NonNegative("percent"))(
     "Scan: standard uncertainty of the stage's scale, common to all positions, in percent."
 )

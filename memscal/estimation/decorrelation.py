@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from scipy.linalg import solve_banded, solve_triangular
 
@@ -15,27 +18,27 @@ class Decorrelation:
 
     # Points of each block, and the lower Cholesky factor of their correlation C, or its diagonals.
     blocks: tuple[tuple[IndexArray, FloatArray], ...]
-    # Orthonormal columns (n, q) of what changes all points in common, after that; its growth (q,).
-    common: FloatArray | None = None
-    growth: FloatArray | None = None
+    # One after the other, orthonormal columns (n, q) of what points have in common, after that,
+    # and its growth (q,).
+    common: tuple[tuple[Any, FloatArray], ...] = ()
 
     def apply(self, values: FloatArray) -> FloatArray:
         """Make columns (n,) or (n, m) white."""
         white = values.copy()
         for rows, root in self.blocks:
             white[rows] = _solved(root, values[rows])
-        return self._scaled(white, 1.0)
+        return _scaled(self.common, white, 1.0)
 
     def adjoint(self, values: FloatArray) -> FloatArray:
         """The transposed transformation of columns."""
-        white = self._scaled(values, 1.0).copy()
+        white = _scaled(self.common[::-1], values, 1.0).copy()
         for rows, root in self.blocks:
             white[rows] = _solved(root, white[rows], transposed=True)
         return white
 
     def correlate(self, white: FloatArray) -> FloatArray:
         """Give white noise the correlation: the inverse of :meth:`apply`."""
-        values = self._scaled(white, -1.0).copy()
+        values = _scaled(self.common[::-1], white, -1.0).copy()
         for rows, root in self.blocks:
             values[rows] = _product(root, values[rows])
         return values
@@ -45,14 +48,17 @@ class Decorrelation:
         moved = values.copy()
         for rows, root in self.blocks:
             moved[rows] = _product(root, values[rows], transposed=True)
-        return self._scaled(moved, -1.0)
+        return _scaled(self.common, moved, -1.0)
 
-    def _scaled(self, values: FloatArray, power: float) -> FloatArray:
-        """Divide what is along the common columns by its growth, to a power."""
-        if self.common is None or self.growth is None:
-            return values
-        along = self.common.T @ values
-        return values + self.common @ (along.T * (self.growth**-power - 1)).T
+
+def _scaled(
+    common: Sequence[tuple[Any, FloatArray]], values: FloatArray, power: float
+) -> FloatArray:
+    """Divide what is along common columns by its growth, to a power."""
+    for columns, growth in common:
+        along = columns.T @ values
+        values = values + columns @ (along.T * (growth**-power - 1)).T
+    return values
 
 
 @array_record

@@ -99,6 +99,8 @@ class ScanPoints:
     repeat: IndexArray  # (n,): number of each point's repeat, counted through all scans
     branch: NDArray[np.int64]  # (n,): 1 where the indenter approached, 2 where it retreated, or 0
     scan: IndexArray  # (n,): number of each point's scan
+    owner: IndexArray  # (n,): number of the measurement that its scan is a part of
+    anew: BoolArray  # (n,): whether each repeat has an error of its position of its own
     free: BoolArray  # (scans, 2): along x and y, whether the centre is a free parameter
     missing: int  # how many points were missing
     decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
@@ -218,8 +220,37 @@ class ScanPoints:
         """
         left, singular, _ = np.linalg.svd(changes, full_matrices=False)
         factor = self.decorrelation or Decorrelation(())
-        factor = replace(factor, common=left, growth=np.hypot(1, singular))
+        factor = replace(factor, common=(*factor.common, (left, np.hypot(1, singular))))
         return replace(self, decorrelation=factor), float(np.log1p(singular**2).sum())
+
+    def sharing_positions(self, moved: FloatArray, stated: FloatArray) -> ScanPoints:
+        """Return the points with the errors of their positions in common to repeats.
+
+        ``moved`` (n,), in V, is what one deviation of each does, ``stated`` the inverse variance.
+        """
+        from scipy.sparse import csr_array
+
+        place = grouped(self.owner, self.anew * self.repeat, self.y, self.x)
+        share = moved * np.sqrt(stated)
+        share[np.bincount(place)[place] == 1] = 0.0
+        if self.u_errors is None or not share.any():
+            return self
+        # The variance counts all errors: what is a reading's own is left of it.
+        own = np.sqrt(1 - share**2)
+        every = np.arange(place.size)
+        known = self.decorrelation
+        root = own[None] if known is None else own[:, None] * known.correlate(np.eye(every.size))
+        points = replace(self, decorrelation=Decorrelation(((every, root),)))
+        columns = csr_array((share, (every, place)))
+        if known is not None:
+            assert points.decorrelation is not None
+            return points.sharing(points.decorrelation.apply(columns.toarray()))[0]
+        # No reading has two positions: the columns are orthogonal.
+        square = np.bincount(place, (share / own) ** 2)
+        size = np.sqrt(np.where(square > 0, square, 1.0))
+        common = csr_array((share / own / size[place], (every, place)))
+        factor = Decorrelation(((every, root),), ((common, np.sqrt(1 + square)),))
+        return replace(self, decorrelation=factor)
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
         """Apply the transposed standardisation to columns (n, m), which are overwritten."""
@@ -255,6 +286,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         u_errors=None if errors is None else errors[keep],
         x_errors=np.broadcast_to(x_errors, u.shape)[keep],
         repeat=scan.passes[keep],
+        owner=np.zeros(int(keep.sum()), dtype=np.intp),
+        anew=np.full(int(keep.sum()), scan.new_position_errors),
         branch=branch[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
@@ -366,8 +399,11 @@ def grouped(*keys: NDArray[Any]) -> IndexArray:
     return group
 
 
-def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
-    """Join the points of several scans, of which all state their noise, or none."""
+def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = None) -> ScanPoints:
+    """Join the points of several scans, of which all state their noise, or none.
+
+    ``owners``: the number of the scan that each is a part of; parts share their positions.
+    """
     if len(scans) == 1:
         return scans[0]
     stated = [points.u_errors for points in scans if points.u_errors is not None]
@@ -378,17 +414,19 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     repeats = []
     numbers = []
     first = 0
-    for number, points in enumerate(scans):
+    for i, points in enumerate(scans):
         repeats.append(points.repeat + first)
-        numbers.append(np.full_like(points.scan, number))
+        numbers.append(np.full_like(points.scan, i))
         first += int(points.repeat.max()) + 1
-    names = ("x", "y", "u", "load", "x_errors", "branch", "free", "curvature")
+    number = np.concatenate(numbers)
+    names = ("x", "y", "u", "load", "x_errors", "branch", "anew", "free", "curvature")
     columns = {name: np.concatenate([getattr(each, name) for each in scans]) for name in names}
     return ScanPoints(
         **columns,
         u_errors=np.concatenate(stated) if stated else None,
         repeat=np.concatenate(repeats),
-        scan=np.concatenate(numbers),
+        owner=number if owners is None else np.array(owners)[number],
+        scan=number,
         missing=sum(points.missing for points in scans),
         decorrelation=_joined_decorrelation(scans),
         channel=scans[0].channel,

@@ -258,6 +258,8 @@ def estimate_profile(
     along = np.argmax(points.free[points.scan], axis=1), range(points.u.size)
     # Uncertain positions make noise where U is steep.
     stated = stated_weights(points, slope[along] * points.x_errors)
+    points = points.sharing_positions(slope[along] * points.x_errors, stated)
+    model = replace(model, points=points)
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
     angular = angular and points.planar and not points.order

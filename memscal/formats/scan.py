@@ -206,7 +206,9 @@ def _data_group(scan: Scan) -> Group:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, positions, axes if points else (along,))
-    stated = vars(scan) | {"line_offset": scan.line_offset or None}
+    stated = dict(vars(scan))
+    for name in ("line_offset", "new_position_errors"):
+        stated[name] = stated[name] or None
     data |= write_record(records.TAKEN_FOR_GRANTED, stated).children
     data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:

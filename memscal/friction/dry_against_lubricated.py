@@ -124,6 +124,10 @@ def _averaged(points: LoadPoints) -> LoadPoints:
         return (sums.T / counts).T
 
     noise = np.sqrt(mean(points.noise**2) / counts)
+    x_errors = mean(points.x_errors)
+    if points.places is None:
+        # They are new in every repeat.
+        x_errors = np.sqrt(mean(points.x_errors**2) / counts)
     correlation = None
     if points.correlation is not None:
         single = np.outer(points.noise, points.noise) * points.correlation
@@ -137,8 +141,8 @@ def _averaged(points: LoadPoints) -> LoadPoints:
         log_load=mean(points.log_load),
         noise=noise,
         load_errors=np.sqrt(mean(points.load_errors**2) / counts),
-        # The stage errs alike in every repeat.
-        x_errors=mean(points.x_errors),
+        x_errors=x_errors,
+        places=None,
         flat=mean(points.flat),
         correlation=correlation,
     )

@@ -33,7 +33,7 @@ from memscal.measurement.posterior import (
     sensor_changes,
     shared_changes,
 )
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
@@ -60,11 +60,32 @@ class LoadPoints:
     correlation: FloatArray | None = None  # (n, n): of the electronic noise
     # (n, m): one where a reading is of the contact; without it each is of its own.
     contacts: FloatArray | None = None
+    # (n, p): one where a reading is at the place, whose error it shares; without it none does.
+    places: FloatArray | None = None
 
     @property
     def radius(self) -> FloatArray:
         """Distance from the centre, in m."""
         return np.abs(self.offset)
+
+    def shared_noise(self) -> tuple[IndexArray, dict[str, FloatArray]]:
+        """Order of the readings, and correlations (m, m) of kinds of noise in m that follow."""
+        order = np.arange(self.u.size)
+        shared = {}
+        if self.correlation is not None:
+            shared["noise"] = self.correlation
+        if self.contacts is not None:
+            shared["load_scatter"] = self.contacts @ self.contacts.T
+            shared["position"] = shared["load_scatter"]
+        if self.places is not None:
+            readings = self.places.sum(axis=0)
+            most = int(readings.max())
+            if shared or np.ptp(readings):
+                shared["position"] = self.places @ self.places.T
+            elif most > 1:
+                order = np.argsort(self.places.argmax(axis=1), kind="stable")
+                shared["position"] = np.ones((most, most))
+        return order, shared
 
     @property
     def degrees(self) -> int:
@@ -108,6 +129,9 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     position = (points.x, points.y)[profile.axis]
     middle = (position.max() + position.min()) / 2
     drift = (position - middle) / (np.ptp(position) / 2)
+    places = None
+    if points.x_errors.any() and not profile.scan.new_position_errors:
+        places = _own(np.round(position, 12).tolist())
     return LoadPoints(
         u=points.u,
         offset=position - float(profile.centre[profile.axis]),
@@ -121,6 +145,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         position_share=profile.scan.position_scale_uncertainty or 0.0,
         gain_share=profile.scan.gain_uncertainty or 0.0,
         correlation=points.correlation,
+        places=places,
     )
 
 
@@ -173,6 +198,7 @@ def points_at(
         free_centre=False,
         correlation=None,
         contacts=None,
+        places=None,
     )
 
 
@@ -343,6 +369,8 @@ def stacked(
         correlation=block_diag(*correlations),
         contacts=np.eye(len(contacts))[numbers],
     )
+    if points[0].places is not None:
+        together = replace(together, places=_own(np.round(together.offset, 12).tolist()))
     columns = [dict(channel.columns) for channel in predicted]
     if "apparatus" in columns[1]:
         columns[1]["apparatus_shear"] = columns[1].pop("apparatus")
@@ -363,37 +391,32 @@ class Noise:
     """Independent kinds of noise of the n readings of one load, at V values of the parameter."""
 
     kinds: Mapping[str, FloatArray]  # (V, n): standard deviations in V
-    correlation: FloatArray | None = None  # (n, n): of the electronic noise, the kind "noise"
-    contacts: FloatArray | None = None  # (n, m): readings of one contact share the other kinds
+    # (m, m): correlation of kinds within each m readings that follow each other, if there is any.
+    shared: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def inverse_root(self) -> FloatArray:
         """Return W, with W N W^T = 1, in B blocks of readings that share noise: (V, B, m, m)."""
-        if self.correlation is None:
+        if not self.shared:
             variance = np.sum([kind**2 for kind in self.kinds.values()], axis=0)
             return np.asarray(1 / np.sqrt(variance))[..., None, None]
+        size = len(next(iter(self.shared.values())))
         covariance = np.zeros(())
         for name, kind in self.kinds.items():
-            shared = np.eye(kind.shape[-1])
-            if name == "noise":
-                shared = self.correlation
-            elif self.contacts is not None:
-                shared = self.contacts @ self.contacts.T
-            covariance = covariance + kind[:, :, None] * kind[:, None, :] * shared
-        return np.linalg.inv(np.linalg.cholesky(covariance))[:, None]
+            block = kind.reshape(len(kind), -1, size)
+            correlation = self.shared.get(name, np.eye(size))
+            covariance = covariance + block[..., None] * block[..., None, :] * correlation
+        return np.linalg.inv(np.linalg.cholesky(covariance))
 
     def shares(self, gain: FloatArray) -> dict[str, float]:
         """Return the standard deviation by kind of a sum of whitened readings, at one value."""
         # Not kept with the readings: at all values the matrices fill the memory.
         root = self.inverse_root()[0]
-        weights = (gain.reshape(root.shape[0], 1, -1) @ root).ravel()
+        weights = (gain.reshape(len(root), 1, -1) @ root)[:, 0]
         shares = {}
         for name, kind in self.kinds.items():
-            share = weights * kind[0]
-            if name == "noise" and self.correlation is not None:
-                share = np.linalg.cholesky(self.correlation).T @ share
-            elif name != "noise" and self.contacts is not None:
-                share = self.contacts.T @ share
-            shares[name] = float(np.linalg.norm(share))
+            share = weights * kind[0].reshape(weights.shape)
+            correlation = self.shared.get(name, np.eye(weights.shape[1]))
+            shares[name] = float(np.sqrt(np.sum(share @ correlation * share)))
         return shares
 
 
@@ -433,12 +456,13 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
         "load_scatter": predicted.by_load * points.load_errors,
         "position": by_centre * points.x_errors,
     }
-    noise = Noise(kinds, points.correlation, points.contacts)
+    order, shared = points.shared_noise()
+    noise = Noise({name: kind[:, order] for name, kind in kinds.items()}, shared)
     root = noise.inverse_root()
 
     def whitened(values: FloatArray) -> FloatArray:
-        """Values (V, n, q) in units of the noise."""
-        blocks = values.reshape(*root.shape[:-1], values.shape[-1])
+        """Values (V, n, q) in units of the noise, in its order."""
+        blocks = values[:, order].reshape(*root.shape[:-1], values.shape[-1])
         return (root @ blocks).reshape(values.shape)
 
     flat = np.broadcast_to(points.flat, (*shape, points.flat.shape[1]))

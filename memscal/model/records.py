@@ -135,6 +135,7 @@ TAKEN_FOR_GRANTED = record(
         Quantity(f"{name}_uncertainty", _L if name in _LENGTHS else _ONE, stored=f"{name}_errors")
         for name in STATED_ERRORS
     ),
+    Quantity("new_position_errors", "truth", "whether x_errors are new in each repeat"),
 )
 """What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(
@@ -355,6 +356,7 @@ MEASURED_SCAN = record(
     ),
     Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors"),
     Quantity("gain_uncertainty", _ONE, _OF_GAIN, stored="gain_errors"),
+    Quantity("new_position_errors", "truth", "whether x_errors are new in each repeat"),
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 

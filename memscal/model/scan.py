@@ -189,7 +189,9 @@ class Scan:
         Load at each point where it was recorded, and its standard uncertainty, independent from
         point to point, in N.
     x_errors : ndarray, shape of ``x``, optional
-        Standard uncertainty of each position, independent from point to point, in m.
+        Standard uncertainty of each position, independent from position to position, in m.
+    new_position_errors : bool
+        Whether these errors are new in each repeat; else all repeats at a position share its error.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
         Correlation of the noise between the points of one repeat (of kind points: between all);
         none where absent.  With shape (n, w) that of each point with itself and the next w - 1.
@@ -254,6 +256,7 @@ class Scan:
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
     x_errors: FloatArray | None = None
+    new_position_errors: bool = False
     u_zz_correlation: FloatArray | None = None
     direction: str = "x"
     position_scale_uncertainty: float | None = None

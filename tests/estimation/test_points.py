@@ -56,3 +56,32 @@ def test_a_negative_outlier_is_no_wrong_sign() -> None:
     u = scan.u_zz.copy()
     u[5] -= 10 * u.max()
     assert measured_points(replace(scan, u_zz=u)).u.size == 65
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.4])
+@pytest.mark.parametrize("anew", [False, True])
+def test_repeats_share_the_error_of_their_position(anew: bool, correlation: float) -> None:
+    scan = simulated(repeats=3, points=9)
+    apart = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
+    scan = replace(
+        scan,
+        x_errors=np.full(9, 10e-6),
+        new_position_errors=anew,
+        u_zz_correlation=correlation**apart if correlation else None,
+    )
+    points = measured_points(scan)
+    moved = np.tile(np.linspace(-2.0, 2.0, 9), 3) * points.u_errors
+    stated = 1 / (points.u_errors**2 + moved**2)
+    shared = points.sharing_positions(moved, stated)
+    of_repeat = np.kron(np.eye(3), correlation**apart)
+    together = np.eye(27) if anew else np.tile(np.eye(9), (3, 3))
+    covariance = np.outer(points.u_errors, points.u_errors) * of_repeat
+    if not (anew and correlation):
+        covariance = covariance + np.outer(moved, moved) * together
+        root = np.linalg.cholesky(covariance)
+        white = shared.standardised(root, stated)
+        np.testing.assert_allclose(white @ white.T, np.eye(27), atol=1e-9)
+    if not anew:
+        assert shared.decorrelation is not None
+        again = shared.decorrelation.correlate(shared.decorrelation.apply(root))
+        np.testing.assert_allclose(again, root, atol=1e-12)

@@ -9,7 +9,7 @@ from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
 from memscal.friction.effective import FrictionFit
 from memscal.friction.family import bounded, unbounded
-from memscal.friction.likelihood import Predicted, likelihood, predict
+from memscal.friction.likelihood import LoadPoints, Predicted, likelihood, predict
 
 CORRELATED = {"white": 0.0, "correlated": 0.6}
 
@@ -34,7 +34,9 @@ def dense(found: FrictionFit, value: float) -> tuple[np.ndarray, np.ndarray, np.
         inner = np.eye(points.u.size) if points.correlation is None else points.correlation
         block = np.outer(points.noise, points.noise) * inner
         block += np.diag((p.by_load[0] * points.load_errors) ** 2)
-        block += np.diag((p.slope[0] * points.x_errors) ** 2)
+        shifted = np.diag(p.slope[0] * np.sign(points.offset) * points.x_errors)
+        by_place = shifted if points.places is None else shifted @ points.places
+        block += by_place @ by_place.T
         noise[rows, rows] = block
         flat[rows, 3 * i : 3 * i + 3] = np.column_stack(
             [points.flat, p.slope[0] * np.sign(points.offset)]
@@ -62,6 +64,24 @@ def test_chi_square_is_that_of_generalised_least_squares(laboratory: Laboratory)
     assert whole.shape == FRICTIONS.shape
     for i, value in enumerate(FRICTIONS):
         assert whole[i] == pytest.approx(generalised(*dense(found, value)), rel=1e-6)
+
+
+def without_the_last_reading(points: LoadPoints) -> LoadPoints:
+    """Points of repeats that are not complete."""
+    arrays = {k: v[:-1] for k, v in vars(points).items() if np.shape(v)[:1] == points.u.shape}
+    return replace(points, **arrays)
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_repeats_share_the_error_of_their_position(complete: bool) -> None:
+    points = bare_points(repeats=3)
+    points = points if complete else without_the_last_reading(points)
+    found = Laboratory.of(points=points).drawn(0.15, seed=1)
+    (there,) = likelihood(found.channel.at(0.15)).chi_square
+    assert there == pytest.approx(generalised(*dense(found, 0.15)), rel=1e-6)
+    anew = [replace(each, places=None) for each in found.channel.points]
+    apart = likelihood(replace(found.channel, points=anew).at(0.15))
+    assert likelihood(found.channel.at(0.15)).information[0] < apart.information[0]
 
 
 def test_one_load_of_several_is_that_load_alone(laboratory: Laboratory) -> None:

@@ -63,6 +63,7 @@ def bare_points(*, correlation: float = 0.0, repeats: int = 1) -> LoadPoints:
         flat=np.stack([np.ones(x.size), x / x.max()], axis=1),
         load_share=0.01,
         correlation=correlation**apart if correlation else None,
+        places=np.tile(np.eye(_POSITIONS.size), (repeats, 1)) if repeats > 1 else None,
     )
 
 
@@ -116,5 +117,8 @@ def noise_of(points: LoadPoints, found: Predicted, rng: np.random.Generator) -> 
     if points.correlation is not None:
         white = np.linalg.cholesky(points.correlation) @ white
     scatter = found.by_load[0] * points.load_errors * rng.standard_normal(points.u.size)
-    moved = found.slope[0] * points.x_errors * rng.standard_normal(points.u.size)
+    errors = rng.standard_normal(points.u.size)
+    if points.places is not None:
+        errors = errors[points.places.argmax(axis=1)]
+    moved = found.slope[0] * points.x_errors * errors
     return np.asarray(points.noise * white + scatter + moved)

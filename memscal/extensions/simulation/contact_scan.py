@@ -73,7 +73,8 @@ def simulate_contacts(
         for stream in np.random.SeedSequence(seed).spawn(4)
     )
     centre_x, centre_y = disturbances.centre
-    offset = x + disturbances.position_error * position_errors - centre_x
+    # Repeats of a load are at the same places.
+    offset = x + disturbances.position_error * position_errors[repeats * row] - centre_x
     distance = np.hypot(offset, centre_y)
     ratio = 1 + disturbances.load_scatter * load_errors
 

@@ -1,0 +1,98 @@
+"""Rasters of unknown noise, outliers, and errors of positions, by another forward calculation.
+
+Set MEMSCAL_FULL_STUDY for 192 rasters, 75 scans with outliers and 150 of each kind of error.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.bounds import FULL, RARE, root_mean_square_limit
+from helpers.outside import ROUND, SIGMA, A, line, scan
+from scipy.interpolate import make_interp_spline
+from scipy.stats import binom
+
+import memscal
+from memscal.model.arrays import FloatArray
+
+pytestmark = pytest.mark.accuracy
+
+RASTERS, OUTLIERS, REPEATS = (64, 25, 150) if FULL else (3, 4, 12)
+HALF = 8e-3
+ERROR = 10e-6
+
+
+def fails(made: memscal.ApparatusFunction) -> bool:
+    return any(not check.passed for check in made.checks)
+
+
+@lru_cache
+def clean(side: int) -> FloatArray:
+    """Voltages of a raster of the round sensor."""
+    x = np.linspace(-HALF, HALF, side)
+    return np.stack([ROUND.voltages(x, y=float(y)) for y in x])
+
+
+def test_a_good_raster_of_unknown_noise_fails_a_check_as_rarely_as_is_meant() -> None:
+    failed = 0
+    sides = (23, 25, 29)
+    for side in sides:
+        x = np.linspace(-HALF, HALF, side)
+        u = clean(side)
+        for seed in range(RASTERS):
+            noise = np.random.default_rng([seed, side]).normal(0.0, 0.005 * u.max(), u.shape)
+            raster = replace(scan(ROUND, 0), x=x, y=x, u_zz=u + noise, u_zz_errors=None)
+            failed += fails(memscal.calibrate(raster, other=False).apparatus)
+    # Ten of the checks are tests at 1/1000.
+    assert failed <= binom.isf(RARE, len(sides) * RASTERS, 0.01)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.15])
+def test_outliers_move_a_division_by_no_more_than_the_other_route(share: float) -> None:
+    errors: dict[str, list[float]] = {"division": [], "bayesian": [], "deviates": []}
+    for seed in range(OUTLIERS):
+        made = scan(ROUND, seed)
+        rng = np.random.default_rng([seed, 1])
+        hit = rng.permutation(made.x.size)[: round(share * made.x.size)]
+        u = made.u_zz.copy()
+        u[hit] += rng.uniform(0.05, 0.5, hit.size) * u.max()
+        apparatus = memscal.calibrate(replace(made, u_zz=u)).apparatus
+        by_division = apparatus.parameters
+        errors["division"].append(by_division["conversion_constant"] / A - 1)
+        assert apparatus.other is not None
+        errors["bayesian"].append(apparatus.other.parameters["conversion_constant"] / A - 1)
+        u_a = by_division.uncertainty("conversion_constant") / A
+        errors["deviates"].append(errors["division"][-1] / u_a)
+    rms = {name: float(np.sqrt(np.mean(np.square(each)))) for name, each in errors.items()}
+    assert rms["division"] < root_mean_square_limit(max(rms["bayesian"], 0.01), OUTLIERS, RARE)
+    assert rms["deviates"] < root_mean_square_limit(1.0, OUTLIERS, RARE)
+
+
+@pytest.mark.parametrize("anew", [False, True])
+def test_errors_of_positions_are_as_stated(anew: bool) -> None:
+    fine = np.arange(-HALF - 0.2e-3, HALF + 0.2e-3, 0.02e-3)
+    at = make_interp_spline(fine, ROUND.voltages(fine), k=5)
+    film: Any = {"thickness_uncertainty": None, "poisson_ratio_uncertainty": None}
+    stated = scan(ROUND, 0)
+    stated = replace(stated, load_uncertainty=None, film=replace(stated.film, **film))
+    deviates = []
+    for seed in range(REPEATS):
+        rng = np.random.default_rng([seed, 11])
+        moved = line() + ERROR * rng.normal(size=(3 if anew else 1, line().size))
+        u = at(moved) + rng.normal(0.0, 0.005 * at(0.0), (3, line().size))
+        made = replace(
+            stated,
+            u_zz=u,
+            u_zz_errors=np.full(u.shape, 0.005 * at(0.0)),
+            x_errors=np.full(line().size, ERROR),
+            new_position_errors=anew,
+        )
+        found = memscal.calibrate(made).apparatus.parameters
+        sigma = (found["gaussian_sigma"] - SIGMA) / found.uncertainty("gaussian_sigma")
+        deviates.append([sigma, found["centre"] / found.uncertainty("centre")])
+    rms = np.sqrt(np.mean(np.square(deviates), axis=0))
+    assert (rms < root_mean_square_limit(1.1, REPEATS, RARE)).all()
+    assert (rms > (0.7 if FULL else 0.4)).all()
+    assert np.mean(np.abs(deviates) < 2) >= binom.ppf(RARE, 2 * REPEATS, 0.95) / (2 * REPEATS)
