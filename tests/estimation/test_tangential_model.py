@@ -29,6 +29,8 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
         u_errors=None,
         x_errors=np.zeros(n),
         repeat=np.zeros(n, np.intp),
+        owner=np.zeros(n, np.intp),
+        anew=np.zeros(n, np.bool_),
         branch=np.zeros(n, np.int64),
         scan=np.zeros(n, np.intp),
         free=np.array([[True, True]]),
