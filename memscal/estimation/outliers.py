@@ -12,8 +12,9 @@ from memscal.model.checks import OUTLIER_WEIGHT
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
-#: Residuals below this share of the largest voltage are the model's own, and show no outliers.
-_MODEL = 5e-5
+#: Noise, over the largest voltage, of which no residual within the model's own error, 3e-5 by the
+#: convergence of reference and quadrature, is an outlier.
+_MODEL = 3e-5 / OUTLIER_THRESHOLD
 #: Fewer differences, or degrees of freedom among repeats, say nothing of the noise.
 _FEWEST_DIFFERENCES = 30
 #: Points of which a third difference is taken are at most so unevenly spaced.
