@@ -214,7 +214,7 @@ def test_the_way_from_contacts_to_friction_prints_what_is_shown(
 def test_the_page_on_plans_finds_the_repeats_that_it_names(folder: Path, run: Run) -> None:
     for line in blocks("plan_a_scan.md", "console")[1].splitlines():
         outcome = run(*shlex.split(line)[1:], "--json").exits(0)
-    assert outcome.json["plan"]["repeats"] == 4
+    assert outcome.json["plan"]["repeats"] == 8
     assert (folder / "design.png").is_file()
     assert run_examples("plan_a_scan.md")["enough"].plan.repeats > 1
 
