@@ -138,24 +138,6 @@ def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calib
     assert found["gaussian_sigma_deconvolved"] == pytest.approx(truth["gaussian_sigma"], rel=0.1)
 
 
-def own_uncertainty(apparatus: memscal.ApparatusFunction) -> float:
-    """Uncertainty of A that two scans do not share, as they share film, rod and load."""
-    budget = apparatus.budget["conversion_constant"]
-    own = ("noise", "window", "raster_noise")
-    return float(np.linalg.norm([budget.get(source, 0.0) for source in own]))
-
-
-@pytest.mark.parametrize(
-    "name", ["rod_scan_33.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
-)
-def test_lines_loads_and_raster_give_the_same_conversion_constant(name, calibrations) -> None:
-    one = calibrations["rod_scan_65.h5"].apparatus
-    other = calibrations[name].apparatus
-    expected = np.hypot(own_uncertainty(one), own_uncertainty(other))
-    assert expected < 0.02 * one.conversion_constant
-    assert abs(one.conversion_constant - other.conversion_constant) < 4 * expected
-
-
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
 def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
     shipped = memscal.read_scan(DATA / name)
