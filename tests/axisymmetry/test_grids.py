@@ -8,14 +8,11 @@ from scipy.signal import fftconvolve
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, on_grid
 from memscal.axisymmetry.hankel import radial_spline
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def gaussian(r: FloatArray, width: float = 1.0) -> FloatArray:
-    return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
 
 
 def centred_axis(count: int, step: float, offset: float = 0.0) -> FloatArray:
@@ -101,11 +98,11 @@ def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed:
 def test_the_quotient_of_two_displaced_fields_is_centred(axis: tuple[float, float]) -> None:
     grid = Lattice(centred_axis(81, 0.25, -axis[0]), centred_axis(61, 0.35, -axis[1]))
     middle = Lattice(centred_axis(81, 0.25), centred_axis(61, 0.35))
-    narrow = grid.forward(gaussian(grid.radius, 0.45))
-    wide = grid.forward(gaussian(grid.radius))
+    narrow = grid.forward(unit_gaussian(grid.radius, 0.45))
+    wide = grid.forward(unit_gaussian(grid.radius, 1.0))
     open_ = np.exp(-(grid.wavenumber**2) * 0.45**2 / 2) > 1e-7
     quotient = np.divide(wide, narrow, out=np.zeros_like(wide), where=open_)
-    exact = gaussian(middle.radius, np.sqrt(1 - 0.45**2))
+    exact = unit_gaussian(middle.radius, np.sqrt(1 - 0.45**2))
     np.testing.assert_allclose(grid.inverse(quotient), exact, atol=1e-7)
 
 
@@ -137,8 +134,8 @@ def test_a_refined_kernel_keeps_its_values_and_its_integral(seed: int, factor: i
 
 def test_a_refined_gaussian_is_a_gaussian() -> None:
     grid = Lattice(centred_axis(31, 0.5), centred_axis(25, 0.6))
-    fine, values = grid.refined(gaussian(grid.radius), 5)
-    np.testing.assert_allclose(values, gaussian(fine.radius), atol=1e-6)
+    fine, values = grid.refined(unit_gaussian(grid.radius, 1.0), 5)
+    np.testing.assert_allclose(values, unit_gaussian(fine.radius, 1.0), atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -14,13 +14,14 @@ from memscal.axisymmetry.hankel import (
     hankel_transform,
     radial_spline,
 )
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.model.arrays import FloatArray
 
 K = np.linspace(0.05, 20.0, 60)
 
 
 def gaussian(r: FloatArray) -> FloatArray:
-    return np.exp(-(r**2) / 2) / (2 * np.pi)
+    return unit_gaussian(r, 1.0)
 
 
 @pytest.mark.parametrize(("power", "jinc"), [(0, j1(K) / K), (1, 2 * jv(2, K) / K**2)])
@@ -35,7 +36,7 @@ def test_a_disc_and_a_paraboloid_become_jincs(power: int, jinc: FloatArray) -> N
 def test_a_gaussian_becomes_a_gaussian_in_any_unit_of_length(width: float) -> None:
     r = width * np.linspace(0.0, 9.0, 600)
     k = np.array([0.0, 0.5, 1.0, 3.0]) / width
-    found = hankel_transform(r, gaussian(r / width) / width**2, k)
+    found = hankel_transform(r, unit_gaussian(r, width), k)
     np.testing.assert_allclose(found, np.exp(-((k * width) ** 2) / 2), atol=1e-8)
 
 
@@ -107,7 +108,7 @@ def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, 
 def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated(width: float):
     r = np.concatenate([np.linspace(0, 10 * width, 400), np.linspace(10 * width, 8, 400)[1:]])
     k = np.array([0.0, 1.0, 5.0])
-    found = hankel_transform(r, np.exp(-0.5 * (r / width) ** 2) / (2 * np.pi * width**2), k)
+    found = hankel_transform(r, unit_gaussian(r, width), k)
     np.testing.assert_allclose(found, np.exp(-0.5 * (width * k) ** 2), atol=1e-6)
 
 
@@ -115,7 +116,7 @@ def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated
 def test_the_slope_of_a_gaussian_has_k_times_its_transform(start: float, spread: float) -> None:
     # A table of a vector field need not begin on the axis.
     r = np.linspace(start, 9.0 * spread, 600)
-    slope = -r / spread**2 * np.exp(-(r**2) / (2 * spread**2)) / (2 * np.pi * spread**2)
+    slope = -r / spread**2 * unit_gaussian(r, spread)
     found = hankel_transform(r, slope, K, order=1)
     np.testing.assert_allclose(found, -K * np.exp(-((K * spread) ** 2) / 2), atol=1e-6)
 

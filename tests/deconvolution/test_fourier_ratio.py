@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import memscal
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import Tikhonov
 from memscal.errors import FitError, InputError
 
@@ -17,8 +18,7 @@ CONVERSION = 1e-7
 
 def gaussian(width: float) -> memscal.Field:
     """A Gaussian of unit integral, lifted."""
-    profile = np.exp(-((R / width) ** 2) / 2) / (2 * np.pi * width**2)
-    return memscal.lift(R, profile, SPACING, EXTENT)
+    return memscal.lift(R, unit_gaussian(R, width), SPACING, EXTENT)
 
 
 def voltage_and_stress() -> tuple[memscal.Field, memscal.Field]:
@@ -32,7 +32,7 @@ def test_lifting_keeps_the_integral_and_the_profile():
     # The spline through the profile errs by (25 um / 561 um)^4 = 4e-6 at the most.
     assert field.integral == pytest.approx(1.0, abs=4e-6)
     assert field.image.shape == (field.y.size, field.x.size)
-    exact = np.exp(-((field.r / WIDTH) ** 2) / 2) / (2 * np.pi * WIDTH**2)
+    exact = unit_gaussian(field.r, WIDTH)
     np.testing.assert_allclose(field.radial, exact, atol=1e-5 * exact[0])
 
 

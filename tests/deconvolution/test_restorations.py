@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from memscal.axisymmetry.grids import Lattice
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import (
     DivisionProblem,
     Regulariser,
@@ -78,8 +79,8 @@ def test_wiener_does_not_smooth_away_a_raster_too_coarse_to_show_the_band_edge()
     # At 1 mm the last component of the lattice is still relevant.
     axis = (np.arange(19) - 9) * 1e-3
     grid = Lattice(axis, axis)
-    reference = np.exp(-((grid.radius / 0.9e-3) ** 2) / 2) / (2 * np.pi * 0.9e-3**2)
-    kernel = np.exp(-((grid.radius / 0.6e-3) ** 2) / 2) / (2 * np.pi * 0.6e-3**2)
+    reference = unit_gaussian(grid.radius, 0.9e-3)
+    kernel = unit_gaussian(grid.radius, 0.6e-3)
     problem = DivisionProblem(grid, grid.convolve(kernel, reference), reference, 1e-5, 1e-3)
     np.testing.assert_allclose(Wiener().divide(problem).field, kernel, atol=0.01 * kernel.max())
 
