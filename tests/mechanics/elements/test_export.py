@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers.paper import film
 
-from memscal import ElasticFilm, FieldMesh
+from memscal import FieldMesh
 from memscal.mechanics.elements.element_film import ElementField, ElementFilm
 
 H = 2e-3
@@ -13,10 +14,9 @@ H = 2e-3
 
 @cache
 def solved(nu: float) -> tuple[ElementField, FieldMesh, np.ndarray, np.ndarray]:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=H)
     r = np.linspace(0, H, 81)
     pressure = 1e5 * (1 - (r / H) ** 2) ** 2
-    field = ElementFilm(film, r).field(pressure, 0.2 * pressure * r / H)
+    field = ElementFilm(film(nu), r).field(pressure, 0.2 * pressure * r / H)
     return field, field.mesh(), r, pressure
 
 
