@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from accuracy.test_design import scan_of
 from helpers.bounds import FULL
 from helpers.direct import direct_scan
 from helpers.scans import CONVERSION, GAUSSIAN, SIGMA, TAILS, simulate
@@ -145,19 +146,8 @@ def test_a_plan_predicts_what_calibrations_of_imported_scans_state(name: str, me
     planned = memscal.design(**options, method=method)
     stated = []
     for seed in range(MADE):
-        made = simulate(
-            film=plan.film,
-            kernel=plan.kernel,
-            load=plan.load,
-            half_range=plan.step * (plan.positions - 1) / 2,
-            points=plan.positions,
-            repeats=plan.repeats,
-            noise=plan.noise,
-            load_uncertainty=plan.load_uncertainty,
-            centre=(plan.centre, 0.0),
-            seed=seed,
-        )
         statements = {each: getattr(plan, each) for each in STATED}
+        made = scan_of(plan, seed)
         scan = replace(made, film=plan.film, rod_friction=plan.rod_friction, **statements)
         p = memscal.calibrate(scan, method=method, other=False).apparatus.parameters
         stated.append([p.uncertainty(each) / p[each] for each in TRUTHS])

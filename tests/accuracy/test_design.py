@@ -69,6 +69,22 @@ def shares(
     return [*(parameters.uncertainty(name) / parameters[name] for name in NAMES), of_g]
 
 
+def scan_of(plan: Plan, seed: int) -> memscal.Scan:
+    """Simulate a scan as it is planned."""
+    return simulate(
+        film=plan.film,
+        kernel=plan.kernel,
+        load=plan.load,
+        half_range=plan.step * (plan.positions - 1) / 2,
+        points=plan.positions,
+        repeats=plan.repeats,
+        noise=plan.noise,
+        load_uncertainty=plan.load_uncertainty,
+        centre=(plan.centre, 0.0),
+        seed=seed,
+    )
+
+
 @lru_cache(maxsize=DESIGNS)
 def study(number: int) -> Study:
     plan = random_plan(number)
@@ -78,17 +94,7 @@ def study(number: int) -> Study:
     stated = []
     found = []
     for seed in range(SEEDS):
-        scan = simulate(
-            film=plan.film,
-            kernel=plan.kernel,
-            half_range=plan.step * (plan.positions - 1) / 2,
-            points=plan.positions,
-            repeats=plan.repeats,
-            noise=plan.noise,
-            load_uncertainty=plan.load_uncertainty,
-            seed=seed,
-        )
-        result = memscal.calibrate(scan, method="evidence").apparatus
+        result = memscal.calibrate(scan_of(plan, seed), method="evidence").apparatus
         profile = result.radial_profile
         stated.append(shares(result.parameters, profile.r, profile.g_errors, sigma))
         found.append([result.parameters[n] / planned.parameters[n] for n in NAMES])

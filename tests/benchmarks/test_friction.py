@@ -77,5 +77,4 @@ def test_measured_stress_and_comparison_cost_so_many_calibrations(tmp_path: Path
     }
     sys.stdout.write(f"\none calibration of 65 points: {calibration:.3g} s of processor time\n")
     for what, (seconds, stated) in ratios.items():
-        ratio = seconds / calibration
-        sys.stdout.write(f"{what}: {ratio:.3g} calibrations (stated: below {stated})\n")
+        show(f"{what}, over a calibration", seconds / calibration, stated)

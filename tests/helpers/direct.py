@@ -10,6 +10,7 @@ G it is at distance R
 the inner integral is the same for all G, the outer one has panels narrower than any blur.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -71,13 +72,17 @@ def base_stresses(radius: float, law: str) -> dict[float, FloatArray]:
     return {load: c.base_stress(TABLE) for load, c in zip(LOADS, contacts, strict=True)}
 
 
+def spline_across(radius: float, law: str, load: float) -> Callable[[FloatArray], FloatArray]:
+    """Base stress (Pa) by the distance from the axis (m), smooth on it."""
+    stress = base_stresses(radius, law)[load]
+    even = np.append(-TABLE[:0:-1], TABLE), np.append(stress[:0:-1], stress)
+    return make_interp_spline(*even, k=5)
+
+
 @lru_cache
 def mean_stress(points: int, centre: float, load: float, radius: float, law: str) -> FloatArray:
     """Base stress, averaged over circles about each position of the scan, in Pa."""
-    table = TABLE
-    stress = base_stresses(radius, law)[load]
-    even = np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress)
-    at = make_interp_spline(*even, k=5)
+    at = spline_across(radius, law, load)
     q = quadrature()[0][:, None]
     cosine = np.cos((np.arange(ANGLES) + 0.5) * np.pi / ANGLES)
     distances = np.abs(np.linspace(-HALF_RANGE, HALF_RANGE, points) - centre)

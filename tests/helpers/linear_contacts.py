@@ -18,9 +18,9 @@ CONVERSION = 1e-7
 _POSITIONS = np.linspace(-8e-3, 8e-3, 33)
 
 
-def gaussian_family(loads: Sequence[float] = LOADS) -> ProfileFamily:
+def gaussian_family() -> ProfileFamily:
     """Gaussian stresses that narrow with friction and widen with the load; thickness uncertain."""
-    load = np.asarray(loads, dtype=np.float64)
+    load = np.array(LOADS)
     narrower = 0.1 * (1 - np.exp(-FRICTIONS / 0.12))
     variance = (1.3e-3 * (1 - narrower[:, None]) * load ** (1 / 6)) ** 2
     k2 = NODES.k**2
@@ -49,9 +49,9 @@ def gaussian_sensor() -> Sensor:
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 
-def bare_points(*, correlation: float = 0.0, repeats: int = 1) -> LoadPoints:
+def bare_points(*, correlation: float = 0.0) -> LoadPoints:
     """Points of a load whose voltages are still to be drawn."""
-    x = np.tile(_POSITIONS, repeats)
+    x = _POSITIONS
     apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
     return LoadPoints(
         u=np.zeros(x.size),

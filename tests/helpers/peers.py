@@ -157,18 +157,16 @@ def inference_tools(scan: Scan, truth: Kernel) -> FloatArray:
     return np.interp(RADII, ring, heights) / (area @ heights)
 
 
-def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
-    """scikit-image's Wiener filter with the best of 25 balances: G, and A in V/Pa."""
+def skimage(scan: Scan, truth: Kernel) -> FloatArray:
+    """scikit-image's Wiener filter with the best of 25 balances."""
     from skimage.restoration import wiener
 
     plane = Plane(scan)
-    stress = plane.stress.sum()
+    stress = plane.stress / plane.stress.sum()
     images = (
-        wiener(plane.voltage, plane.stress / stress, balance, clip=False)
-        for balance in np.logspace(-9, 1, 25)
+        wiener(plane.voltage, stress, balance, clip=False) for balance in np.logspace(-9, 1, 25)
     )
-    image = plane.best(images, truth)
-    return plane.radial(image), float(image.sum() / (scan.load * stress))
+    return plane.radial(plane.best(images, truth))
 
 
 def photutils(scan: Scan, truth: Kernel) -> FloatArray:
@@ -192,6 +190,6 @@ PEERS: dict[str, Peer] = {
     "deerlab": deerlab,
     "inference": inference_tools,
     "photutils": photutils,
-    "skimage": lambda scan, truth: tuned_wiener(scan, truth)[0],
+    "skimage": skimage,
 }
 """By the name that is imported."""

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from helpers.direct import TABLE, base_stresses
+from helpers.direct import spline_across
 from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SENSOR
 from scipy.fft import irfft2, rfft2
-from scipy.interpolate import make_interp_spline
 
 import memscal
 from memscal.model.arrays import FloatArray
@@ -47,16 +46,13 @@ class TailedEllipse:
 
 
 @lru_cache
-def clean_raster(
-    kernel: TailedEllipse, side: int, half: float, finer: int = 3, reach: float = 12e-3
-) -> FloatArray:
+def clean_raster(kernel: TailedEllipse, side: int, half: float) -> FloatArray:
     """Voltages (side, side) per newton without noise, in V."""
+    finer = 3
     step = 2 * half / (side - 1) / finer
-    count = 2 * int(np.ceil(reach / step)) + 1
+    count = 2 * int(np.ceil(12e-3 / step)) + 1
     axis = step * (np.arange(count) - count // 2)
-    table = TABLE
-    stress = base_stresses(EXACT_ROD.radius, "linear")[1.0]
-    at = make_interp_spline(np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress), k=5)
+    at = spline_across(EXACT_ROD.radius, "linear", 1.0)
     g = kernel.at(axis[None, :] - CENTRE[0], axis[:, None] - CENTRE[1])
     size = 2 * count
     product = rfft2(at(np.hypot.outer(axis, axis)), (size, size)) * rfft2(g, (size, size))

@@ -1,9 +1,12 @@
 """Rods of the table beside the same rods solved directly, off the table's nodes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from helpers import paper
 
-from memscal import ElasticFilm, Rod
+from memscal import Rod
 from memscal.extensions.finite_strain.solve import follow_depths
 from memscal.mechanics.tabulated_rod import tabulated_rod
 
@@ -12,7 +15,7 @@ H = 2e-3
 
 def compare_with_the_table(nu: float, radius: float, depths: list[float], sticking: bool) -> None:
     """Assert that spectra, stress and depth agree; radius and depths in thicknesses."""
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=H, law="neo-hookean")
+    film = replace(paper.film(nu), law="neo-hookean")
     rod = Rod(radius=radius * H)
     k = np.linspace(0.0, 12.0, 61) / H
     r = np.linspace(0.1, 4, 40) * H
