@@ -49,9 +49,9 @@ def gaussian_sensor() -> Sensor:
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 
-def bare_points(*, correlation: float = 0.0) -> LoadPoints:
+def bare_points(*, correlation: float = 0.0, repeats: int = 1) -> LoadPoints:
     """Points of a load whose voltages are still to be drawn."""
-    x = _POSITIONS
+    x = np.tile(_POSITIONS, repeats)
     apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
     return LoadPoints(
         u=np.zeros(x.size),
