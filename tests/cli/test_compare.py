@@ -1,6 +1,5 @@
 """``memscal compare``: from files to friction; exit codes, refusals, and what it writes."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from memscal.cli.failures import CHECK_FAILED
 CHECKED = CHECK_FAILED
 REFUSED = 3
 NOT_WRITTEN = 4
-Give = Callable[..., None]
 Patch = pytest.MonkeyPatch
 
 
@@ -51,21 +49,6 @@ def compare(run: Run, bench: Path, folder: Path, monkeypatch: Patch) -> Run:
 QUICK = ("--friction", 0.2, "--friction", 0.1, "--loading", "incremental")
 
 
-@pytest.fixture
-def made_by_hand(monkeypatch: Patch) -> Callable[..., None]:
-    """Let the comparison give a result made by hand, and remember what it was asked."""
-
-    def give(found: Any = None, asked: dict[str, Any] | None = None) -> None:
-        def compare(*_: object, **options: Any) -> Any:
-            if asked is not None:
-                asked.update(options)
-            return comparison(lubrications=("dry",), loads=(1.37,)) if found is None else found
-
-        monkeypatch.setattr("memscal.friction.compare.compare", compare)
-
-    return give
-
-
 @pytest.mark.usefixtures("folder")
 def test_measured_stress_gives_the_numbers_of_its_scans(run: Run, compare: Run, bench: Path):
     scans = ("dry.h5", "lubricated.h5")
@@ -95,8 +78,9 @@ def test_stress_of_another_sensor_is_refused(run: Run, compare: Run, bench: Path
     compare(*QUICK, scans=both).exits(REFUSED, "other.apparatus.h5")
 
 
-def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_hand: Give):
-    made_by_hand(comparison(lubrications=("dry",), failed=True))
+def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, monkeypatch: Patch):
+    found = comparison(lubrications=("dry",), failed=True)
+    monkeypatch.setattr("memscal.friction.compare.compare", lambda *_, **__: found)
     done = compare()
     done.exits(CHECKED, "bracketing")
     assert "Effective friction coefficient" in done.out

@@ -205,20 +205,6 @@ def test_damaged_tables_are_read_or_refused(good, folder, changes) -> None:
 def test_damaged_meshes_are_read_or_refused(good, folder, changes) -> None:
     # Each is read by a process of its own.
     change = change_table if type(changes[0]).__name__ == "CellChange" else change_bytes
-    run = (
-        "import",
-        "in.vtu",
-        "-o",
-        "out.h5",
-        "--format",
-        "reference",
-        "--r-unit",
-        "mm",
-        "--sigma",
-        "S",
-        "--sigma-unit",
-        "MPa",
-        "--load",
-        "1",
-    )
+    reference = "--format reference --r-unit mm --sigma S --sigma-unit MPa --load 1"
+    run = ("import", "in.vtu", "-o", "out.h5", *reference.split())
     survives(folder, change(good["mesh"], changes), run, name="in.vtu")

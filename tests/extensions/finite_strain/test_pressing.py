@@ -127,6 +127,10 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool):
     per_load = state.base_stress(RADII) / state.load
     expected = linear.base_stress(RADII) / linear.load
     assert per_load == pytest.approx(expected, abs=1e-3 * float(expected[0]))
+    k = np.linspace(200.0, 1500.0, 5)
+    shear = linear.base_shear_spectrum(k) / linear.load
+    per_load = state.base_shear_spectrum(k) / state.load
+    assert per_load == pytest.approx(shear, abs=0.02 * np.abs(shear).max())
 
 
 def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]):

@@ -22,19 +22,6 @@ def mesh(folder: Path) -> Path:
     return Path(shutil.copy(DATA / "vtk_film.vtu", folder / "film.vtu"))
 
 
-def test_a_mesh_becomes_a_reference(run, folder):
-    table = Path(shutil.copy(DATA / "getfem_film.vtu", folder / "film.vtu"))
-    solver = ["--solver", "GetFEM", "--sigma", "stress"]
-    film = ["--young-modulus", 2.2, "--poisson-ratio", 0.5, "--thickness", 2]
-    done = run("import", table, "-o", "film.h5", *MESH, *solver, *film).exits(0)
-    for words in ("x as the radius and y across", "y = 0 mm, its lowest level", "component yy"):
-        assert words in done.out
-    found = memscal.read_reference("film.h5")
-    assert found.solver == "GetFEM"
-    assert found.film == memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    assert found.sigma_rz is not None
-
-
 def test_lengths_on_the_command_line_are_in_mm(run, folder):
     film = section("yx", heights=np.linspace(3.0, 5.0, 4))
     film.point_data = {"p": -pressure(film.points[:, 1])}
