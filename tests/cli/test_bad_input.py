@@ -42,7 +42,6 @@ def refused(run: Run, folder: Path) -> Refused:
         (lambda signal: signal.attrs.__delitem__("units"), (f"scan.h5: {SIGNAL}", "unit")),
         (lambda signal: signal.write_direct(np.full(65, np.nan)), ("missing (NaN)",)),
     ],
-    ids=["no unit", "no number"],
 )
 def test_a_file_that_was_spoilt_is_refused(refused: Refused, scan: Path, change, words):
     with h5py.File(scan, "r+") as file:
@@ -59,21 +58,21 @@ def altered(path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    "line",
     [
-        ["calibrate", "scan.h5", "-o", "out.h5"],
-        ["calibrate", "scan.h5", "--dry-run"],
-        ["apply", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
-        ["restore", "sensor.apparatus.h5", "scan.h5", "--override", "-o", "out.h5"],
-        ["inspect", "scan.h5"],
-        ["batch", "manifest", "-o", "results", "--artifacts", "all", "--workers", "1"],
+        "calibrate scan.h5 -o out.h5",
+        "calibrate scan.h5 --dry-run",
+        "apply sensor.apparatus.h5 scan.h5 --override -o out.h5",
+        "restore sensor.apparatus.h5 scan.h5 --override -o out.h5",
+        "inspect scan.h5",
+        "batch manifest -o results --artifacts all --workers 1",
     ],
-    ids=lambda arguments: " ".join(arguments[:: len(arguments) - 1]),
 )
 @pytest.mark.usefixtures("artifact")
 def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
-    run: Run, scan: Path, folder: Path, arguments
+    run: Run, scan: Path, folder: Path, line
 ):
+    arguments = line.split()
     altered(scan)
     (folder / "manifest").write_text("scan.h5\n")
     batch = arguments[0] == "batch"
@@ -102,7 +101,6 @@ def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
             ("made with a sphere", "needs a rod"),
         ),
     ],
-    ids=["few points", "wide rod", "wrong sign", "sphere"],
 )
 def test_a_scan_of_no_use_is_refused(refused: Refused, folder: Path, scan, words):
     memscal.write_scan(scan, folder / "scan.h5")

@@ -58,18 +58,22 @@ def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
     assert Path("rod.h5").read_bytes() == before
 
 
-@pytest.mark.parametrize(("name", "arguments"), [
-    ("scan.apparatus.h5", ["calibrate", "scan.h5"]),
-    ("rod.h5", ["reference", "rod", "-o", "rod.h5"]),
-    ("d.png", ["design", "--figure", "d.svg", "--figure", "d.png"]),
-    ("sphere.stress.h5", ["apply", "sensor.apparatus.h5", "sphere.h5"]),
-    ("out.h5", ["restore", "sensor.apparatus.h5", "sphere.h5", "-o", "out.h5"]),
-    ("a.html", ["apply", "sensor.apparatus.h5", "sphere.h5", "-o", "new.h5", "--report", "a.html"]),
-    ("r.html", ["restore", "sensor.apparatus.h5", "sphere.h5", "-o", "new.h5",
-                "--report", "r.html"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("scan.apparatus.h5", "calibrate scan.h5"),
+        ("rod.h5", "reference rod -o rod.h5"),
+        ("d.png", "design --figure d.svg --figure d.png"),
+        ("sphere_dry.h5", "simulate --experiment sphere --contacts 9 --load 1 -o ."),
+        ("sphere.stress.h5", "apply sensor.apparatus.h5 sphere.h5"),
+        ("out.h5", "restore sensor.apparatus.h5 sphere.h5 -o out.h5"),
+        ("a.html", "apply sensor.apparatus.h5 sphere.h5 -o new.h5 --report a.html"),
+        ("r.html", "restore sensor.apparatus.h5 sphere.h5 -o new.h5 --report r.html"),
+    ],
+)
 @pytest.mark.usefixtures("artifact", "scan")
-def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, arguments):
+def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, line):
+    arguments = line.split()
     memscal.write_scan(sphere_scan(pressed(), seed=5), "sphere.h5")
     (folder / name).write_bytes(OLD)
     assert run(*arguments).exits(4, "--force").out == ""
@@ -85,16 +89,20 @@ def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, 
     assert names(folder) == ["scan.h5"]
 
 
-@pytest.mark.parametrize(("arguments", "old", "failing"), [
-    (["calibrate", "scan.h5", "-o", "a.h5", "--figure", "b.svg"], ["a.h5", "b.svg"], "b.svg"),
-    (["simulate", "--experiment", "sphere", "-o", "."],
-     ["rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5"], "sphere_lubricated.h5"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "outputs"),
+    [
+        ("calibrate scan.h5 -o a.h5 --figure b.svg", "a.h5 b.svg"),
+        ("simulate --experiment sphere -o .", "rod_scan.h5 sphere_dry.h5 sphere_lubricated.h5"),
+    ],
+)
 @pytest.mark.usefixtures("scan")
 def test_where_one_output_cannot_be_replaced_all_stay(
-    run: Run, folder: Path, monkeypatch: Patch, arguments, old, failing
+    run: Run, folder: Path, monkeypatch: Patch, line, outputs
 ):
     rename = os.replace
+    old = outputs.split()
+    failing = old[-1]
 
     def replace(source: Path, target: Path) -> None:
         if Path(target).name == failing:
@@ -105,21 +113,26 @@ def test_where_one_output_cannot_be_replaced_all_stay(
         (folder / name).write_bytes(OLD)
     before = names(folder)
     monkeypatch.setattr(os, "replace", replace)
-    run(*arguments, "--force").exits(4, failing, "what was there before is untouched")
+    run(*line.split(), "--force").exits(4, failing, "what was there before is untouched")
     assert {(folder / name).read_bytes() for name in old} == {OLD}
     assert names(folder) == before
 
 
-@pytest.mark.parametrize(("arguments", "code"), [
-    (["calibrate", "scan.h5", "-o", "loop", "--force"], 4), (["batch", "loop", "-o", "new"], 3),
-    (["calibrate", "scan.h5", "--figure", "loop.svg"], 4), (["calibrate", "loop"], 3),
-    (["simulate", "--experiment", "sphere", "-o", "loop"], 4),
-])  # fmt: skip
-def test_a_circle_of_links_is_refused(run: Run, scan: Path, folder: Path, arguments, code):
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("batch loop -o new", 3),
+        ("calibrate loop", 3),
+        ("calibrate scan.h5 -o loop --force", 4),
+        ("calibrate scan.h5 --figure loop.svg", 4),
+        ("simulate --experiment sphere -o loop", 4),
+    ],
+)
+def test_a_circle_of_links_is_refused(run: Run, scan: Path, folder: Path, line, code):
     for ending in ("", ".svg"):
         (folder / f"loop{ending}").symlink_to(f"circle{ending}")
         (folder / f"circle{ending}").symlink_to(f"loop{ending}")
-    run(*arguments).exits(code, "loop")
+    run(*line.split()).exits(code, "loop")
 
 
 def test_an_input_without_permission_is_refused_and_no_usage_error(

@@ -9,13 +9,6 @@ from helpers.console import Run
 import memscal
 
 
-def test_a_depth_gives_the_load_that_gives_the_depth(run: Run):
-    (pressed,) = run("reference", "rod", "--depth", 100, "--json").json["solutions"]
-    load = pressed["load"]["value"]
-    (loaded,) = run("reference", "rod", "--load", load, "--json").json["solutions"]
-    assert loaded["depth"]["value"] == pytest.approx(100)
-
-
 @pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])
 def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path, law):
     done = run("reference", "rod", "--load", 0.02, *law, "-o", "finite.h5").exits(0)

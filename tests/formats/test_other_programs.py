@@ -86,17 +86,11 @@ def test_xarray_opens_every_group_without_a_warning(path: Path):
 
 @pytest.mark.parametrize(("kind", "group", "name", "dims", "units"), [
     ("artifact", "apparatus_function", "g", ("y", "x"), "1/mm^2"),
-    ("artifact", "apparatus_function", "g_errors", ("y", "x"), "1/mm^2"),
     ("artifact", "radial_covariance", "g_covariance", ("r", "r_prime"), "1/mm^4"),
-    ("artifact", "transfer_function", "modulus", ("k",), "1"),
-    ("artifact", "transfer_function", "resolved_wavenumber", (), "rad/mm"),
-    ("artifact", "reconvolution", "u_zz_predicted", ("x",), "mV"),
-    ("artifact", "parameters", "conversion_constant", (), "mV/Pa"),
     ("artifact", "parameters", "covariance", ("parameter", "parameter_prime"), "1"),
     ("raster", "data", "u_zz", ("y", "x"), "mV"),
-    ("raster", "data", "normal_load", ("y", "x"), "N"),
-    ("repeats", "data", "u_zz", ("repeat", "x"), "mV"), ("line", "data", "u_zz", ("x",), "mV"),
-    ("points", "data", "y", ("point",), "mm"), ("reference", "reference", "sigma_zz", ("r",), "Pa"),
+    ("repeats", "data", "u_zz", ("repeat", "x"), "mV"),
+    ("points", "data", "y", ("point",), "mm"),
 ], indirect=["kind"])  # fmt: skip
 def test_xarray_gives_dimensions_in_order_with_units(path: Path, group, name, dims, units):
     with xarray.open_dataset(path, engine="h5netcdf", group=f"/entry/{group}") as dataset:

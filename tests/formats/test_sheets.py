@@ -75,7 +75,6 @@ DOCTYPE = b'<!DOCTYPE a [<!ENTITY b "bb">]>' + SHEET % b"&b;"
         (b'<?xml version="1.0" encoding="cp037"?>' + SHEET % b"", "encoding"),
         (b"<a", "cannot be"),
     ],
-    ids=["size", "tags", "rows", "columns", "entities", "utf-16", "ebcdic", "damaged"],
 )
 def test_a_hostile_workbook_is_refused_before_it_takes_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, xml, words

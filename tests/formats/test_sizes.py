@@ -86,11 +86,9 @@ def test_blocks_give_what_the_whole_table_gives(
             np.testing.assert_equal(found, whole)
 
 
-def big_table(path: Path, rows: int, wrong: int = -1) -> Path:
+def big_table(path: Path, rows: int) -> Path:
     x = np.linspace(-8.0, 8.0, rows)
     lines = [f"{place:.6f},{np.exp(-place * place):.6f}" for place in x.tolist()]
-    if wrong >= 0:
-        lines[wrong] = "1.0,overload"
     path.write_text("\n".join(["x/mm,u/mV", *lines]))
     return path
 

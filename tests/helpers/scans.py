@@ -34,6 +34,7 @@ EXACT_FILM = replace(
     thickness_uncertainty=None,
 )
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
+STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 
 
 def in_record(options: dict[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers.console import names
 
 DATA = Path(__file__).parents[3] / "calibration_data"
 
@@ -28,14 +27,6 @@ def test_one_certificate_is_written_in_both_forms_of_text(run, inputs):
     made = run("certificate", *inputs, "-o", "c.xml", "--force", "--json").exits(0).json
     assert made["number"].encode() in Path("c.xml").read_bytes()
     assert [item["conforms"] for item in made["conformity"]] == [True]
-
-
-def test_missing_fields_are_all_named_and_nothing_is_written(run, inputs):
-    Path("lab.toml").write_text('[laboratory]\nname = "a"\n', "utf-8")
-    refused = run("certificate", *inputs, "-o", "c.pdf").exits(3, "lab.toml", "load cell")
-    keys = "[laboratory] city", "[customer] name", "[sensor] serial", "[conditions] start_time"
-    assert [key for key in keys if key not in refused.err] == []
-    assert names(Path()) == ["lab.toml", "scan.apparatus.h5"]
 
 
 def test_without_weasyprint_the_pdf_is_refused_with_the_extra(run, inputs, monkeypatch):

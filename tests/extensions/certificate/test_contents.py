@@ -80,10 +80,7 @@ def test_an_artifact_without_pascals_gets_no_certificate(laboratory):
         certify(relative, laboratory)
 
 
-def test_values_and_profile_are_those_of_the_artifact(apparatus, certificate):
-    for value in certificate.values:
-        assert value.value == apparatus.parameters[value.quantity.name]
-        assert value.expanded == 2 * apparatus.parameters.uncertainty(value.quantity.name)
+def test_the_profile_is_that_of_the_artifact(apparatus, certificate):
     np.testing.assert_allclose(np.diag(certificate.correlation), 1.0)
     assert np.all(np.abs(certificate.correlation) <= 1 + 1e-12)
     r, g, covariance = certificate.profile

@@ -59,10 +59,10 @@ def test_degrees_celsius_are_kelvins_of_another_zero_and_the_same_uncertainty(tm
         assert read.stated("conditions", "temperature") == pytest.approx(Measured(296.15, 0.3))
 
 
-IMPORT = [
-    *("--x", "x", "--x-unit", "mm", "--u", "U", "--u-unit", "mV", "--load", "1", "--radius"),
-    *("0.25", "--young-modulus", "2.2", "--poisson-ratio", "0.5", "--thickness", "2", "--force"),
-]
+IMPORT = (
+    "--x x --x-unit mm --u U --u-unit mV --load 1 --radius 0.25 "
+    "--young-modulus 2.2 --poisson-ratio 0.5 --thickness 2 --force"
+)
 
 
 def imported(folder: Path, *options: str) -> int:
@@ -71,7 +71,7 @@ def imported(folder: Path, *options: str) -> int:
     table = folder / "scan.csv"
     lines = [f"{x * 1e3},{u * 1e3}" for x, u in zip(scan.x, scan.u_zz, strict=True)]
     table.write_text("\n".join(["x,U", *lines]), encoding="utf-8")
-    given = [*IMPORT, "-o", str(folder / "scan.h5"), "--lab", str(SHIPPED), *options]
+    given = [*IMPORT.split(), "-o", str(folder / "scan.h5"), "--lab", str(SHIPPED), *options]
     return main(["import", str(table), *given])
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import RARE
-from helpers.scans import simulate, simulate_contacts, simulate_experiment
+from helpers.scans import LINEAR_FILM, STILL, simulate, simulate_contacts, simulate_experiment
 from scipy.stats import chi2
 
 import memscal
@@ -17,9 +17,7 @@ from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.extensions.simulation.sensor import blurred_stress
 from memscal.model.scan import Scan
 
-STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
-LINEAR = replace(PAPER_FILM, law="linear")
 
 
 def truth(scan: Scan) -> dict[str, Any]:
@@ -31,7 +29,7 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int):
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
     each = np.sort(scan.normal_load, axis=None)
-    contacts = memscal.indent(LINEAR.expected, PAPER_SPHERE, load=each, friction=0.15)
+    contacts = memscal.indent(LINEAR_FILM.expected, PAPER_SPHERE, load=each, friction=0.15)
     solved = {contact.load: contact for contact in contacts}
     away = np.abs(scan.x - 0.14e-3)
     expected = np.empty_like(scan.u_zz)
@@ -48,7 +46,9 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int):
 def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads():
     law = memscal.Interface(slip_length=3e-6)
     scan = simulate_contacts(load=1.37, friction=0.8, interface=law, points=17, **EXACT)
-    contact = memscal.indent(LINEAR.expected, PAPER_SPHERE, load=1.37, friction=0.8, interface=law)
+    contact = memscal.indent(
+        LINEAR_FILM.expected, PAPER_SPHERE, load=1.37, friction=0.8, interface=law
+    )
     r = np.linspace(0, 30e-3, 3001)
     profile = contact.base_stress(r)
     # The blurred stress at a place, as an integral over the plane around it.
@@ -161,9 +161,7 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
         film=film,
         rod=memscal.Rod(radius=rod["indenter_radius"]),
         load=rod["load_1"],
-        noise=0.0,
-        baseline=0.0,
-        drift=0.0,
+        **STILL,
     )
     np.testing.assert_allclose(found.rod.u_zz, pressed.u_zz, rtol=1e-12)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import RARE
-from helpers.scans import simulate
+from helpers.scans import LINEAR_FILM, STILL, simulate
 from scipy.special import j1
 from scipy.stats import chi2
 
@@ -16,8 +16,6 @@ from memscal.errors import InputError
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.model.arrays import FloatArray
 
-LINEAR = replace(PAPER_FILM, law="linear")
-STILL = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 RING = GaussianMixture((1.8, -0.8), (0.7e-3, 0.45e-3))
 DISC = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
 KERNELS = {"gaussian": GaussianMixture(), "ring": RING, "disc": DISC}
@@ -28,13 +26,18 @@ def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: Radia
     # The integral of a smooth field is the sum of a raster's pixels; this one, of an
     # incompressible film, is gone only at 20 thicknesses.
     options: dict[str, Any] = {"points": 121, "half_range": 40e-3, "centre": (0.2e-3, -0.3e-3)}
-    options |= {"film": LINEAR, "load": 2.0, "kernel": kernel}
+    options |= {"film": LINEAR_FILM, "load": 2.0, "kernel": kernel}
     scan = simulate(raster=True, conversion_constant=3e-8, **options, **STILL)
     assert scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2 == pytest.approx(3e-8 * 2.0, rel=1e-6)
 
 
 def test_a_line_is_the_middle_row_of_a_raster():
-    options: dict[str, Any] = {"points": 33, "centre": (0.3e-3, 0.2e-3), "film": LINEAR, **STILL}
+    options: dict[str, Any] = {
+        "points": 33,
+        "centre": (0.3e-3, 0.2e-3),
+        "film": LINEAR_FILM,
+        **STILL,
+    }
     raster = simulate(raster=True, **options)
     line = simulate(**options)
     assert (raster.kind, line.kind) == ("raster", "line")
@@ -44,7 +47,7 @@ def test_a_line_is_the_middle_row_of_a_raster():
 
 @pytest.mark.parametrize("noise", [0.001, 0.05])
 def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed: int):
-    options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR}
+    options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR_FILM}
     noisy, clean = (simulate(noise=s, seed=seed, **options) for s in (noise, 0.0))
     residual = noisy.u_zz - clean.u_zz
     stated = noisy.u_zz_errors
@@ -70,7 +73,7 @@ def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int):
 
 
 def test_several_loads_give_a_repeat_each_in_proportion():
-    options: dict[str, Any] = {"repeats": 2, "points": 17, "film": LINEAR}
+    options: dict[str, Any] = {"repeats": 2, "points": 17, "film": LINEAR_FILM}
     scan = simulate(load=[0.34, 0.69, 1.37], load_uncertainty=0.02, **options, **STILL)
     assert (scan.kind, scan.u_zz.shape) == ("repeats", (6, 17))
     loads = np.array([0.34, 0.34, 0.69, 0.69, 1.37, 1.37])
@@ -95,7 +98,7 @@ def test_the_rod_is_pressed_by_the_law_at_each_load():
     ("film", "law", "friction"),
     [
         (PAPER_FILM, "neo-hookean", math.inf),
-        (LINEAR, "linear", None),
+        (LINEAR_FILM, "linear", None),
         (replace(PAPER_FILM, law=""), "linear", None),
     ],
 )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.machine import assert_same_to_rounding
-from helpers.scans import simulate, simulate_contacts, simulate_experiment
+from helpers.scans import STILL, simulate, simulate_contacts, simulate_experiment
 
 import memscal
 from memscal import GaussianMixture
@@ -13,7 +13,6 @@ from memscal.errors import InputError
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 
 KERNEL = GaussianMixture(sigmas=(400e-6,))
-QUIET = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 LINEAR = replace(PAPER_FILM, law="linear", poisson_ratio_uncertainty=None)
 BOTH = {"shear": (KERNEL, 4e-8)}
 
@@ -27,15 +26,8 @@ def test_the_normal_channel_is_the_same_with_and_without_the_other():
         assert set(other.channels) == {"u_xz", "u_xz_errors"}
 
 
-def test_a_rod_s_shear_is_odd_about_the_sensor_and_falls_where_the_rod_is_beyond_it():
-    scan = simulate(film=LINEAR, centre=(0.0, 0.0), **QUIET, **BOTH)
-    u = scan.channels["u_xz"]
-    np.testing.assert_allclose(u, -u[::-1], atol=1e-12 * np.abs(u).max())
-    assert u[scan.x > 0].max() < 0 < u[scan.x < 0].min()
-
-
 def test_a_raster_s_shear_is_one_component_of_a_vector_field():
-    scan = simulate(raster=True, points=21, centre=(0.0, 0.0), **QUIET, **BOTH)
+    scan = simulate(raster=True, points=21, centre=(0.0, 0.0), **STILL, **BOTH)
     u = scan.channels["u_xz"]
     np.testing.assert_allclose(u, -u[:, ::-1], atol=1e-12 * np.abs(u).max())
     np.testing.assert_allclose(u, u[::-1], atol=1e-12 * np.abs(u).max())
@@ -44,7 +36,7 @@ def test_a_raster_s_shear_is_one_component_of_a_vector_field():
 
 
 def test_a_narrow_g_shows_the_shear_of_rod_and_sphere_at_its_friction():
-    options = {**QUIET, **BOTH, "centre": (0.0, 0.0), "film": LINEAR}
+    options = {**STILL, **BOTH, "centre": (0.0, 0.0), "film": LINEAR}
     options["shear"] = (GaussianMixture(sigmas=(5e-6,)), 4e-8)
     exact = {"load_scatter": 0.0, "position_error": 0.0, "load": 1.37, **options}
     scans = [(simulate(**options), 1.0, 0.0, 1e-3)]
