@@ -6,6 +6,9 @@ from pathlib import Path
 import pytest
 from helpers.console import run_program
 
+FULL = Path("/dev/full")
+NEEDS_FULL = pytest.mark.skipif(not FULL.exists(), reason="The system has no /dev/full.")
+
 
 def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path):
     reading, writing = os.pipe()
@@ -27,19 +30,19 @@ def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path
     assert "Exception ignored" not in done.stderr
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="The system has no /dev/full.")
+@NEEDS_FULL
 @pytest.mark.parametrize("arguments", [["--help"], ["calibrate", "--help"], ["--version"]])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_help_that_cannot_be_printed_is_exit_code_4(folder: Path, arguments, unbuffered):
-    with Path("/dev/full").open("w") as full:
+    with FULL.open("w") as full:
         stream = {"cwd": folder, "stdout": full.fileno(), "PYTHONUNBUFFERED": unbuffered}
         done = run_program(*arguments, **stream)
     assert (done.returncode, "cannot be printed: No space" in done.stderr) == (4, True)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="The system has no /dev/full.")
+@NEEDS_FULL
 def test_a_result_that_cannot_be_printed_is_not_written_either(folder: Path):
-    with Path("/dev/full").open("w") as full:
+    with FULL.open("w") as full:
         done = run_program("reference", "rod", "-o", "rod.h5", cwd=folder, stdout=full.fileno())
     assert done.returncode == 4
     assert "cannot be printed: No space left" in done.stderr

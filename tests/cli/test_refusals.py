@@ -179,6 +179,8 @@ CREATE = "Create the folder first"
 INPUT = "also an input"
 NOT_WRITTEN = {
     "apply sensor.apparatus.h5 scan.h5 -o scan.h5 --force": INPUT,
+    "batch . -o new --report no/page.html": CREATE,
+    "batch . -o new --report scan.h5 --force": INPUT,
     "calibrate scan.h5 -o no/out.h5": CREATE,
     "calibrate scan.h5 --figure no/out.png": CREATE,
     "calibrate scan.h5 --report no/out.html": CREATE,

@@ -6,7 +6,6 @@ from typing import Any
 
 import h5py
 import netCDF4
-import numpy as np
 import pytest
 import silx.io.nxdata
 import xarray
@@ -98,16 +97,6 @@ def test_xarray_gives_dimensions_in_order_with_units(path: Path, group, name, di
         assert dataset[name].attrs["units"] == units
         for dim in dims:
             assert dim in dataset.coords
-
-
-@pytest.mark.parametrize("kind", ["artifact"], indirect=True)
-def test_a_point_of_g_is_found_by_its_coordinates_in_mm(path: Path):
-    data = make_artifact().field
-    with xarray.open_dataset(path, engine="h5netcdf", group="/entry/apparatus_function") as found:
-        value = float(found["g"].sel(x=0.5, y=-1.0, method="nearest"))
-    j = int(np.argmin(np.abs(data.x - 0.5e-3)))
-    i = int(np.argmin(np.abs(data.y + 1.0e-3)))
-    assert value == pytest.approx(data.g[i, j] * 1e-6, rel=1e-14)
 
 
 def test_netcdf4_opens_every_group_and_reads_every_variable(path: Path):

@@ -1,6 +1,5 @@
 """Units at the door: the table, pint behind it, and what is refused."""
 
-
 import numpy as np
 import pint
 import pytest

@@ -247,13 +247,6 @@ def test_the_report_of_a_batch_is_its_summary(copy, folder, run):
     run("summary", copy / "results", "-o", folder / "page.html").exits(0)
     assert page.read_text(encoding="utf-8") == (folder / "page.html").read_text(encoding="utf-8")
     run(*line, str(page)).exits(4, "exists already")
-    scan = copy / "scans" / "s01.h5"
-    before = scan.read_bytes()
-    run(*line, str(scan), "--force").exits(4, "also an input")
-    assert scan.read_bytes() == before
-    new = folder / "new"
-    run(*arguments(copy / "wafer.csv", new, "--report", folder / "no" / "page.html")).exits(4)
-    assert not new.exists()
 
 
 def test_a_summary_as_json_is_that_of_the_tables(results, folder, run):
