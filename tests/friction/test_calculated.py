@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,9 +27,9 @@ LENGTHS = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0]) * 1.82e-6
 Build = Callable[[ElasticFilm, Sphere, list[float], list[float]], ProfileFamily]
 
 
-def amontons(loading: str = "incremental") -> Build:
+def amontons(**options: Any) -> Build:
     return lambda film, sphere, loads, values: amontons_family(
-        film, sphere, loads, friction=values, loading=loading, reach=REACH
+        film, sphere, loads, friction=values, reach=REACH, **options
     )
 
 
@@ -48,14 +49,15 @@ def normal() -> Build:
     ("build", "loads", "grid", "between"),
     [
         (amontons(), LOADS, FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
-        (amontons("total"), LOADS[1:], FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
+        (amontons(loading="total"), LOADS[1:], FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
+        (amontons(order=1), LOADS, FRICTIONS, [0.07, 0.22, 0.5]),
         (elasto_plastic(1.6), LOADS[:1], SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
         pytest.param(
             *(normal(), LOADS, LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
             marks=pytest.mark.full_study,
         ),
     ],
-    ids=["incremental", "total", "elasto-plastic", "exponential"],
+    ids=["incremental", "total", "shear", "elasto-plastic", "exponential"],
 )
 def test_interpolated_profiles_are_those_of_contacts_solved_between(
     build, loads, grid, between
@@ -68,11 +70,16 @@ def test_interpolated_profiles_are_those_of_contacts_solved_between(
         assert apart(family, member.by_load[0], solved.by_load[index]) < 2e-2
 
 
-@pytest.mark.parametrize(("friction", "loading"), [(0.2, "incremental"), (math.inf, "total")])
-def test_a_family_holds_the_contacts_that_indent_finds(friction: float, loading: str) -> None:
-    family = amontons_family(FILM, SPHERE, LOADS, friction=[friction], loading=loading, reach=REACH)
+@pytest.mark.parametrize(
+    ("friction", "loading", "order"),
+    [(0.2, "incremental", 0), (math.inf, "total", 0), (0.2, "incremental", 1)],
+)
+def test_a_family_holds_the_contacts_that_indent_finds(friction, loading, order) -> None:
+    family = amontons(loading=loading, order=order)(FILM, SPHERE, list(LOADS), [friction])
+    assert family.order == order
+    spectrum = ("base_spectrum", "base_shear_spectrum")[order]
     contacts = indent(FILM, SPHERE, load=LOADS, friction=friction, loading=loading)
-    truth = np.array([contact.base_spectrum(family.wavenumbers.k) for contact in contacts])
+    truth = np.array([getattr(contact, spectrum)(family.wavenumbers.k) for contact in contacts])
     assert apart(family, family.spectra[0], truth) < 3e-4
     np.testing.assert_allclose(family.depths[0], [contact.depth for contact in contacts], rtol=2e-4)
     assert np.all(family.convergence < 1e-3)
@@ -81,7 +88,8 @@ def test_a_family_holds_the_contacts_that_indent_finds(friction: float, loading:
 CASES = {
     "smooth": (amontons(), [0.0], 0.0),
     "incremental": (amontons(), [0.2], 0.2),
-    "total": (amontons("total"), [0.4], 0.4),
+    "total": (amontons(loading="total"), [0.4], 0.4),
+    "shear": (amontons(order=1), [0.2], 0.2),
     "elasto-plastic": (elasto_plastic(1.6), [1e-6, 2e-6, 3e-6, 4e-6], 2.5e-6),
     "exponential": (normal(), [1.82e-6, 3.64e-6, 7.28e-6], 3.64e-6),
 }

@@ -57,16 +57,6 @@ def test_chi_square_is_as_large_as_its_degrees_say() -> None:
     assert kstest(chances, "uniform").pvalue > CHANCE
 
 
-def test_values_scatter_as_their_uncertainties_say() -> None:
-    apart = [
-        (one.value - 0.1) / one.standard_uncertainty
-        for one in found(0.1)
-        if one.value is not None and one.standard_uncertainty is not None
-    ]
-    assert len(apart) > 0.9 * SEEDS
-    assert abs(np.sqrt(np.mean(np.square(apart))) - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
-
-
 def test_of_two_loadings_the_middle_is_the_value_and_a_rectangle_is_left() -> None:
     ends = {"incremental": found(0.1)[0], "total": found(0.2)[0]}
     both = with_loading(ends)

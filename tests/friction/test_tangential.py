@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from friction.test_likelihood import generalised
 from helpers.bounds import FULL
-from helpers.paper import FILM, SPHERE
 from helpers.scans import simulate_experiment
 from scipy.linalg import block_diag
 from scipy.stats import binom
@@ -79,38 +78,6 @@ def measured(friction: float, seed: int) -> MeasuredStress:
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Contacts that the tests of this module calculate once."""
     return tmp_path_factory.mktemp("contacts")
-
-
-def test_a_family_of_shear_is_that_of_contacts_between_its_values() -> None:
-    family = amontons_family(FILM, SPHERE, LOADS, reach=24e-3, order=1)
-    assert family.order == 1
-    r = np.linspace(0.0, 8e-3, 41)
-    for friction in (0.07, 0.22, 0.5):
-        member = family.at(friction)
-        for i, contact in enumerate(memscal.indent(FILM, SPHERE, load=LOADS, friction=friction)):
-            found = family.wavenumbers.synthesise(member.spectra[0, i], r, order=1)
-            exact = contact.base_shear(r)
-            np.testing.assert_allclose(found, exact, atol=1e-3 * np.abs(exact).max())
-
-
-def test_a_thicker_film_and_a_larger_load_change_the_shear_as_the_family_says() -> None:
-    film = replace(memscal.simulate().film, poisson_ratio_uncertainty=None)
-    sphere = memscal.Sphere(radius=128.8e-3, radius_uncertainty=0.5e-3)
-    family = amontons_family(film, sphere, [1.37], friction=(0.2,), reach=24e-3, order=1)
-    k = family.wavenumbers.k
-    u = film.thickness_uncertainty or 0.0
-
-    def spectrum(thickness: float, load: float) -> FloatArray:
-        changed = replace(film, thickness=thickness)
-        return memscal.indent(changed, sphere, load=load, friction=0.2).base_shear_spectrum(k)
-
-    h = film.thickness
-    thicker = (spectrum(h + u, 1.37) - spectrum(h - u, 1.37)) / 2
-    heavier = (spectrum(h, 1.37 * 1.02) - spectrum(h, 1.37 * 0.98)) / 0.04
-    np.testing.assert_allclose(
-        family.changes["thickness"][0, 0], thicker, atol=0.03 * np.abs(thicker).max()
-    )
-    np.testing.assert_allclose(family.by_load[0, 0], heavier, atol=0.01 * np.abs(heavier).max())
 
 
 def test_what_is_predicted_has_a_side_and_slopes_of_its_own() -> None:
