@@ -60,13 +60,6 @@ def test_friction_changes_the_stress_under_the_paper_s_rod_by_a_thousandth() -> 
     assert 0.5e-3 < np.max(np.abs(sticking - sliding)) / np.max(sliding) < 2e-3
 
 
-@pytest.mark.parametrize(("nu", "friction"), CASES)
-def test_the_base_holds_the_film_back_around_the_axis(nu, friction) -> None:
-    shear = press(nu, friction).base_shear([0.0, 0.5e-3, 1e-3, 2e-3])
-    assert shear[0] == 0
-    assert np.all(shear[1:] < 0)
-
-
 def test_a_list_of_loads_gives_proportional_contacts() -> None:
     one, three = indent(FILM, ROD, load=[0.25, 0.75])
     assert three.depth == pytest.approx(3 * one.depth, rel=1e-14)
