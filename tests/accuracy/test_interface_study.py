@@ -127,12 +127,6 @@ def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
     assert np.median(ratios) == pytest.approx(1.0, abs=0.12 + 0.2 / math.sqrt(SEEDS))
 
 
-def test_the_effective_coefficient_grows_with_the_load() -> None:
-    for one in experiments(MACROSCOPIC, SLIP_LENGTH, "known"):
-        assert np.all(np.diff(one.implied.friction[:, 1]) > 0)
-        assert one.implied.friction[-1, 1] > 1.5 * one.implied.friction[0, 1]
-
-
 def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
     wide = 0
     for one in experiments(MACROSCOPIC, 1.82e-6, "paper"):
