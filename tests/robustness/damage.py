@@ -35,19 +35,10 @@ NUMBERS = (
 )
 SHAPES = ((), (0,), (1,), (2,), (7,), (7, 1), (1, 7), (3, 3), (2, 2, 2), (1, 1, 1, 1, 1))
 TYPES = ("f2", "f4", "f8", ">f8", "i1", "u1", "i8", "u8", "bool", "c16", "S4", "O")
-UNITS = (
-    "", "1", "m", "mm", "km", "furlong", "um", "µm", "mV", "V", "pA", "Pa", "N", "kN", "rad/mm",
-    "1/mm^2", "degC", "m/0", "m**1e9", "((((", "1e400 m", "__import__", "\x1b[2J", "x" * 5000,
-)  # fmt: skip
-TEXTS = (
-    "", " ", "NaN", "Infinity", "null", "[]", "{}", "[1e999]", '{"a":', '["a", "a"]', "[" * 5000,
-    '{"A": NaN}', "-1", "rod", "sphere", "1.0.0", "9.9.9", "../../etc", "a/b", "\x1b]0;x\x07",
-    "\u202e\u2066", "x" * 100_000,
-)  # fmt: skip
-CELLS = (
-    "", " ", "nan", "NaN", "inf", "-inf", "1e999", "1,5", "1.5.2", "0x10", '"', '"1"', "'", "=1+1",
-    "1e-400", "-1", "1e200", "\x00", "µ", "\ufeff", "9" * 400, "TRUE", "#N/A", "1\t2",
-)  # fmt: skip
+WORDS = json.loads(Path(__file__).with_name("damage.json").read_text(encoding="utf-8"))
+UNITS = [*WORDS["units"], "x" * 5000]
+TEXTS = [*WORDS["texts"], "[" * 5000, "x" * 100_000]
+CELLS = [*WORDS["cells"], "9" * 400]
 
 
 class ByteChange(NamedTuple):
