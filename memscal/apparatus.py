@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import cached_property
 from os import PathLike
 
@@ -15,7 +15,7 @@ from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.extensions import hook
 from memscal.model.apparatus import ApparatusData, ApparatusField
-from memscal.model.arrays import FloatArray, finite_vector, require_increasing
+from memscal.model.arrays import FloatArray, finite_vector, keyword_array_record, require_increasing
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Result
 
@@ -30,7 +30,7 @@ _ROUND = 1e-4
 _UNEVEN = 1e-3
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class ApparatusFunction(Result, ApparatusData):
     r"""A calibrated sensor: :math:`U_{zz} = A\,G \otimes \sigma_{zz}`.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 from memscal.apparatus import ApparatusFunction
@@ -29,6 +29,7 @@ from memscal.extensions import hook
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
+from memscal.model.arrays import array_record
 from memscal.model.assumptions import Assumption
 from memscal.model.film import LINEAR
 from memscal.model.notation import VOLTS, Reading
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from memscal import Sweep
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Calibration(Result):
     """A finished calibration: its result, and every step that led to it.
 

@@ -1,7 +1,7 @@
 """What a calibration is asked for, and what it starts from: scans, film, loads and references."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -23,7 +23,7 @@ from memscal.estimation.set_up import (
     with_film_of,
 )
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
-from memscal.model.arrays import array_record
+from memscal.model.arrays import array_record, keyword_array_record
 from memscal.model.film import LINEAR
 from memscal.model.notation import Reading
 from memscal.model.provenance import accepted_alterations
@@ -40,7 +40,7 @@ Reference: TypeAlias = (
 """A base stress, an ideal reference, the path or name of one, or nothing: the rod is solved."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@keyword_array_record
 class Request:
     """What a calibration is asked for; :func:`memscal.calibrate` describes each."""
 

@@ -29,7 +29,7 @@ from memscal.estimation.profile import ProfileEstimate, constrained_profile, est
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
 from memscal.progress import done_with
@@ -198,7 +198,7 @@ class Misfit:
     degrees: float
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Deconvolution:
     """A and G by one route, a division of the fields or the posterior, and what they predict."""
 
@@ -212,7 +212,7 @@ class Deconvolution:
     divided: bool = True  # by a division of the fields; else the posterior's
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Solution:
     """Every step of a calibration."""
 

@@ -10,7 +10,7 @@ r"""Fourier ratio, the paper's method on arrays: lift, divide, normalise, convol
 profiles from any source.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -21,13 +21,19 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.deconvolution.division import DivisionProblem, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import Bayesian
-from memscal.model.arrays import FloatArray, finite_vector, require_increasing, require_positive
+from memscal.model.arrays import (
+    FloatArray,
+    array_record,
+    finite_vector,
+    require_increasing,
+    require_positive,
+)
 
 #: A field of more points along half its side takes gigabytes.
 _MOST_POINTS = 8192
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Field:
     """A field over the plane, about its axis of symmetry; from :func:`lift`.
 
@@ -98,7 +104,7 @@ class Field:
         return self.grid.wavenumber[0], np.abs(self.transform[0])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Quotient(Field):
     """The quotient of two fields, A G; from :func:`divide`.
 

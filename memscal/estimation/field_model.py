@@ -7,7 +7,6 @@ on a grid, and at the points by quintic splines through it; its slopes are the s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, cast
 
@@ -16,7 +15,7 @@ import scipy.fft
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.estimation.forward import ForwardModel, Geometry
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record, keyword_array_record
 from memscal.model.stress import StressField
 
 #: Points of the grid for each half wave of the last wavenumber, and at most for each step.
@@ -144,7 +143,7 @@ class FieldModel(ForwardModel):
         return values * self.points.load
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@keyword_array_record
 class FieldSpectrum(RadialSpectrum):
     """A field per newton by the transform of its mean over directions, and by itself."""
 

@@ -69,7 +69,7 @@ class Interval:
         return self.low <= value <= self.upper
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class BoundedEstimate:
     r"""A friction coefficient or a length (``unit`` m) by profile likelihood, with its interval.
 
@@ -256,7 +256,7 @@ def joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
     return "; ".join(texts)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class FrictionComparison(Result, Checked):
     """Measured stress against calculated contacts, with the friction that explains it.
 

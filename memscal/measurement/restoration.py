@@ -1,7 +1,6 @@
 """Restored stress: the stress at the base of the film that explains a scan, and its comparison."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
 from typing import TypeAlias
 
@@ -52,7 +51,7 @@ class StressComparison:
     within: float  # share of the radii at which they agree within 1.96 standard uncertainties
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Restoration(Result, Checked):
     r"""The stress at the film's base that explains a scan, with its uncertainty.
 

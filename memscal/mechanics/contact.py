@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -13,7 +13,7 @@ from memscal.errors import DomainError, InputError
 from memscal.mechanics.film_response import InterfaceTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.surface import FilmField
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Indenter, Rod
@@ -33,7 +33,7 @@ _PRESSURE_SAMPLES = 2001
 _BASE_SAMPLES = 128
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class Contact(Result):
     r"""A rigid indenter pressed on a bonded film, solved; from :func:`memscal.indent`.
 

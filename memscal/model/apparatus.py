@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property
 
@@ -11,7 +10,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, FrozenArrays, array_record
+from memscal.model.arrays import FloatArray, FrozenArrays, array_record, keyword_array_record
 from memscal.model.assumptions import Assumption
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
@@ -211,7 +210,7 @@ class OtherEstimate:
     radial_profile: ApparatusRadial
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class ApparatusData(Checked):
     """Everything that an apparatus-function artifact stores, in SI units.
 

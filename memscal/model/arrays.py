@@ -21,7 +21,20 @@ _Class = TypeVar("_Class")
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 def array_record(cls: type[_Class]) -> type[_Class]:
     """Make a class a frozen dataclass that equals itself alone: arrays have no single truth."""
-    return dataclass(frozen=True, eq=False)(cls)
+    return dataclass(frozen=True, eq=False, repr=_shows_fields(cls))(cls)
+
+
+@dataclass_transform(
+    frozen_default=True, eq_default=False, kw_only_default=True, field_specifiers=(field,)
+)
+def keyword_array_record(cls: type[_Class]) -> type[_Class]:
+    """Make a class a record of arrays whose fields are given by their names."""
+    return dataclass(frozen=True, kw_only=True, eq=False, repr=_shows_fields(cls))(cls)
+
+
+def _shows_fields(cls: type) -> bool:
+    """Whether neither a class nor its bases say how it is shown."""
+    return not any("__repr__" in vars(base) for base in cls.__mro__[:-1])
 
 
 #: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.

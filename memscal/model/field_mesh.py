@@ -1,15 +1,13 @@
 """Displacement and stress on a mesh of the film's cross-section, as finite elements give them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, frozen_array
+from memscal.model.arrays import FloatArray, frozen_array, keyword_array_record
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class FieldMesh:
     r"""Displacement and stress in the half-plane :math:`r \ge 0` of an axisymmetric film.
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, keyword_array_record
 
 
 class Indenter:
@@ -144,7 +144,7 @@ class Cone(Indenter):
         return np.asarray(r, dtype=np.float64) * math.tan(self.inclination)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@keyword_array_record
 class Profile(Indenter):
     """A rigid indenter of any axisymmetric shape, such as a worn or a measured tip.
 

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from memscal.extensions import hook
-from memscal.model.arrays import ByContent, FloatArray, frozen_array
+from memscal.model.arrays import ByContent, FloatArray, frozen_array, keyword_array_record
 from memscal.model.checks import (
     NOISE_UNSTATED,
     Checked,
@@ -86,7 +86,7 @@ class MeasuredScan:
         object.__setattr__(self, "width", _kept(self.width))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@keyword_array_record
 class MeasuredPoints(ByContent):
     """The measured points of one load and channel, missing ones left out; arrays of shape (n,).
 
@@ -125,7 +125,7 @@ class MeasuredPoints(ByContent):
         return f"<MeasuredPoints: {self.u.size}>"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class MeasuredProfile(ByContent):
     """The measured stress of one load, from the centre outward.
 
@@ -251,7 +251,7 @@ class MeasuredProfile(ByContent):
         return float(np.linalg.norm(list(self.maximum_budget.values())))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class MeasuredStress(Result, Checked, ByContent):
     """The measured stress of all loads of one or several scans, live or read from its file.
 

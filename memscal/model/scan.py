@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import FloatArray, IndexArray, keyword_array_record
 from memscal.model.correlation import checked_correlation, of_points
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -144,7 +144,7 @@ class SetUp(NamedTuple):
         return self._replace(film=replace(self.film, law=law, mooney_rivlin_ratio=None))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class Scan:
     r"""Sensor voltage against the position of the indenter, with what it was measured on.
 

@@ -10,7 +10,7 @@ from scipy.special import j0, j1
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -111,7 +111,7 @@ _RINGS = 16
 _WAYS = 8
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class StressField:
     r"""A field in two dimensions that takes the place of a stress: U is :math:`A\,G \otimes` it.
 
@@ -240,7 +240,7 @@ class StressField:
         return StressProfile(r=r, sigma_zz=mean, load=load, field=self, source=self.source)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class StressProfile:
     r"""Stress at the base of the film as a function of radius, for one load.
 

@@ -1,11 +1,10 @@
 """Results of a fleet of sensors: what a summary needs of their calibrations."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, keyword_array_record
 from memscal.model.checks import Message
 from memscal.model.result import Result
 
@@ -16,7 +15,7 @@ _FEW_VALUES = 8.0
 _TO_SIGMA = 1.4826  # of a normal law's median absolute deviation
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class FleetResults(Result):
     """Sensors in the order of their batch; arrays have NaN where a scan has an error.
 

@@ -80,7 +80,7 @@ class LawComparison:
         return evident and likelier
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class InterfaceComparison(Result):
     """Laws of the interface against an effective friction coefficient, by evidence.
 

@@ -240,7 +240,7 @@ class BudgetComparison:
         return not self.reason
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class MonteCarlo(Result):
     """Draws of a calibration, from :func:`monte_carlo`; ``to_dataframe()`` holds them.
 

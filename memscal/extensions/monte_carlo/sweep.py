@@ -1,19 +1,19 @@
 """Sweep of the white noise: how a calibration depends on its amplitude and its seed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.deconvolution.division import Regulariser, WhiteNoise, WhiteNoiseDraw, require_count
 from memscal.errors import FitError
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, array_record
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
 from memscal.progress import Task
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Sweep(Result):
     """Results against the noise amplitude.
 

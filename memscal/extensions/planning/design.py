@@ -32,7 +32,13 @@ from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.extensions.simulation.sensor import blurred_stress
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
+from memscal.model.arrays import (
+    FloatArray,
+    FrozenArrays,
+    array_record,
+    require_non_negative,
+    require_positive,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.result import Result
@@ -187,7 +193,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     return solution, uncertainties(solution, solution.deconvolution, effects, {})
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@array_record
 class Design(Result, FrozenArrays):
     """A planned scan and its expected results, with standard uncertainties (k = 1).
 

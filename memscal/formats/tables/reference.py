@@ -1,7 +1,7 @@
 """References from samples of a calculated stress, checked; and from tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.text_table import Wanted
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, keyword_array_record
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
@@ -32,7 +32,7 @@ class ImportedProfile:
     notes: tuple[Message, ...]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@keyword_array_record
 class Samples:
     """Stress at the base as a file states it, in SI, and the words for it in messages."""
 

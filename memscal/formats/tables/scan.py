@@ -1,7 +1,7 @@
 """Scans from tables with one row per reading."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +14,7 @@ from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
 from memscal.formats.tables.text_table import NamedColumns, Wanted
 from memscal.formats.units import reading_of, to_si
+from memscal.model.arrays import keyword_array_record
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
@@ -47,7 +48,7 @@ _MANY = 0.25
 _MIXED = 0.3
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@keyword_array_record
 class ImportedScan(Scan):
     """A scan that was read from a table, and what was done on the way.
 
