@@ -1,8 +1,9 @@
 """Sizes at which what a calibration takes for granted moves its result by one uncertainty."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,25 +15,28 @@ from memscal.estimation.residuals import residuals_of
 from memscal.estimation.slow_noise import slow_noise
 from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
+from memscal.model.scan import Scan
 
 _ASKED_FOR = ("poisson_ratio", "thickness", "load_scale")
 #: Lines that pass farther away, in widths of the Gaussian, are hardly those of one stage.
 _FARTHEST = 2.0
 #: Correlations of neighbours that are tried.
 _CORRELATIONS = np.linspace(0.02, 0.98, 49)
-#: By name the uncertainty that a scan, its film or its sensor states.
+#: What states a thing, where it is not the uncertainty of the thing's name; of some it is the film.
 _STATEMENTS = {
-    "roundness": "roundness_uncertainty",
-    "line_offset": "line_offset_uncertainty",
     "stage_scale": "position_scale_uncertainty",
-    "base_slip": "base_slip_uncertainty",
-    "baseline_curvature": "baseline_curvature_uncertainty",
-    "gain_curvature": "gain_curvature_uncertainty",
-    "shear_sensitivity": "shear_sensitivity_uncertainty",
     "load_scale": "load_uncertainty",
     "noise_correlation": "u_zz_correlation",
     "rod_friction": "rod_friction",
+    "film_law": "law",
 }
+OF_FILM = ("thickness", "poisson_ratio", "film_law")
+
+
+def statement(owner: object, name: str) -> Any:
+    """What a scan, or its film, states of a thing that is else taken for granted; or None."""
+    stated = getattr(owner, _STATEMENTS.get(name, f"{name}_uncertainty"), None)
+    return None if isinstance(stated, str) and not stated else stated
 
 
 def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ...]:
@@ -67,8 +71,7 @@ def at_offsets(solution: Solution) -> Solution:
     farthest = max(abs(scan.line_offset) for scan in scans)
     if farthest > _FARTHEST * solution.estimate.gaussian.sigma:
         return solution
-    moved = solve(scans, solution.stresses, solution.method, owners=solution.owners)
-    return replace(moved, apart=solution.apart)
+    return _again(solution, scans)
 
 
 def less_mean_offset(solution: Solution) -> Solution:
@@ -85,8 +88,12 @@ def less_mean_offset(solution: Solution) -> Solution:
         readings = scan.u_zz.copy()
         readings[measured_mask(scan)] -= mean[points.scan == i]
         scans.append(replace(scan, u_zz=readings))
-    corrected = solve(scans, solution.stresses, solution.method, owners=solution.owners)
-    return replace(corrected, apart=solution.apart)
+    return _again(solution, scans)
+
+
+def _again(solution: Solution, scans: Sequence[Scan]) -> Solution:
+    solved = solve(scans, solution.stresses, solution.method, owners=solution.owners)
+    return replace(solved, apart=solution.apart)
 
 
 def with_slow_noise(solution: Solution) -> Solution:
@@ -104,15 +111,10 @@ def _state(solution: Solution, name: str) -> str:
     points = solution.estimate.points
     if name in measured_by(points) or (name == "noise_correlation" and solution.estimate.slow):
         return MEASURED
-    stated = []
     for scan in solution.scans:
-        if name == "film_law":
-            stated.append(bool(scan.film and scan.film.law))
-        elif name in ("poisson_ratio", "thickness"):
-            stated.append(getattr(scan.film, f"{name}_uncertainty", None) is not None)
-        else:
-            stated.append(getattr(scan, _STATEMENTS.get(name, ""), None) is not None)
-    return STATED if all(stated) else ASSUMED
+        if statement(scan.film if name in OF_FILM else scan, name) is None:
+            return ASSUMED
+    return STATED
 
 
 def _sizes(effect: Influence, results: Results) -> dict[str, float]:

@@ -28,7 +28,7 @@ from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import IndexArray
 from memscal.model.assumptions import Assumption
-from memscal.model.checks import QualityCheck, check, chi_square_limit
+from memscal.model.checks import QualityCheck, added_check, check, chi_square_limit
 from memscal.model.film import LINEAR
 from memscal.model.notation import format_measured
 
@@ -277,13 +277,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         )
         force = carried_force(solution.stress, estimate.model.reference)
         checks.append(check("reference_force", abs(force - 1.0), 0.01, meaning))
-    meaning = (
-        "Share of points whose weight was more than halved. A failure means that the noise is not "
-        "what the uncertainties take it for: look at the points that the messages name."
-    )
-    outliers = np.mean(estimate.outlier_weight < quality.OUTLIER_WEIGHT)
-    checks.append(check("outliers", float(outliers), quality.OUTLIER_LIMIT, meaning))
-    return checks
+    named = "the points that the messages name"
+    return [*checks, quality.outlier_check(estimate.outlier_weight, named)]
 
 
 def _indentation(
@@ -405,7 +400,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
         f"{extra.size:.2%} of the largest signal. A failure means that the left and right halves "
         f"differ{failure}."
     )
-    return _added("symmetry", extra, meaning)
+    return added_check("symmetry", extra.fall, extra.count, meaning)
 
 
 def _steadiness(solution: Solution) -> list[QualityCheck]:
@@ -419,7 +414,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
             f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output "
             "is not linear in the load, and that one A does not serve all loads."
         )
-        checks.append(_added("load_linearity", linear, meaning))
+        checks.append(added_check("load_linearity", linear.fall, linear.count, meaning))
     owner = np.array(solution.owners)[estimate.points.scan]
     branches = model_tests.hysteresis_test(estimate, owner)
     if branches is not None:
@@ -438,7 +433,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
             "drifts. Wait longer before each reading, move to each position from the same side, "
             "or calibrate with one branch alone."
         )
-        checks.append(_added("hysteresis", branches, meaning))
+        checks.append(added_check("hysteresis", branches.fall, branches.count, meaning))
     apart = solution.apart
     if apart is not None and not solution.per_repeat:
         meaning = (
@@ -449,11 +444,6 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
         )
         checks.append(_tested("repeat_centres", apart, meaning))
     return checks
-
-
-def _added(name: str, extra: model_tests.ExtraColumns, meaning: str) -> QualityCheck:
-    p_value = float(chdtrc(extra.count, extra.fall))
-    return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
 
 
 def _held_out(solution: Solution) -> list[QualityCheck | None]:

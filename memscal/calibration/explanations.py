@@ -21,6 +21,7 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.calibration.assumptions import OF_FILM, statement
 from memscal.calibration.stages import Solution
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel
@@ -71,7 +72,6 @@ _RIVALS = {
     "gain_curvature": ("an amplifier of curvature {}", 0.05, ""),
     "lag": ("a lag of {} along the scan", 0.2e-3, "mm"),
 }
-_OF_FILM = ("thickness", "poisson_ratio", "film_law")
 #: The farthest size, and the step of derivatives, over the rival's scale.
 _FARTHEST = 6.0
 _STEP = 0.03
@@ -139,7 +139,7 @@ def _applicable(solution: Solution) -> list[str]:
         return []
     left_out = list(measured_by(points))
     if solution.stress.form or any(scan.film is None for scan in solution.scans):
-        left_out += _OF_FILM
+        left_out += OF_FILM
     elif not all(is_tabulated(*scan.set_up.under(NEO_HOOKEAN)) for scan in solution.scans):
         left_out.append("film_law")
     return [name for name in _RIVALS if name not in left_out]
@@ -184,9 +184,8 @@ def _statement(solution: Solution, name: str) -> tuple[float, float | None]:
     if name == "film_law":
         film = film_of(solution.stress)
         return float(film is None or film.law != LINEAR), None
-    owner = scan.set_up.expected.film if name in _OF_FILM else scan
-    u = getattr(owner, f"{name}_uncertainty".replace("stage", "position"), None)
-    return getattr(owner, name, float(name == "stage_scale")), u
+    owner = scan.set_up.expected.film if name in OF_FILM else scan
+    return getattr(owner, name, float(name == "stage_scale")), statement(owner, name)
 
 
 def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> ForwardModel:
@@ -197,7 +196,7 @@ def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> Fo
     place = np.stack([points.x, points.y])
     signal = fit.predicted - model.drift_columns @ fit.drift
     added: FloatArray | float = 0.0
-    if name in _OF_FILM:
+    if name in OF_FILM:
         pairs = zip(solution.scans, model.references, strict=True)
         references = tuple(_reference(*pair, name, size) for pair in pairs)
         model = replace(model, references=references)

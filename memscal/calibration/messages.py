@@ -9,7 +9,6 @@ from memscal.calibration.film_inference import FilmLawComparison
 from memscal.calibration.prepare import Prepared
 from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import Results, slow_noise_text
-from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate, point_messages
 from memscal.estimation.reference_spectra import RECTANGLE
@@ -22,8 +21,6 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
-#: Tails of less probability are not mentioned.
-_LEAST_PROBABILITY = 0.001
 
 
 def calibration_messages(
@@ -71,7 +68,7 @@ def calibration_messages(
     messages += point_messages(estimate)
     if estimate.points.u_errors is None:
         messages.append(_noise(estimate, results))
-    messages += _tails(estimate) + _directions(estimate, checks) + _method(solution)
+    messages += _method(solution)
     form = stress.form
     if form is not None:
         text = (
@@ -119,35 +116,6 @@ def _noise(estimate: ProfileEstimate, results: Results) -> Message:
         f"misfit of the same size, and has no p-value. {slow}"
     )
     return Message(quality.NOISE_UNSTATED, text)
-
-
-def _directions(estimate: ProfileEstimate, checks: tuple[QualityCheck, ...]) -> list[Message]:
-    fall = next((c.value for c in checks if c.name == "axisymmetry"), 0.0)
-    if fall <= quality.chi_square_limit(2):
-        return []
-    size = float(np.abs(estimate.oval).max()) / estimate.largest_signal
-    text = (
-        f"The sensor is not round: what differs between directions makes up {size:.1%} of the "
-        "largest signal. The field has it; the radial profile is a mean over directions "
-        "(predict(x, stress, y=y) takes the field)."
-    )
-    return [Message("not_round", text)]
-
-
-def _tails(estimate: ProfileEstimate) -> list[Message]:
-    """Return what a tail that the scan hardly tells from the baseline would change in A."""
-    probability, change = estimate.weighed.of_kind("wide tail", estimate.departures.integrals)
-    if probability < _LEAST_PROBABILITY:
-        return []
-    prior = sum(h.estimate for h in HYPOTHESES if h.kind == "wide tail")
-    a = estimate.conversion_constant
-    text = (
-        "Tails of G two to three times as wide as its core have a probability of "
-        f"{probability:.2g} (prior {prior:.2g}). With them A by method bayesian is "
-        f"{abs(change) / a:.2%} {'larger' if change > 0 else 'smaller'} than without; it is the "
-        "mean of both."
-    )
-    return [Message("wide_tails", text)]
 
 
 def _method(solution: Solution) -> list[Message]:

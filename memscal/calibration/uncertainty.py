@@ -30,7 +30,7 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.widths import kernel_functionals
 from memscal.errors import InputError
 from memscal.estimation.decorrelation import SlowNoise
-from memscal.estimation.influences import influences, measured_by
+from memscal.estimation.influences import influences, measured_by, signal_by
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import (
@@ -102,12 +102,12 @@ def input_effects(
     if alternatives is not None:
         pairs = zip(alternatives, model.references, strict=True)
         changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
-    effects = {name: InputEffect(_mistaken(estimate, change)) for name, change in changes.items()}
+    effects = {n: InputEffect(-signal_by(estimate, change)) for n, change in changes.items()}
     effects |= _taken_for_granted(scans, estimate) | _load_effects(scans, stresses, estimate)
     if "load" in effects:
         # Beside its scaling: at finite strain a larger load spreads the stress.
-        spread = _mistaken(estimate, load_sensitivities(scans, model.references))
-        effects["load"] = replace(effects["load"], voltage=effects["load"].voltage + spread)
+        spread = signal_by(estimate, load_sensitivities(scans, model.references))
+        effects["load"] = replace(effects["load"], voltage=effects["load"].voltage - spread)
     return effects
 
 
@@ -127,14 +127,6 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
             change = u * influence.voltage + 2**0.5 * u**2 * influence.squared
             effects[name] = InputEffect(-change)
     return effects
-
-
-def _mistaken(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> FloatArray:
-    """Voltages (n,) that changes of the references' transforms would be mistaken for, in V."""
-    changed = zip(estimate.model.references, changes, strict=True)
-    spectra = tuple(replace(reference, values=values) for reference, values in changed)
-    model = replace(estimate.model, references=spectra)
-    return -model.signal(estimate.gaussian.geometry, estimate.kernel)
 
 
 def _load_effects(

@@ -299,19 +299,7 @@ class WeighedFit:
     noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
-    means: FloatArray  # (h, all columns): of each hypothesis; zero where it is unlikely
     log_marginals: FloatArray  # (h,): logarithm of the voltages' probability by each of HYPOTHESES
-
-    def of_kind(self, name: str, integrals: FloatArray) -> tuple[float, float]:
-        """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
-        # ``integrals`` of all columns that were weighed, before any was left out.
-        shares = self.probability * [h.kind == name for h in HYPOTHESES]
-        total = float(shares.sum())
-        if total == 0:
-            return 0.0, 0.0
-        change = self.means @ integrals
-        others = (self.probability - shares) @ change / max(1 - total, 1e-300)
-        return total, float(shares @ change / total - others)
 
 
 def weigh_departures(
@@ -379,10 +367,9 @@ class Weighing:
         used = replace(given, **{f.name: getattr(given, f.name)[likely] for f in fields(given)[1:]})
         p = estimate[used.number]
         q = uncertainty[used.number]
-        means = np.zeros((estimate.size, self.basis.integrals.size))
-        means[used.number] = used.means
-        mean = p @ means[used.number]
-        apart = means[used.number] - mean
+        means = used.means
+        mean = p @ means
+        apart = means - mean
         gain = used.gain(p)
         parts = [q**0.5 * apart.T, used.covariance_root(q)]
         if self.added:
@@ -398,7 +385,6 @@ class Weighing:
             noise=float(np.sqrt(estimate @ scatter)),
             probability=estimate,
             residual=model.points.u - fit.predicted - self.basis.voltages(model, fit, mean),
-            means=means,
             log_marginals=self.log_marginals,
         )
 

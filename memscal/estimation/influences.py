@@ -93,11 +93,11 @@ def _of_film(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, Infl
     found = {}
     for name in set.intersection(*map(set, by_scan)):
         first, second = zip(*(each[name] for each in by_scan), strict=True)
-        found[name] = Influence(_by_spectra(estimate, first), _by_spectra(estimate, second))
+        found[name] = Influence(signal_by(estimate, first), signal_by(estimate, second))
     return found
 
 
-def _by_spectra(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> FloatArray:
+def signal_by(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> FloatArray:
     """Voltages by changes of the references' transforms."""
     model = estimate.model
     changed = zip(model.references, changes, strict=True)

@@ -201,23 +201,25 @@ def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str,
     if film.law != LINEAR:
         names.append("young_modulus")
     for name in names:
-        ends = more_and_less(film, name)
-        if ends:
-            more, less, share = ends
-            varied = (set_up._replace(film=more), set_up._replace(film=less))
-            changes[name] = share * difference(set_up, reference, *varied)
+        changes |= _sensitivity(set_up, reference, "film", name, name)
     return changes
 
 
 def rod_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of the rod's radius."""
-    rod = set_up.indenter
-    u = rod.radius_uncertainty
-    if not u:
+    return _sensitivity(set_up, reference, "indenter", "radius", "rod_radius")
+
+
+def _sensitivity(
+    set_up: SetUp, reference: RadialSpectrum, owner: str, name: str, source: str
+) -> dict[str, FloatArray]:
+    """Change by one standard uncertainty of a quantity of film or indenter, where one is stated."""
+    ends = more_and_less(getattr(set_up, owner), name)
+    if not ends:
         return {}
-    more = set_up._replace(indenter=replace(rod, radius=rod.radius + u))
-    less = set_up._replace(indenter=replace(rod, radius=max(rod.radius - u, rod.radius / 2)))
-    return {"rod_radius": difference(set_up, reference, more, less) / 2}
+    more, less, share = ends
+    varied = (set_up._replace(**{owner: more}), set_up._replace(**{owner: less}))
+    return {source: share * difference(set_up, reference, *varied)}
 
 
 def load_sensitivities(

@@ -7,7 +7,6 @@ from dataclasses import replace
 from os import PathLike
 
 import numpy as np
-from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
@@ -200,15 +199,10 @@ NEGLIGIBLE_FORCE = 0.01
 
 def _checks(restored: Restoration) -> list[QualityCheck]:
     degrees = restored.degrees
-    outliers = np.mean(restored.posterior.estimate.outlier_weight < quality.OUTLIER_WEIGHT)
     blurred = (
         "Reduced chi-square of the scan against the restored stress blurred again by A G. A "
         "failure means that no radial stress at the base of this film explains the scan through "
         "this apparatus function."
-    )
-    doubtful = (
-        "Share of points whose weight was more than halved. A failure means that the noise is not "
-        "what the uncertainties take it for: look at the residuals."
     )
     load = restored.scan.stated_load
     budget = force_less_load(restored.force_budget, restored.scan.load_uncertainty)
@@ -226,7 +220,7 @@ def _checks(restored: Restoration) -> list[QualityCheck]:
         check("restored_force", abs(restored.force - load) / allowed, FORCE_LIMIT, carried),
         *_noise(restored),
         _symmetry(restored),
-        check("outliers", float(outliers), quality.OUTLIER_LIMIT, doubtful),
+        quality.outlier_check(restored.posterior.estimate.outlier_weight, "the residuals"),
     ]
     if restored.comparison is not None:
         checks.append(_expected(restored.comparison))
@@ -274,8 +268,7 @@ def _symmetry(restored: Restoration) -> QualityCheck:
             "indenter, an uneven film, or a drifting load."
         )
     meaning = f"Fall of chi-square by {uneven.count} {meaning}"
-    p_value = float(chdtrc(uneven.count, uneven.fall))
-    return check(name, uneven.fall, chi_square_limit(uneven.count), meaning, p_value)
+    return quality.added_check(name, uneven.fall, uneven.count, meaning)
 
 
 def _expected(compared: StressComparison) -> QualityCheck:

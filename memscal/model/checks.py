@@ -2,14 +2,17 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from memscal.model.arrays import FloatArray
 
 #: Chance that a check fails although its assumption holds.
 FALSE_ALARM = 1e-3
 #: Scatter over stated noise up to which a scan counts as being as noisy as stated.
 _NOISE_LIMIT = 1.5
 #: Share of points that may be outliers.
-OUTLIER_LIMIT = 0.10
+_OUTLIER_LIMIT = 0.10
 #: A point of less weight is an outlier.
 OUTLIER_WEIGHT = 0.5
 
@@ -194,6 +197,23 @@ def noise_check(scatter: float, channel: str = "zz") -> QualityCheck:
         "uncertainties have been raised accordingly."
     )
     return check("noise_as_stated", scatter, _NOISE_LIMIT, meaning)
+
+
+def outlier_check(weights: "FloatArray", where: str) -> QualityCheck:
+    """Return the check of the share of outliers by the weights of the points."""
+    meaning = (
+        "Share of points whose weight was more than halved. A failure means that the noise is not "
+        f"what the uncertainties take it for: look at {where}."
+    )
+    share = float((weights < OUTLIER_WEIGHT).mean())
+    return check("outliers", share, _OUTLIER_LIMIT, meaning)
+
+
+def added_check(name: str, fall: float, count: int, meaning: str) -> QualityCheck:
+    """Return the check of the fall of chi-square by columns that are added to a model."""
+    from scipy.special import chdtrc
+
+    return check(name, fall, chi_square_limit(count), meaning, float(chdtrc(count, fall)))
 
 
 def state_of_checks(checks: Iterable[QualityCheck]) -> str:
