@@ -8,7 +8,6 @@ Both scale their transforms to approximate :math:`\hat f(k) = \int f e^{-ikx} dx
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,13 +16,13 @@ from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 
 #: Directions over which a field of a lattice is averaged.
 _DIRECTIONS = 64
 
 
-@dataclass(frozen=True)
+@value_record
 class EvenGrid:
     """A quarter plane of ``count`` by ``count`` points, ``spacing`` (m) apart, axis included.
 

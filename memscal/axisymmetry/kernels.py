@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from scipy.special import chndtr, i0e, j0, j1
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, array_record, require_positive
+from memscal.model.arrays import FloatArray, array_record, require_positive, value_record
 
 #: Beyond its edge by so many widths of the blur nothing is left of a disc.
 _FARTHEST = 9.0
@@ -79,7 +78,7 @@ class RadialKernel(Protocol):
         """What a simulated scan keeps as its truth: text, or SI numbers by name."""
 
 
-@dataclass(frozen=True)
+@value_record
 class GaussianMixture:
     """A radial apparatus function: a sum of Gaussians, of unit integral in all.
 
@@ -134,7 +133,7 @@ class GaussianMixture:
         return truth
 
 
-@dataclass(frozen=True)
+@value_record
 class SmoothedDisc:
     r"""A radial apparatus function: a uniform disc of unit integral, blurred by a Gaussian.
 

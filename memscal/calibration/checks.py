@@ -9,12 +9,7 @@ from scipy.special import chdtrc, fdtri, logsumexp
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Solution
-from memscal.calibration.uncertainty import (
-    DivisionMap,
-    Results,
-    route_difference,
-    slow_noise_text,
-)
+from memscal.calibration.uncertainty import DivisionMap, Results, route_difference, slow_noise_text
 from memscal.estimation import model_tests
 from memscal.estimation import residuals as unexplained
 from memscal.estimation.band import RESOLVED

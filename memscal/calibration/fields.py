@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, TypeAlias
 
@@ -20,7 +19,7 @@ from memscal.estimation.forward import wave_table
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile, rounded_reach
 from memscal.estimation.voltage_map import DENSE, VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
 from memscal.model.places import EvenAxis
 from memscal.readings.find_places import even_lattice
 
@@ -31,7 +30,7 @@ _COUNTED = 4
 _MOST_KEPT = 512
 
 
-@dataclass(frozen=True)
+@value_record
 class GridChoice:
     """Spacing, half width of the support of G, and half extent of the fields, in m."""
 

@@ -11,7 +11,7 @@ prior, and the expected squared error of it by the priors of G's uncertainty.
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from memscal.estimation.profile import log_marginal_likelihood
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.estimation.set_up import film_of
 from memscal.mechanics.press_rod import is_tabulated, press_rod
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, value_record
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, law_in_words
@@ -37,7 +37,7 @@ from memscal.model.scan import Scan
 THICKNESS = "thickness"
 
 
-@dataclass(frozen=True)
+@value_record
 class WeighedLaw:
     """A law of the film: ln of its evidence up to a constant of the scans, and the result by it."""
 
@@ -47,7 +47,7 @@ class WeighedLaw:
     gaussian_sigma: float  # in m
 
 
-@dataclass(frozen=True)
+@value_record
 class FilmLawComparison:
     """Laws of the film, by falling evidence, and that of the reference (empty: not stated)."""
 
@@ -161,7 +161,7 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-@dataclass(frozen=True)
+@value_record
 class FreeThickness:
     """Posterior of the thickness of films by scans: each film as stated, and as estimated."""
 

@@ -7,7 +7,7 @@ them by the functions of :mod:`memscal.deconvolution.fourier_ratio`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -29,7 +29,7 @@ from memscal.estimation.profile import ProfileEstimate, constrained_profile, est
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
 from memscal.progress import done_with
@@ -189,7 +189,7 @@ def prepare_fields(
     return LineFields.lift(estimate, (smoothed or estimate).spectrum, choice)
 
 
-@dataclass(frozen=True)
+@value_record
 class Misfit:
     """Difference of a prediction from the scan."""
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias
@@ -23,7 +22,7 @@ import scipy.fft
 from memscal.axisymmetry.grids import FieldGrid
 from memscal.errors import InputError
 from memscal.estimation.bayesian import Bayesian
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, keyword_value_record
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -139,7 +138,7 @@ class _Own:
             require_count(self.name, "seed", options["seed"], 0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class WhiteNoise(_Own):
     """Expectation of the paper's method over all draws of its complex noise, of variance s^2."""
 
@@ -160,7 +159,7 @@ class WhiteNoise(_Own):
         return filtered_division(problem, window)
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class WhiteNoiseDraw(_Own):
     """One seeded draw of the paper's method: its quotient has no finite variance."""
 
@@ -186,7 +185,7 @@ class WhiteNoiseDraw(_Own):
         return Division(grid.from_quotient(period), expected.window)
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Tikhonov(_Own):
     r"""Minimiser of :math:`|\hat\sigma \hat g - \hat u|^2 + \alpha |\hat g|^2`."""
 
@@ -204,7 +203,7 @@ class Tikhonov(_Own):
         return filtered_division(problem, power / (power + alpha))
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Wiener(_Own):
     """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
 

@@ -20,7 +20,7 @@ the Gaussian itself; its uncertainty is the mean squared error with priors that 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property, lru_cache
 from itertools import compress, product
 from typing import ClassVar, NamedTuple
@@ -37,7 +37,13 @@ from memscal.estimation.departures import (
     Shape,
 )
 from memscal.estimation.voltage_map import VoltageMap
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import (
+    FloatArray,
+    IndexArray,
+    array_record,
+    keyword_value_record,
+    value_record,
+)
 
 #: The smallest noise, over the largest residual of a Gaussian, that is distinct from rounding.
 _ROUNDING = 1e-9
@@ -45,7 +51,7 @@ _ROUNDING = 1e-9
 _NEGLIGIBLE = 1e-4
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Bayesian:
     """Bayesian model averaging in data space: the posterior mean of A G, or its MAP estimate."""
 
@@ -241,7 +247,7 @@ def _likelihoods(
     return -0.5 * loss - sensors.log_determinant[family], scatter, variance
 
 
-@dataclass(frozen=True)
+@value_record
 class Hypothesis:
     """The Gaussian or a family, with departures of a shape and strength; prior probabilities."""
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -31,7 +31,7 @@ from memscal.estimation.angular import AngularDepartures, AngularRings
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 
 #: Rings are never narrower than this many steps: a width below the sampling is not resolved.
 _SMALLEST_WIDTH_IN_STEPS = 0.5
@@ -43,7 +43,7 @@ _REACH = 2.2
 _SCALES = 12
 
 
-@dataclass(frozen=True)
+@value_record
 class Shape:
     """A kind of departure, in units of the Gaussian's width."""
 
@@ -83,7 +83,7 @@ SHAPES = (
 )
 
 
-@dataclass(frozen=True)
+@value_record
 class Family:
     """Sensors that no departure from a Gaussian resembles: blurred discs, wide tails, rings."""
 

@@ -4,7 +4,7 @@ Some add m columns to the fitted model: chi-square falls by a chi-square variabl
 of freedom.  Others predict a group of points from the rest, or look for a ceiling of the voltage.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
@@ -19,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
 
 #: More groups than this are held out several at a time.
@@ -30,7 +30,7 @@ _SAME_LOAD = 0.05
 _DEPENDENT = 1e-10
 
 
-@dataclass(frozen=True)
+@value_record
 class HeldOut(TestOutcome):
     """The worst predicted of several groups: chi-square per degree, or F if no noise is stated."""
 
@@ -105,7 +105,7 @@ def _predict(
     return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
 
 
-@dataclass(frozen=True)
+@value_record
 class CentresApart(TestOutcome):
     """Test of whether the repeats of a line have centres of their own: an F ratio."""
 

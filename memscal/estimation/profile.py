@@ -16,16 +16,8 @@ from memscal.estimation.decorrelation import Decorrelation, SlowNoise
 from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.ellipse import elliptic_departure
 from memscal.estimation.forward import ForwardModel, forward_model
-from memscal.estimation.gaussian import (
-    GaussianFit,
-    fit_gaussian_to_points,
-)
-from memscal.estimation.outliers import (
-    OUTLIER_THRESHOLD,
-    RasterNoise,
-    point_weights,
-    raster_noise,
-)
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
+from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
 from memscal.model.arrays import FloatArray, IndexArray, array_record

@@ -10,7 +10,6 @@ and every combination of departures that stands above a share of the noise.  Wha
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
@@ -18,7 +17,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
@@ -104,7 +103,7 @@ _LEAST_STEP = 0.1
 FEWEST_RESIDUALS = 3
 
 
-@dataclass(frozen=True)
+@value_record
 class TestOutcome:
     """A test's value, what it exceeds by chance once in a thousand, and its p-value."""
 

@@ -34,11 +34,7 @@ from memscal.figures.style import (
     mark,
     panels_of,
 )
-from memscal.friction.results import (
-    BoundedEstimate,
-    FrictionComparison,
-    LoadComparison,
-)
+from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 
 RISE = r"$-2\,\ln(p/p_{max})$"

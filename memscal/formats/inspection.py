@@ -16,13 +16,7 @@ from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
-from memscal.formats.values import (
-    altered,
-    has_no_digest,
-    optional_text,
-    require_schema,
-    units_of,
-)
+from memscal.formats.values import altered, has_no_digest, optional_text, require_schema, units_of
 from memscal.model import records
 from memscal.model.quantities import Record, record
 

@@ -16,13 +16,7 @@ from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
-from memscal.model.scan import (
-    BRANCHES,
-    LIKE_SIGNAL,
-    Scan,
-    branch_numbers,
-    require_rod_friction,
-)
+from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
 from memscal.model.sizes import too_large
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")

@@ -10,12 +10,7 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
-from memscal.friction.family import (
-    FamilySetup,
-    ProfileFamily,
-    parameter_values,
-    require_loads,
-)
+from memscal.friction.family import FamilySetup, ProfileFamily, parameter_values, require_loads
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter

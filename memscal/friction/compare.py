@@ -16,11 +16,7 @@ from memscal.extensions import hook
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened_contacts import Contacts, opened_contacts
 from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
-from memscal.friction.checks import (
-    comparison_checks,
-    comparison_messages,
-    synthetic_messages,
-)
+from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
 from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
 from memscal.friction.effective import FrictionFit, fit_friction, load_comparison, with_loading
 from memscal.friction.family import ProfileFamily
@@ -32,11 +28,7 @@ from memscal.friction.likelihood import (
     require_line,
     sensor_of,
 )
-from memscal.friction.results import (
-    BoundedEstimate,
-    FrictionComparison,
-    LoadComparison,
-)
+from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from functools import cached_property
 from itertools import chain
 from typing import Any
@@ -30,6 +30,7 @@ from memscal.model.arrays import (
     FrozenArrays,
     array_record,
     finite_vector,
+    keyword_value_record,
     require_positive,
 )
 from memscal.model.film import ElasticFilm
@@ -166,7 +167,7 @@ _OTHER_RINGS = (80, 64, 48, 112)
 _STRETCH = 1e-4
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class LoadingPath:
     """A loading of one film with one interface, looked at at ``loads`` (N, in any order)."""
 

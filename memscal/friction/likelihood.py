@@ -28,11 +28,7 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
-from memscal.measurement.posterior import (
-    input_changes,
-    sensor_changes,
-    shared_changes,
-)
+from memscal.measurement.posterior import input_changes, sensor_changes, shared_changes
 from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan

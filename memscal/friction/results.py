@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from memscal.apparatus import ApparatusFunction
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
@@ -34,7 +34,7 @@ def percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
-@dataclass(frozen=True)
+@value_record
 class Interval:
     """A confidence interval of a parameter that is not negative and may have no upper end.
 

@@ -24,11 +24,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate, stated_weights
 from memscal.estimation.voltage_map import square_root
-from memscal.measurement.posterior import (
-    film_transfer,
-    sensor_changes,
-    shared_changes,
-)
+from memscal.measurement.posterior import film_transfer, sensor_changes, shared_changes
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure, load_of, undetermined, unit_force
 from memscal.mechanics.contact import Contact

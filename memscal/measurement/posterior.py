@@ -26,7 +26,7 @@ stress by the wrong :math:`T`.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, reduce
 from operator import add
 
@@ -44,7 +44,7 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import law_at_once, law_sensitivities, rod_spectrum
 from memscal.estimation.voltage_map import VoltageMap
 from memscal.mechanics.film_response import base_normal
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.scan import Scan, SetUp
@@ -82,7 +82,7 @@ def _per_pressure(set_up: SetUp, linear: RadialSpectrum, change: FloatArray) -> 
     return change * pressure / (pressure**2 + (_LEAST_PRESSURE * set_up.load) ** 2)
 
 
-@dataclass(frozen=True)
+@value_record
 class PressureShape:
     """A pressure of unit force with its shear, as an equivalent pressure on a film."""
 

@@ -6,14 +6,18 @@ the rms roughness: :math:`q = -\mu p\,e/\ell` for an elastic displacement :math:
 (Bureau, Caroli and Baumberger, Proc. R. Soc. A 459 (2003) 2787).
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy.special import gamma, pbdv
 
-from memscal.model.arrays import FloatArray, require_non_negative, require_positive
+from memscal.model.arrays import (
+    FloatArray,
+    keyword_value_record,
+    require_non_negative,
+    require_positive,
+)
 from memscal.model.film import ElasticFilm
 
 # Separations, in units of the law's length, between which a law is inverted.
@@ -25,7 +29,7 @@ _DEEP = -20.0
 _ENTRIES = 3601
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class GreenwoodTripp:
     r"""Normal compliance of a rough film under a smooth indenter.
 
@@ -97,7 +101,7 @@ class GreenwoodTripp:
         return 4 / 3 * film.contact_modulus * bearing
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class ExponentialCompliance:
     r"""Normal compliance :math:`p = p_1\,e^{-d/\lambda}`.
 
@@ -149,7 +153,7 @@ class ExponentialCompliance:
 NormalLaw = GreenwoodTripp | ExponentialCompliance
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Interface:
     r"""Compliance of the interface between indenter and film; rigid by default.
 

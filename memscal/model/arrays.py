@@ -32,6 +32,18 @@ def keyword_array_record(cls: type[_Class]) -> type[_Class]:
     return dataclass(frozen=True, kw_only=True, eq=False, repr=_shows_fields(cls))(cls)
 
 
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def value_record(cls: type[_Class]) -> type[_Class]:
+    """Make a class a frozen dataclass that equals another of the same values."""
+    return dataclass(frozen=True)(cls)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
+def keyword_value_record(cls: type[_Class]) -> type[_Class]:
+    """Make a class a record of values whose fields are given by their names."""
+    return dataclass(frozen=True, kw_only=True)(cls)
+
+
 def _shows_fields(cls: type) -> bool:
     """Whether neither a class nor its bases say how it is shown."""
     return not any("__repr__" in vars(base) for base in cls.__mro__[:-1])

@@ -1,11 +1,16 @@
 """The elastic film between the indenter and the sensor."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from memscal.errors import InputError
-from memscal.model.arrays import require_non_negative, require_positive, require_range
+from memscal.model.arrays import (
+    keyword_value_record,
+    require_non_negative,
+    require_positive,
+    require_range,
+)
 
 #: A normal distribution whose mean is moved by less, in standard deviations, is not cut off.
 _UNCUT = 1e-6
@@ -13,7 +18,7 @@ _UNCUT = 1e-6
 LINEAR, NEO_HOOKEAN, MOONEY_RIVLIN = LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class ElasticFilm:
     r"""An elastic film bonded to a rigid base.
 

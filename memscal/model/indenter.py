@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray, keyword_array_record
+from memscal.model.arrays import FloatArray, keyword_array_record, keyword_value_record
 
 
 class Indenter:
@@ -36,7 +35,7 @@ class Indenter:
         raise NotImplementedError
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class RoundIndenter(Indenter):
     """An indenter that one radius describes.
 
@@ -69,7 +68,7 @@ class RoundIndenter(Indenter):
         return self.radius
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Rod(RoundIndenter):
     """A rigid flat-ended cylinder, the indenter of the calibration scan.
 
@@ -86,7 +85,7 @@ class Rod(RoundIndenter):
         return np.where(np.asarray(r) <= self.radius, 0.0, np.inf)
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Sphere(RoundIndenter):
     """A rigid sphere, the indenter of the contact scans; ``radius`` is its curvature's.
 
@@ -107,7 +106,7 @@ class Sphere(RoundIndenter):
         return np.where(radii <= self.radius, rise, np.inf)
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Cone(Indenter):
     """A rigid cone.
 

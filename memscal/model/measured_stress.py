@@ -12,21 +12,21 @@ that this conversion gives back, so that what was saved and read again is equal 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
 
 from memscal.extensions import hook
-from memscal.model.arrays import ByContent, FloatArray, frozen_array, keyword_array_record
-from memscal.model.checks import (
-    NOISE_UNSTATED,
-    Checked,
-    Message,
-    QualityCheck,
-    state_of_checks,
+from memscal.model.arrays import (
+    ByContent,
+    FloatArray,
+    frozen_array,
+    keyword_array_record,
+    keyword_value_record,
 )
+from memscal.model.checks import NOISE_UNSTATED, Checked, Message, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor
@@ -40,7 +40,7 @@ _FILE_SCALE = 1e3
 Record = TypeVar("Record", ElasticFilm, RoundIndenter)
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class MeasuredScan:
     """What is known of a scan beside its points.
 

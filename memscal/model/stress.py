@@ -1,7 +1,6 @@
 """References of a calibration: stress at the base of a film, or a source of known form."""
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -10,7 +9,7 @@ from scipy.special import j0, j1
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray, keyword_array_record
+from memscal.model.arrays import FloatArray, keyword_array_record, value_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -24,7 +23,7 @@ _IDEAL_REACH = 6.0
 _EDGE = 1e-6
 
 
-@dataclass(frozen=True)
+@value_record
 class IdealReference:
     r"""A source of known form in place of a stress: no film, rod or load is needed.
 

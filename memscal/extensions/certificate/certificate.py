@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import date
 from typing import Any, NamedTuple
 
@@ -22,7 +21,7 @@ from memscal.extensions.certificate.laboratory import (
 from memscal.formats.artifact import artifact_tree
 from memscal.formats.hdf5.writer import tree_to_bytes
 from memscal.formats.units import to_si
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, keyword_value_record, value_record
 from memscal.model.checks import OVERRIDE
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, Quantity, parameter_quantity
@@ -51,7 +50,7 @@ _NUMBER_DIGITS = 10
 _MOST_EMBEDDED = 4_000_000
 
 
-@dataclass(frozen=True)
+@value_record
 class CertifiedValue:
     """A parameter with its standard uncertainty, in SI units, and how it is shown."""
 
@@ -66,7 +65,7 @@ class CertifiedValue:
         return self.factor * self.uncertainty
 
 
-@dataclass(frozen=True)
+@value_record
 class Conformity:
     """Whether a value conforms with its tolerance, by a decision rule; -inf or inf: no limit."""
 
@@ -110,7 +109,7 @@ class CertifiedProfile(NamedTuple):
     covariance: FloatArray
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Certificate:
     """What a certificate states: on its pages, and in XML."""
 

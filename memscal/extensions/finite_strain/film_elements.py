@@ -18,7 +18,6 @@ Lengths are in mm, stresses in MPa, forces in N; in SI units the direct solver l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -26,7 +25,7 @@ import numpy as np
 from scipy import sparse
 
 from memscal.mechanics.elements.mesh import graded
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
@@ -58,7 +57,7 @@ def _curvature(F: FloatArray) -> FloatArray:
     return second
 
 
-@dataclass(frozen=True)
+@value_record
 class Rubber:
     """The film's material, in MPa: with lengths in mm, the unknowns are then of like size."""
 

@@ -10,7 +10,7 @@ active set: a node that is pulled leaves, and one that lies inside the indenter 
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,10 @@ from scipy.sparse.linalg import splu
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements
 from memscal.mechanics.solver.step import Load, Target
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
 
 
-@dataclass(frozen=True)
+@value_record
 class RodFace:
     """A rod (radii in mm): its end, its rounded edge, and the wall that the film drapes against."""
 
@@ -57,7 +57,7 @@ class RodFace:
         return s, np.where(turning, np.hypot(x, y), np.where(wall, x, y)) - self.edge
 
 
-@dataclass(frozen=True)
+@value_record
 class SphereFace:
     """A sphere of this radius of curvature."""
 

@@ -6,7 +6,7 @@ The linear model is formal where an indenter sinks by a good part of the film's 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -36,7 +36,7 @@ from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.mechanics.surface import anticlockwise, on_hats
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, Sphere
@@ -140,7 +140,7 @@ def follow_depths(
     return _Request(film, rod, goals, sticking, radius, None, finer).reached(1.0)
 
 
-@dataclass(frozen=True)
+@value_record
 class _Request:
     """What is asked for, in mm and N."""
 

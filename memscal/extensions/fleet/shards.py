@@ -15,7 +15,7 @@ from memscal.errors import FormatError, InputError, MemscalError
 from memscal.extensions.fleet.results import FleetResults
 from memscal.formats.files import atomic_write_bytes, read_bytes
 from memscal.model.apparatus import ApparatusData
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, value_record
 from memscal.model.checks import OVERRIDE, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.quantities import ESTIMATED, MM, PER_MM, PER_MM2, parameter_quantity
@@ -33,7 +33,7 @@ _SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 _RESULTS = (".apparatus", ".stress")
 
 
-@dataclass(frozen=True)
+@value_record
 class FleetScan:
     """A scan of a manifest: its path as listed, and the sensor's place on its wafer, in mm."""
 

@@ -13,13 +13,7 @@ from memscal.extensions.interface_laws.results import (
     InterfaceComparison,
     LawComparison,
 )
-from memscal.figures.friction import (
-    INTERVAL_NOTE,
-    RISE,
-    deviance_rise,
-    draw_levels,
-    interval_ends,
-)
+from memscal.figures.friction import INTERVAL_NOTE, RISE, deviance_rise, draw_levels, interval_ends
 from memscal.figures.friction_profiles import friction_axis, friction_position, lubricated_words
 from memscal.figures.style import COLOURS, draw_band, legend_above, panels_of
 from memscal.friction.family import bounded

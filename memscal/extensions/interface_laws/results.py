@@ -1,17 +1,17 @@
 """Records of laws of the interface: their evidence, the slip length, and what it means."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from scipy.special import chdtrc
 
 from memscal.friction.results import BoundedEstimate
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.bayes_factor import POSITIVE, BayesFactor
 from memscal.model.checks import Message
 from memscal.model.result import Result
 
 
-@dataclass(frozen=True)
+@value_record
 class InterfaceLaw:
     r"""One law of the interface, weighed over all loads together.
 

@@ -1,6 +1,6 @@
 """Import of a stress profile from the mesh of any FEM program."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
 from memscal.formats.files import FilePath
 from memscal.formats.tables import reference
 from memscal.formats.units import to_si
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import Message, import_notes
 from memscal.model.notation import printable
 
@@ -169,7 +169,7 @@ _NINE = 9
 _MOST_LISTED = 30
 
 
-@dataclass(frozen=True)
+@value_record
 class Component:
     """One component of a field: of its values at the points, or in the cells."""
 

@@ -4,7 +4,7 @@ Each draw is a scan with new noise and other true inputs; it states the nominal 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -26,7 +26,7 @@ from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.points import measured_mask
 from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, rod_spectrum
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
@@ -35,7 +35,7 @@ from memscal.parallel import require_workers, shared, single_threaded
 from memscal.progress import Listener, Task, reported
 
 
-@dataclass(frozen=True)
+@value_record
 class SolvedInput:
     """An uncertain property of the film or rod (``component``) that the rod is solved for."""
 

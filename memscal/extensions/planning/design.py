@@ -8,7 +8,7 @@ with the expected squares of signal plus noise in place of the data's own.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
@@ -36,6 +36,7 @@ from memscal.model.arrays import (
     FloatArray,
     FrozenArrays,
     array_record,
+    keyword_value_record,
     require_non_negative,
     require_positive,
 )
@@ -57,7 +58,7 @@ _A_POINT = 1e-3
 _LARGEST_KH = 20.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Plan:
     """A line scan to be made; the attributes are the arguments of :func:`memscal.design`.
 

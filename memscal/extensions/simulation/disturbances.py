@@ -2,21 +2,26 @@
 
 import math
 import warnings
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, require_non_negative, require_positive, require_range
+from memscal.model.arrays import (
+    FloatArray,
+    keyword_value_record,
+    require_non_negative,
+    require_positive,
+    require_range,
+)
 from memscal.model.old_keywords import with_old_keywords
 
 # Beyond this scatter of the loads a parabola in ln P is no longer good to 1e-3.
 _MOST_SCATTER = 0.1
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Disturbances:
     """What keeps a simulated scan from being ideal, and what the scan states of it.
 

@@ -1,7 +1,7 @@
 """A whole synthetic experiment: a sensor's calibration, and what it then measures of contacts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -22,7 +22,7 @@ from memscal.extensions.simulation.disturbances import (
 )
 from memscal.extensions.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate, without_law
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import array_record, require_non_negative
+from memscal.model.arrays import array_record, keyword_value_record, require_non_negative
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.instrument import LoadCell
@@ -30,7 +30,7 @@ from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Reality:
     """The true film and indenters; true loads of rod and sphere relative to the stated ones."""
 

@@ -1,7 +1,6 @@
 """The simulated sensor: base stress seen through a known G, as disturbed voltages."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import Disturbances, Shear
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray, require_positive
+from memscal.model.arrays import FloatArray, require_positive, value_record
 from memscal.model.instrument import StressSensor
 from memscal.model.scan import Scan
 
@@ -65,7 +64,7 @@ Blurred = Callable[[RadialKernel, int], FloatArray]
 """Base stress through a kernel, in Pa at each reading: normal (order 0), radial shear (order 1)."""
 
 
-@dataclass(frozen=True)
+@value_record
 class SimulatedSensor:
     """G and A (V/Pa) of the normal channel, and those of the tangential one where there is one."""
 

@@ -1,16 +1,16 @@
 """What is stated of a table of readings: how it is read, what was pressed on what, how well."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, keyword_value_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.instrument import Equipment, LoadCell, StressSensor, User
 from memscal.model.stress import StressProfile
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class TableLayout:
     """How a table of readings is read; what is left out is found in it.
 
@@ -53,7 +53,7 @@ class TableLayout:
     decimal: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class ScanConditions:
     """What was pressed on what, under which load, and measured by what: no table states it.
 
@@ -103,7 +103,7 @@ class ScanConditions:
     synthetic: Mapping[str, float | str] | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class ScanUncertainties:
     """Standard uncertainties of the readings, loads and positions of a table.
 

@@ -7,13 +7,12 @@ and there are more of them.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
 
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
@@ -62,7 +61,7 @@ def film_triangles(rings: FloatArray, *, radius: float, refinement: int = 1) -> 
     return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
 
 
-@dataclass(frozen=True)
+@value_record
 class _Sizes:
     """How long a side of a triangle may be."""
 

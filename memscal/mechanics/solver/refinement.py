@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,7 @@ from memscal.mechanics.film_response import HankelFilm, RingTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.path import PathPoint, follow
 from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, value_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 
@@ -65,7 +65,7 @@ _REQUEST_SAMPLES = 24
 _FREE_EDGE = 12.0
 
 
-@dataclass(frozen=True)
+@value_record
 class RingRequest:
     """What is asked for; its content is the key under which a solution is remembered."""
 

@@ -24,7 +24,7 @@ Signorini and Amontons.  Friction acts at the end of the step (implicit Euler).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ import numpy as np
 from memscal.errors import ConvergenceError
 from memscal.mechanics.interface import Interface, NormalLaw
 from memscal.mechanics.surface import SurfaceCompliance
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.film import ElasticFilm
 
 
@@ -71,21 +71,21 @@ class ContactState:
     outward: FloatArray  # outward displacement in m
 
 
-@dataclass(frozen=True)
+@value_record
 class Load:
     """Press until the load is ``value`` N."""
 
     value: float
 
 
-@dataclass(frozen=True)
+@value_record
 class Depth:
     """Press until the depth is ``value`` m."""
 
     value: float
 
 
-@dataclass(frozen=True)
+@value_record
 class Touch:
     """Move until the surfaces meet at ``ring`` without pressing there."""
 
