@@ -46,7 +46,7 @@ Examples:
   memscal design
   memscal design --step 0.5 --half-range 10 --repeats 4 --noise 1
   memscal design --load 0.5 --noise-voltage 0.05 --figure design.png
-  memscal design --noise 1 --rod-friction inf --want A=1.3% --vary step
+  memscal design --noise 1 --rod-friction inf --want A=1.6% --vary step
   memscal design --thickness-uncertainty 0.005 --load 0.2 --want sigma=1.2% --vary repeats --json
   memscal design --disc-radius 800 --sigma 300 --want resolved=4.5 --vary repeats
 """

@@ -543,7 +543,7 @@ def design(
     'thickness'
     >>> finer = memscal.design(noise=0.01, want={"sigma": 0.0335}, vary="repeats")
     >>> finer.plan.repeats
-    3
+    2
     """
     targets = require_targets(want or {}, vary)
     plan = Plan(
