@@ -20,7 +20,7 @@ from memscal.estimation.forward import forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints, joined_points
-from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
+from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, stated_weights
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
@@ -267,7 +267,7 @@ class _Search:
         else:
             stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
         joined = joined_points(points)
-        weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
+        weights = stated_weights(joined)
         with np.errstate(all="ignore"), suppress(MemscalError, np.linalg.LinAlgError):
             model = forward_model(joined, reference_spectra(stresses, points))
             fit = fit_gaussian_to_points(model, weights)

@@ -14,8 +14,7 @@ from memscal.estimation.profile import ProfileEstimate, point_messages
 from memscal.estimation.reference_spectra import RECTANGLE
 from memscal.mechanics.contact import Contact
 from memscal.model import checks as quality
-from memscal.model.arrays import FloatArray
-from memscal.model.assumptions import ASSUMED, Assumption
+from memscal.model.assumptions import ASSUMED, MOVED, Assumption
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
@@ -138,6 +137,8 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     film = solution.scan.set_up.film
     law = film.law
     changes = results.changes
+    parameters = results.parameters
+    rows = [parameters.names.index(name) for name in MOVED[:2]]
     if law == LINEAR:
         text = "The film is taken as linear elastic, as stated; no other law is counted."
         return [Message("film_law", text)]
@@ -145,7 +146,7 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     def changed(by: str) -> str:
         if by not in changes:
             return "cannot be solved at this depth, and nothing is counted for it"
-        a, sigma = _relative_changes(results, changes[by]) / RECTANGLE
+        a, sigma = changes[by][rows] / parameters.values[rows] / RECTANGLE
         return f"would change A by {a:+.1%} and sigma by {sigma:+.1%}"
 
     if not law:
@@ -175,13 +176,6 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         else:
             text += f"it is taken to stick, and sliding {changed('rod_friction')}."
     return [Message("film_law", text)]
-
-
-def _relative_changes(results: Results, change: FloatArray) -> FloatArray:
-    """Changes of A and of the fitted width over their values."""
-    names = results.parameters.names
-    rows = [names.index("conversion_constant"), names.index("gaussian_sigma")]
-    return change[rows] / results.parameters.values[rows]
 
 
 def _unstated(solution: Solution) -> list[Message]:

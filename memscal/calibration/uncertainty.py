@@ -44,6 +44,7 @@ from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, trian
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, array_record
+from memscal.model.assumptions import MOVED
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
 
@@ -324,7 +325,7 @@ def _effective_degrees(
 def slow_noise_text(estimate: ProfileEstimate, slow: SlowNoise, results: Results) -> str:
     """Say what correlation of the noise is found, and what it does to the uncertainties."""
     parameters = results.parameters
-    rows = [parameters.names.index(name) for name in ("conversion_constant", "gaussian_sigma")]
+    rows = [parameters.names.index(name) for name in MOVED[:2]]
     numbers = results.by_voltage[rows]
     found = np.sum(replace(estimate, slow=slow).scattered(numbers) ** 2, axis=1)
     white = np.sum(replace(estimate, slow=None).scattered(numbers) ** 2, axis=1)

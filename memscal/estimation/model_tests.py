@@ -312,11 +312,9 @@ _ENOUGH = 10_000
 
 
 def clipped_points(estimate: ProfileEstimate) -> BoolArray:
-    """Say which points were held at a ceiling, shape (n,); of a shear none is told."""
+    """Say which points were held at a ceiling, shape (n,), of a channel that is no shear."""
     u = estimate.points.u
     clipped = np.zeros(u.size, dtype=np.bool_)
-    if estimate.points.order:
-        return clipped
     # Noise of each point as if none were an outlier.
     stated = estimate.points.u_errors
     ordinary = estimate.noise_scale * (np.ones_like(u) if stated is None else stated)

@@ -339,7 +339,7 @@ class Posterior:
 
 def reach_of(points: ScanPoints) -> float:
     """Return the radius out to which a scan's stress is computed, in m."""
-    return _REACH * float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
+    return _REACH * points.span
 
 
 def posterior_of(

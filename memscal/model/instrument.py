@@ -1,9 +1,9 @@
 """The instruments of a scan: the sensor, what gave load and position, and who measured."""
 
-from dataclasses import dataclass
+from memscal.model.arrays import keyword_value_record
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class StressSensor:
     """The sensor and the channel whose voltage was recorded.
 
@@ -22,7 +22,7 @@ class StressSensor:
     temperature_uncertainty: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class Equipment:
     """A measuring instrument, such as the stage, with the certificate of its calibration.
 
@@ -42,7 +42,7 @@ class Equipment:
         return self.name == other.name != ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class LoadCell(Equipment):
     """The load cell or balance by which loads were set or read; empty where it is not stated.
 
@@ -51,7 +51,7 @@ class LoadCell(Equipment):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
+@keyword_value_record
 class User:
     """Who measured, and the laboratory: ``name`` and ``affiliation``; empty if not stated.
 
