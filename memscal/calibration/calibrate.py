@@ -15,7 +15,7 @@ from memscal.calibration.assumptions import (
 )
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
-from memscal.calibration.explanations import MISFITS, explained
+from memscal.calibration.explanations import explained
 from memscal.calibration.fields import RasterFields
 from memscal.calibration.film_inference import free_thickness, require_free, weigh_laws
 from memscal.calibration.prepare import Prepared, Reference, Request, prepare
@@ -251,9 +251,7 @@ def calibrate(
     done_with("uncertainties")
     assumptions = assumptions_of(solution, results)
     checks = quality_checks(solution, results, by_other_route, assumptions)
-    explanations: list[dict[str, Any]] = []
-    if not all(check.passed or check.name not in MISFITS for check in checks):
-        checks, explanations = explained(solution, checks)
+    checks, explanations = explained(solution, checks)
     done_with("checks")
     laws = None if relative or solution.stress.form else weigh_laws(solution)
     if not other:

@@ -87,6 +87,8 @@ def explained(
     solution: Solution, checks: Sequence[QualityCheck]
 ) -> tuple[tuple[QualityCheck, ...], list[dict[str, Any]]]:
     """Weigh what explains a misfit; return the checks with what was found, and rows for files."""
+    if not misfit(checks):
+        return tuple(checks), []
     values = {check.name: check.value for check in checks}
     rows = _weighed(solution, values[_EVIDENCE])
     found = f" {explanation(rows)}"
@@ -95,6 +97,11 @@ def explained(
         failed = check.name in _OF_GAUSSIAN and not check.passed
         told.append(replace(check, meaning=check.meaning + found * failed))
     return tuple(told), rows
+
+
+def misfit(checks: Sequence[QualityCheck]) -> bool:
+    """Whether a check failed that asks for an explanation."""
+    return any(check.name in MISFITS and not check.passed for check in checks)
 
 
 def explanation(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -39,8 +39,8 @@ def calibration_messages(
         messages.append(laws.message)
     if prepared.thickness is not None:
         messages += prepared.thickness.messages
-    loads = [s.load if s.normal_load is None else s.normal_load for s in prepared.as_stated]
-    if prepared.reading.per == "Pa" and any(load is None for load in loads):
+    unloaded = [s for s in prepared.as_stated if s.load is None and s.normal_load is None]
+    if prepared.reading.per == "Pa" and unloaded:
         text = (
             "No load is stated: it is taken to be that of the reference, "
             f"{solution.scan.stated_load:.4g} N (--relative takes none)."

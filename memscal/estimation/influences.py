@@ -125,11 +125,12 @@ def _film_changes(
         "base_slip": (reference.values * (sliding / bonded - 1), nothing),
         "shear_sensitivity": (-reference.values * k * shear / bonded, nothing),
     }
-    for name, step in (("poisson_ratio", _STEP_OF_RATIO), ("thickness", _STEP * film.thickness)):
+    step = _STEP * film.thickness
+    # Beyond 1/2 there is no Poisson's ratio.
+    tried = {"poisson_ratio": (-2 * _STEP_OF_RATIO, -_STEP_OF_RATIO), "thickness": (-step, step)}
+    for name, steps in tried.items():
         if getattr(scan.film, f"{name}_uncertainty") is None:
             value = getattr(film, name)
-            # Beyond 1/2 there is no Poisson's ratio.
-            steps = (-2 * step, -step) if name == "poisson_ratio" else (-step, step)
             varied = [set_up._replace(film=replace(film, **{name: value + d})) for d in steps]
             pairs = zip(varied, steps, strict=True)
             by_step = [difference(set_up, reference, more, set_up) / d for more, d in pairs]

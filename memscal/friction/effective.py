@@ -70,14 +70,14 @@ class FrictionFit:
         estimate = self._estimate(both, -2 * logs, chi_square, near)
         budget = dict(estimate.budget)
         interval = estimate.interval
-        share = budget.pop(LUBRICATED_FRICTION, None)
-        if friction > 0:
+        share = budget.get(LUBRICATED_FRICTION)
+        if friction == 0:
+            budget.pop(LUBRICATED_FRICTION, None)
+        else:
             # No friction is at the end of its prior: where it is true, the average alone would
             # exclude the truth in one of five.
             none = self.coefficient_beside(chosen, lubricated, 0.0).interval
             interval = replace(interval, low=min(interval.low, none.low))
-            if share is not None:
-                budget[LUBRICATED_FRICTION] = share
         return replace(
             estimate,
             interval=interval,

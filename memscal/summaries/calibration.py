@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from memscal.calibration.calibrate import Calibration
-from memscal.calibration.explanations import DEPARTURE, MISFITS, explanation
+from memscal.calibration.explanations import DEPARTURE, explanation, misfit
 from memscal.calibration.stages import Misfit
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
@@ -78,7 +78,7 @@ def answer(result: Calibrated) -> str:
         a = a.replace("(relative)", "(relative: the load is not known)")
     law = _dominating_law(apparatus)
     checks = verdict(apparatus.checks)
-    if all(check.passed or check.name not in MISFITS for check in apparatus.checks):
+    if not misfit(apparatus.checks):
         sigma = measured_text(apparatus.parameters, "gaussian_sigma")
         suffices = f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
         return f"{law}Use A = {a}{by}. {checks}\n{suffices}"
