@@ -105,6 +105,9 @@ def input_effects(
         changes["model_form"] = [RECTANGLE * (other.values - own.values) for other, own in pairs]
     effects = {n: InputEffect(-signal_by(estimate, change)) for n, change in changes.items()}
     effects |= _taken_for_granted(scans, estimate) | _load_effects(scans, stresses, estimate)
+    varying = _varying_gain(estimate)
+    if varying:
+        effects["between_repeats"] = InputEffect(np.zeros(estimate.points.u.size), varying)
     if "load" in effects:
         # Beside its scaling: at finite strain a larger load spreads the stress.
         spread = signal_by(estimate, load_sensitivities(scans, model.references))
@@ -154,6 +157,30 @@ def _load_effects(
         apart = (by_scan - by_scan.mean())[estimate.points.scan]
         effects[source] = InputEffect(-apart * signal, -float(by_scan.mean()))
     return effects
+
+
+def _varying_gain(estimate: ProfileEstimate) -> float:
+    """Relative standard uncertainty of A by gains that vary between repeats of one scan."""
+    # By moments, which is the restricted likelihood of repeats that are alike: Hedges, J. Educ.
+    # Stat. 8 (1983) 443.  Weights would favour an ordinary gain, which has fewer outliers.
+    points = estimate.points
+    repeats = np.unique(points.repeat)
+    if repeats.size == 1 or points.owner.any():
+        return 0.0
+    signal = estimate.predicted - estimate.background
+    lines = estimate.model.straight_columns
+    columns = np.column_stack([signal, estimate.weighed.residual, lines])
+    columns = points.standardised(columns, estimate.weights / estimate.noise_scale**2)
+    products = []
+    for repeat in repeats:
+        data, own = np.split(columns[points.repeat == repeat], [2], axis=1)
+        data = data - own @ np.linalg.lstsq(own, data, rcond=None)[0]
+        products.append(data[:, 0] @ data)
+    weight, product = np.transpose(products)
+    # A repeat that tells nothing of its gain lets no variation be found.
+    weight = np.maximum(weight, 1.0)
+    variance = np.var(product / weight, ddof=1) - np.mean(1 / weight)
+    return float(np.sqrt(max(variance, 0.0) / repeats.size))
 
 
 def correlation_matrix(

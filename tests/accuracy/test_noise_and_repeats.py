@@ -19,7 +19,7 @@ from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.accuracy
 
-RASTERS, OUTLIERS, REPEATS = (64, 25, 150) if FULL else (3, 4, 12)
+RASTERS, OUTLIERS, REPEATS, GAINS = (64, 25, 150, 40) if FULL else (3, 4, 12, 4)
 HALF = 8e-3
 ERROR = 10e-6
 
@@ -95,3 +95,21 @@ def test_errors_of_positions_are_as_stated(anew: bool) -> None:
     assert (rms < root_mean_square_limit(1.1, REPEATS, RARE)).all()
     assert (rms > (0.7 if FULL else 0.4)).all()
     assert np.mean(np.abs(deviates) < 2) >= binom.ppf(RARE, 2 * REPEATS, 0.95) / (2 * REPEATS)
+
+
+def test_gains_that_vary_between_repeats_are_estimated_and_counted() -> None:
+    u = ROUND.voltages(line())
+    deviates = []
+    for seed in range(GAINS):
+        rng = np.random.default_rng([seed, 3])
+        varying = rng.normal(1.0, 0.02, (5, 1)) * u + rng.normal(0.0, 0.005 * u.max(), (5, u.size))
+        made = replace(
+            scan(ROUND, 0), u_zz=varying, u_zz_errors=np.full(varying.shape, 0.005 * u.max())
+        )
+        found = memscal.calibrate(replace(made, load_uncertainty=None), other=False).apparatus
+        names = ("conversion_constant", "conversion_constant_gaussian")
+        values = [found.parameters[name] - A for name in names]
+        deviates.append(np.divide(values, [found.parameters.uncertainty(name) for name in names]))
+        assert 0 < found.budget["conversion_constant"]["between_repeats"] < 0.025 * A
+    rms = np.sqrt(np.mean(np.square(deviates), axis=0))
+    assert (rms < root_mean_square_limit(1.2, GAINS, RARE)).all()

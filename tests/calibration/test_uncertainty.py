@@ -99,6 +99,20 @@ def test_the_budget_adds_up_to_the_stated_uncertainty():
         assert total == pytest.approx(apparatus.parameters.uncertainty(name), rel=1e-9)
 
 
+def test_a_gain_that_varies_between_repeats_counts_by_its_standard_deviation():
+    scan = memscal.simulate(seed=1)
+    rng = np.random.default_rng(1)
+    repeats = scan.u_zz + rng.normal(0.0, 0.002 * np.ptp(scan.u_zz), (4, scan.u_zz.size))
+    gain = 1 + 0.01 * np.array([1, -1, 1, -1])
+    shares = []
+    for u in (repeats, gain[:, None] * repeats):
+        found = memscal.calibrate(replace(scan, u_zz=u, u_zz_errors=None), other=False).apparatus
+        line = found.budget["conversion_constant"].get("between_repeats", 0.0)
+        shares.append(line / found.conversion_constant)
+    assert shares[0] < 1e-3
+    assert shares[1] == pytest.approx(gain.std(ddof=1) / 2, rel=0.2)
+
+
 def test_covariances_are_covariances():
     apparatus = memscal.calibrate(memscal.simulate(kernel=TAILS)).apparatus
     for covariance in (apparatus.parameters.covariance, apparatus.radial_profile.g_covariance):
