@@ -264,7 +264,8 @@ def command(
     kept in the notes of the file.
     """
     mesh = hook("is_mesh")(table)
-    options |= {name: options[name] or None for name in ("repeat", "missing", "figures", "holds")}
+    given = ("repeat", "missing", "figures", "holds", "new_position_errors")
+    options |= {name: options[name] or None for name in given}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     figures = options["figures"] or ()
