@@ -3,6 +3,7 @@
 Set MEMSCAL_FULL_STUDY for ten designs of 40 seeds in place of two of 8.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -41,6 +42,7 @@ def random_plan(number: int) -> Plan:
         repeats=int(rng.integers(1, 5)),
         noise=rng.uniform(0.002, 0.01),
         load_uncertainty=0.005,
+        rod_friction=math.inf,
     )
 
 

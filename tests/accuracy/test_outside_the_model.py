@@ -1,6 +1,6 @@
 """What scans do not state: its sizes and what tells it, by scans of another forward calculation.
 
-Set MEMSCAL_FULL_STUDY for 30 runs and 60 draws a row in place of 10 and 12.
+Set MEMSCAL_FULL_STUDY for 30 runs and 60 draws a row in place of 6 and 6.
 """
 
 import csv
@@ -97,7 +97,7 @@ def test_what_a_scan_does_not_state_is_counted_alarmed_or_named_as_the_page_says
 
 def test_a_tail_shows_at_little_noise_beside_a_baseline_stated_as_straight() -> None:
     row = ROWS["tail of G of 3 mm"]
-    world = row.world(row.size_at(3.0))
+    world = row.world(row.sizes_at([3.0])[0])
     failed = 0
     for seed in range(RUNS):
         scan = replace(perturbed_scan(world, seed, noise=0.001), baseline_curvature_uncertainty=0.0)
@@ -107,7 +107,7 @@ def test_a_tail_shows_at_little_noise_beside_a_baseline_stated_as_straight() -> 
 
 def test_a_lag_shows_where_the_line_is_scanned_back() -> None:
     row = ROWS["lag along the line"]
-    lag = row.size_at(3.0)
+    lag = row.sizes_at([3.0])[0]
     scan = perturbed_scan(row.world(lag), 0)
     back = perturbed_scan(row.world(-lag), 1)
     voltages = np.vstack([scan.u_zz, back.u_zz])

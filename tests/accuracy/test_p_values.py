@@ -91,9 +91,14 @@ def test_uncertain_positions_are_noise_of_every_chi_square() -> None:
 
 def test_clean_scans_hardly_ever_fail_a_check() -> None:
     settings = [
-        {}, {"noise": 0.02}, {"noise": 0.001}, {"state_noise": False}, {"repeats": 3, "points": 33},
-        {"load": [0.0025, 0.005, 0.0075], "points": 33}, {"repeats": 2, "points": 33, "branch": [1, 2]},
-    ]  # fmt: skip
+        {},
+        {"noise": 0.02},
+        {"noise": 0.001},
+        {"state_noise": False},
+        {"repeats": 3, "points": 33},
+        {"load": [0.0025, 0.005, 0.0075], "points": 33},
+        {"repeats": 2, "points": 33, "branch": [1, 2]},
+    ]
     failed = run = 0
     for seed in range(SEEDS):
         # Light enough for a linear film.

@@ -8,7 +8,7 @@ from it are counted, at two and at three; where a calibration names a size, it i
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -20,8 +20,8 @@ from helpers.outside import scan as perturbed_scan
 import memscal
 from memscal import ApparatusFunction, Scan
 
-RUNS = 30 if FULL else 10
-DRAWS = 60 if FULL else 12
+RUNS = 30 if FULL else 6
+DRAWS = 60 if FULL else 6
 TRUTHS = {"conversion_constant": A, "gaussian_sigma": SIGMA}
 SYMBOLS = {"conversion_constant": "A", "gaussian_sigma": "σ"}
 #: Sizes are tried up to this factor of the first one, each larger by this ratio.
@@ -92,19 +92,18 @@ class Row:
         p = apparatus.parameters
         return (p[self.parameter] - TRUTHS[self.parameter]) / p.uncertainty(self.parameter)
 
-    def size_at(self, deviation: float) -> float:
-        """Size at which the mean error is so many uncertainties; infinite if none is."""
+    def sizes_at(self, deviations: Sequence[float]) -> list[float]:
+        """Sizes at which the mean error is so many uncertainties; infinite if none is."""
         exact = self.deviation(self.calibrated(0.0))
         tried = [0.0]
         found = [0.0]
         size = self.first
-        while size < _FARTHEST * self.first:
+        while size < _FARTHEST * self.first and found[-1] < max(deviations):
             tried.append(size)
             found.append(abs(self.deviation(self.calibrated(size)) - exact))
-            if found[-1] >= deviation:
-                return float(np.interp(deviation, found[-2:], tried[-2:]))
             size *= _RATIO
-        return math.inf
+        largest = np.maximum.accumulate(found)
+        return [float(np.interp(each, largest, tried, right=np.inf)) for each in deviations]
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,7 @@ class Outcome:
 @lru_cache
 def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
     """Run one row of the study."""
-    two = row.size_at(2.0)
-    three = row.size_at(3.0)
+    two, three = row.sizes_at((2.0, 3.0))
     failed: Counter[str] = Counter()
     alarmed = math.nan
     if math.isfinite(three):
