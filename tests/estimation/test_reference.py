@@ -21,13 +21,6 @@ POINTS = measured_points(SCAN)
 CONTACT = memscal.indent(SCAN.film, SCAN.indenter, load=1.0)
 
 
-def test_a_table_of_the_contact_has_the_contact_s_transform() -> None:
-    exact = reference_spectrum(CONTACT, POINTS)
-    table = reference_spectrum(CONTACT.profile(), POINTS, exact.wavenumbers)
-    np.testing.assert_allclose(table.values, exact.values, atol=1e-6)
-    assert exact.integral == pytest.approx(1.0, abs=1e-9)
-
-
 def test_the_order_of_preference_is_given_then_carried_then_solved() -> None:
     other = CONTACT.profile()
     carrying = replace(SCAN, reference=other)

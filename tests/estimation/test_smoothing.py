@@ -53,20 +53,6 @@ def test_a_ring_in_the_voltages_is_followed_by_the_division(width: float) -> Non
         assert followed["bayesian", q] < 0.8 < followed["white-noise", q] < 1.2
 
 
-@pytest.mark.parametrize("place", [10, 25, 32, 40])
-def test_an_outlier_of_the_estimate_moves_no_division(place: int) -> None:
-    scan = simulated(noise=0.005)
-    u = scan.u_zz.copy()
-    u[place] += 20 * scan.u_zz_errors[place]
-    spoilt = replace(scan, u_zz=u)
-    weight = estimated(spoilt).outlier_weight
-    assert weight[place] < 0.01
-    assert np.sum(weight < 0.5) == 1
-    usual, again = (memscal.calibrate(s).apparatus for s in (scan, spoilt))
-    shift = abs(again.conversion_constant - usual.conversion_constant)
-    assert shift < 0.5 * usual.parameters.uncertainty("conversion_constant")
-
-
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), DISC, RING, TAILS])
 def test_a_scan_without_noise_is_its_own_profile(kernel: memscal.RadialKernel) -> None:
     smoothed = smooth_profile(estimated(simulated(noise=0.0, kernel=kernel)))
