@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from helpers.scans import LINEAR_FILM, TAILS, simulated
+from helpers.scans import LINEAR_FILM, simulated
 
 import memscal
 from memscal.calibration.explanations import DEPARTURE, explanation
@@ -49,13 +49,6 @@ def test_nothing_is_weighed_where_the_checks_pass() -> None:
     good = memscal.calibrate(simulated(seed=3))
     assert "explanations" not in good.to_dict()
     assert "suffices" in good.answer()
-
-
-def test_tails_are_named_as_such() -> None:
-    result = memscal.calibrate(simulated(kernel=TAILS, noise=0.001))
-    rows = result.to_dict()["explanations"]
-    assert DEPARTURE in [row["name"] for row in rows if row["named"]]
-    assert "is explained by a G that is not Gaussian" in result.answer()
 
 
 def row(name: str, named: bool = True) -> dict:

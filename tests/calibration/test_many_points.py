@@ -67,33 +67,6 @@ def test_a_correlation_of_neighbours_that_is_none_is_refused(band, found):
     assert found in str(refusal.value)
 
 
-def test_noise_of_many_points_may_be_correlated_with_neighbours(tmp_path):
-    scan = simulate(points=2001, noise=0.0, seed=1)
-    # A moving average of independent noise.
-    share = np.array([1.0, 0.5, 0.25]) / np.sqrt(1.3125)
-    independent = np.random.default_rng(1).standard_normal(2003)
-    size = 0.005 * scan.u_zz.max()
-    noise = size * np.convolve(independent, share, mode="valid")
-    band = np.tile([1.0, 0.625 / 1.3125, 0.25 / 1.3125], (2001, 1))
-    band[-1, 1:] = 0.0
-    band[-2, 2] = 0.0
-    errors = np.full(scan.u_zz.shape, size)
-    scan = replace(scan, u_zz=scan.u_zz + noise, u_zz_errors=errors, u_zz_correlation=band)
-    memscal.write_scan(scan, tmp_path / "scan.h5")
-    apart, alone = (
-        memscal.calibrate(s).apparatus
-        for s in (memscal.read_scan(tmp_path / "scan.h5"), replace(scan, u_zz_correlation=None))
-    )
-    # The variance of a mean over many neighbours is 1 + 2 (0.476 + 0.190) times as large.
-    ratio = apart.budget["gaussian_sigma"]["noise"] / alone.budget["gaussian_sigma"]["noise"]
-    assert ratio**2 == pytest.approx(7 / 3, rel=0.03)
-    passed = [
-        {check.name: check.passed for check in a.checks}["residual_correlation"]
-        for a in (apart, alone)
-    ]
-    assert passed == [True, False]
-
-
 def with_an_outlier(scan: Scan) -> Scan:
     u = scan.u_zz.copy()
     u[..., 20] += 0.3 * np.ptp(u)
@@ -113,6 +86,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         {"centre": "per-repeat"},
     ),
     "correlated noise": (correlated(LINE), {}),
+    "correlated with neighbours": (correlated_with_neighbours(LINE, 4)[1], {}),
     "outlier": (with_an_outlier(LINE), {}),
     "loads": ([simulate(noise=0.005, seed=i, load=0.1 * i) for i in (1, 2, 3)], {}),
     "source": (LINE, {"reference": "disc:0.4mm"}),

@@ -33,13 +33,14 @@ def bare():
     return memscal.calibrate(without_set_up(), reference=BARE).apparatus
 
 
-def numbers(apparatus):
-    names = [
-        n
-        for n in apparatus.parameters.names
-        if n not in ("baseline", "drift", "baseline_curvature")
-    ]
-    return np.array([[apparatus.parameters[n], apparatus.parameters.uncertainty(n)] for n in names])
+def numbers(apparatus, conversion=1.0):
+    """Parameters beside the baseline's and their uncertainties, A times a factor, (n, 2)."""
+    rows = []
+    for name in apparatus.parameters.names:
+        if name not in ("baseline", "drift", "baseline_curvature"):
+            row = np.array([apparatus.parameters[name], apparatus.parameters.uncertainty(name)])
+            rows.append(row * (conversion if "conversion_constant" in name else 1.0))
+    return np.array(rows)
 
 
 @pytest.mark.parametrize(
@@ -59,12 +60,7 @@ def test_readings_in_another_unit_are_volts_times_a_factor(bare, tmp_path, unit,
     np.testing.assert_allclose(stored.u_zz, scan.u_zz, rtol=1e-14)
     apparatus = memscal.calibrate(stored, reference=BARE).apparatus
     assert apparatus.to_dict()["conversion_constant"]["unit"] == shown
-    scale = np.ones((len(numbers(bare)), 1))
-    names = [
-        n for n in bare.parameters.names if n not in ("baseline", "drift", "baseline_curvature")
-    ]
-    scale[["conversion_constant" in name for name in names]] = factor
-    np.testing.assert_allclose(numbers(apparatus), scale * numbers(bare), rtol=1e-6)
+    np.testing.assert_allclose(numbers(apparatus), numbers(bare, factor), rtol=1e-6)
     apparatus.save(tmp_path / "sensor.h5")
     again = memscal.load_apparatus(tmp_path / "sensor.h5")
     np.testing.assert_allclose(numbers(again), numbers(apparatus), rtol=1e-12)
