@@ -29,6 +29,10 @@ NOTEBOOKS = DOCS.with_name("notebooks")
 FRONT = ("README.md", "CHANGELOG.md")
 
 
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
 def cells_of(line: str) -> list[str]:
     return [cell.strip() for cell in line.split("|")[1:-1]]
 
@@ -48,7 +52,7 @@ def sphere_table(ratio: float) -> dict[tuple[str, str], list[str]]:
 
 
 def stated_rows(section: str) -> list[list[str]]:
-    text = (DOCS / "sphere.md").read_text(encoding="utf-8").split(f"## {section}\n")[1]
+    text = text_of(DOCS / "sphere.md").split(f"## {section}\n")[1]
     return [cells_of(line) for line in text.split("##")[0].splitlines() if line.startswith("| ")][
         1:
     ]
@@ -95,7 +99,7 @@ def kinds() -> dict[str, list[dict[str, str]]]:
     ],
 )
 def test_a_page_sums_up_the_study_of_the_bayesian_estimate(page, columns, kinds) -> None:
-    text = (DOCS / page).read_text(encoding="utf-8")
+    text = text_of(DOCS / page)
     rows = [cells_of(line) for line in text.splitlines() if line.startswith("| ")]
     found = {row[0].split(",")[0]: row for row in rows if row[0].split(",")[0] in kinds}
     for kind, cases in kinds.items():
@@ -122,16 +126,16 @@ def test_every_notebook_has_its_script_and_says_the_same() -> None:
 
 def blocks(page: str, language: str) -> list[str]:
     """Return the blocks of code of a page."""
-    text = (DOCS / page).read_text(encoding="utf-8")
+    text = text_of(DOCS / page)
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
 def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives() -> None:
-    page = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    page = text_of(DOCS / "troubleshooting.md")
     quoted = re.findall(r"^\| `(.+?)`", page, flags=re.MULTILINE)
     assert len(quoted) > 20
     package = Path(memscal.__path__[0])
-    sources = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
+    sources = "".join(text_of(path) for path in package.rglob("*.py"))
     joined = re.sub(r'"\s+f?"', "", sources)  # a text over several lines
     filled = re.sub("…+", "…", re.sub(r"\{[^{}]*\}", "…", joined))
     assert [message for message in quoted if message not in filled] == []
@@ -140,7 +144,7 @@ def test_every_message_of_the_troubleshooting_page_is_one_that_memscal_gives() -
 def test_every_option_in_the_documentation_exists() -> None:
     unknown = []
     for page in (*DOCS.glob("*.md"), DOCS.with_name("README.md")):
-        text = page.read_text(encoding="utf-8").replace("\\\n", "")
+        text = text_of(page).replace("\\\n", "")
         for line in re.findall(r"^memscal .*", text, flags=re.MULTILINE):
             name, *arguments = shlex.split(line.split(" > ")[0], comments=True)[1:]
             command = program.get_command(None, name)
@@ -148,14 +152,6 @@ def test_every_option_in_the_documentation_exists() -> None:
             given = {word for word in arguments if re.match("--?[a-z]", word)}
             unknown += [(page.name, line, option) for option in given - known]
     assert unknown == []
-
-
-def test_the_page_on_tables_imports_the_shipped_ones(tmp_path: Path, monkeypatch) -> None:
-    for table in DOCS.with_name("calibration_data").glob("tables/*.csv"):
-        shutil.copy(table, tmp_path)
-    monkeypatch.chdir(tmp_path)
-    for line in "".join(blocks("import_tables.md", "console")).splitlines():
-        assert main(shlex.split(line)[1:]) == 0, line
 
 
 def follow(page: str, run: Run) -> dict[str, Outcome]:
@@ -167,9 +163,15 @@ def follow(page: str, run: Run) -> dict[str, Outcome]:
     return outcomes
 
 
+def test_the_page_on_tables_imports_the_shipped_ones(folder: Path, run: Run) -> None:
+    for table in DOCS.with_name("calibration_data").glob("tables/*.csv"):
+        shutil.copy(table, folder)
+    follow("import_tables.md", run)
+
+
 def run_examples(page: str) -> dict[str, object]:
-    """Run the Python of a page; return its names."""
-    names: dict[str, object] = {}
+    """Run the Python of a page, as a module of its name; return its names."""
+    names: dict[str, object] = {"__name__": page.removesuffix(".md")}
     for example in blocks(page, "python"):
         exec(compile(example, page, "exec"), names)
     return names
@@ -227,7 +229,7 @@ def test_the_examples_of_the_page_on_python_run(folder: Path) -> None:
 
 
 def test_the_citation_names_the_version() -> None:
-    citation = DOCS.with_name("CITATION.cff").read_text(encoding="utf-8")
+    citation = text_of(DOCS.with_name("CITATION.cff"))
     assert f"\nversion: {memscal.__version__}\n" in citation
 
 
@@ -236,7 +238,7 @@ def test_every_public_name_has_an_example_that_runs_and_a_place_in_the_reference
     public = {name: getattr(memscal, name) for name in memscal.__all__ if name[0] != "_"}
     own = {name: thing for name, thing in public.items() if not isinstance(thing, UnionType)}
     assert [name for name, thing in own.items() if ">>>" not in (inspect.getdoc(thing) or "")] == []
-    listed = re.findall(r"^   (\w+)$", (DOCS / "api.md").read_text(encoding="utf-8"), re.MULTILINE)
+    listed = re.findall(r"^   (\w+)$", text_of(DOCS / "api.md"), re.MULTILINE)
     assert sorted(listed) == sorted(public)
 
 
@@ -244,24 +246,22 @@ def test_pages_teach_public_names_only() -> None:
     rooms = [path.name for path in Path(memscal.__path__[0]).iterdir() if path.is_dir()]
     private = re.compile(rf"(?<!click:: )\bmemscal\.({'|'.join(rooms)})\.")
     pages = [*DOCS.glob("*.md"), DOCS.with_name("README.md")]
-    found = [
-        (page.name, name) for page in pages for name in private.findall(page.read_text("utf-8"))
-    ]
+    found = [(page.name, name) for page in pages for name in private.findall(text_of(page))]
     assert found == []
 
 
 def test_every_page_can_be_reached_from_the_start_page() -> None:
-    start = (DOCS / "index.md").read_text(encoding="utf-8")
+    start = text_of(DOCS / "index.md")
     linked = set(re.findall(r"\]\((\w+\.md)", start))
-    trees = "".join(re.findall(r"^```{toctree}\n(.*?)^```$", start, re.MULTILINE | re.DOTALL))
+    trees = "".join(blocks("index.md", "{toctree}"))
     in_tree = {f"{name}.md" for name in re.findall(r"^(\w+)$", trees, re.MULTILINE)}
     written = {page.name for page in DOCS.glob("*.md")} - {"index.md"}
     assert (linked, in_tree) == (written, written)
 
 
 def test_a_page_is_read_in_minutes() -> None:
-    pages = {page: len(page.read_text(encoding="utf-8").split()) for page in DOCS.glob("*.md")}
-    front = [len(DOCS.with_name(name).read_text(encoding="utf-8").split()) for name in FRONT]
+    pages = {page: len(text_of(page).split()) for page in DOCS.glob("*.md")}
+    front = [len(text_of(DOCS.with_name(name)).split()) for name in FRONT]
     assert {page.name: count for page, count in pages.items() if count > 1200} == {}
     assert front[0] <= 1300
     assert sum(pages.values()) + sum(front) <= 38_000
@@ -270,9 +270,7 @@ def test_a_page_is_read_in_minutes() -> None:
 def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, capsys) -> None:
     monkeypatch.chdir(DOCS.with_name("calibration_data"))
     monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
-    names: dict[str, object] = {"__name__": "own_method"}
-    for block in blocks("own_method.md", "python"):
-        exec(compile(block, "own_method.md", "exec"), names)
+    names = run_examples("own_method.md")
     assert "(method richardson-lucy)" in capsys.readouterr().out
     spiked = memscal.calibrate(names["scan"], method=names["UnsupervisedWiener"]()).apparatus
     assert [c.name for c in spiked.checks if not c.passed and c.name.startswith("shape_")]
@@ -300,7 +298,7 @@ def test_the_recipe_with_pymeasure_records_a_scan_that_can_be_calibrated(
 
 
 def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine() -> None:
-    books = {book: book.read_text(encoding="utf-8") for book in NOTEBOOKS.glob("*.ipynb")}
+    books = {book: text_of(book) for book in NOTEBOOKS.glob("*.ipynb")}
     for book, text in books.items():
         assert text.count('"image/png": "') > 3, book.name
         words = re.sub(r'"image/png": "[^"]*"', "", text)
@@ -311,10 +309,10 @@ def test_notebooks_are_stored_with_outputs_and_nothing_of_a_machine() -> None:
 
 
 def test_every_picture_is_there_with_words_and_made_by_a_command_or_script_of_the_page() -> None:
-    readme = DOCS.with_name("README.md").read_text(encoding="utf-8")
-    page = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    readme = text_of(DOCS.with_name("README.md"))
+    page = text_of(DOCS / "gallery.md")
     shown = re.findall(r"!\[(.+)\]\(images/([\w-]+)\.png\)", page)
-    commands = "".join(re.findall(r"^```console\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
+    commands = "".join(blocks("gallery.md", "console"))
     assert len(shown) >= 15
     for caption, name in shown:
         assert len(caption) > 20

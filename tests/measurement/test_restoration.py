@@ -99,45 +99,45 @@ def test_the_direct_comparison_has_the_chi_square_of_its_degrees() -> None:
     assert abs(total / degrees - 1) < 4 * np.sqrt(2 / degrees)
 
 
-def test_an_uncertain_conversion_constant_makes_every_stress_as_uncertain() -> None:
-    scan = made.sphere_scan(made.pressed(), seed=2)
-    found = memscal.restore(scan, made.known_apparatus(conversion_uncertainty=0.02))
-    assert found.force_budget["apparatus"] == pytest.approx(0.02 * found.force, rel=0.05)
-    r = np.linspace(0, 2e-3, 5)
-    expected = 0.02 * found.stress(r)
-    np.testing.assert_allclose(apparatus_part(found, "apparatus", r), expected, rtol=0.05)
+SHARE = 0.01
+QUIET = made.sphere_scan(made.pressed(), noise=0.001, seed=2)
+UNSURE, THICKER = (
+    replace(QUIET.film, **{name: size * QUIET.film.thickness})
+    for name, size in (("thickness_uncertainty", SHARE), ("thickness", 1 + SHARE))
+)
+STRONGER = replace(QUIET, u_zz=(1 + SHARE) * QUIET.u_zz)
 
 
-def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
-    scan = made.sphere_scan(made.pressed(), noise=0.001, seed=2)
-    r = np.array([0.0, 1e-3, 3e-3])
-    share = 0.02
-    found = memscal.restore(scan, made.known_apparatus(width_uncertainty=share))
-    changed = memscal.restore(scan, made.known_apparatus(wider(share)))
-    difference = np.abs(changed.stress(r) - found.stress(r))
-    allowed = 0.35 * difference.max()
-    np.testing.assert_allclose(apparatus_part(found, "apparatus", r), difference, atol=allowed)
-
-
-@pytest.mark.parametrize("source", ["position_scale", "film"])
-def test_an_uncertain_input_counts_as_much_as_it_changes(source: str) -> None:
-    scan = made.sphere_scan(made.pressed(), noise=0.001, seed=2)
-    r = np.array([0.0, 1.5e-3, 3e-3])
-    share = 0.01
-    if source == "film":
-        film = replace(scan.film, thickness_uncertainty=share * scan.film.thickness)
-        other = replace(scan.film, thickness=(1 + share) * scan.film.thickness)
-        stated = replace(scan, film=film)
-        wrong = replace(scan, film=other)
-    else:
-        stated = replace(scan, position_scale_uncertainty=share)
-        wrong = replace(scan, x=(1 + share) * scan.x)
-    found = memscal.restore(stated, EXACT)
-    changed = memscal.restore(wrong, EXACT, override=True)
+@pytest.mark.parametrize(
+    ("source", "stated", "wrong"),
+    [
+        (
+            "position_scale",
+            (replace(QUIET, position_scale_uncertainty=SHARE), EXACT),
+            (replace(QUIET, x=(1 + SHARE) * QUIET.x), EXACT),
+        ),
+        ("film", (replace(QUIET, film=UNSURE), EXACT), (replace(QUIET, film=THICKER), EXACT)),
+        (
+            "apparatus",
+            (QUIET, made.known_apparatus(width_uncertainty=SHARE)),
+            (QUIET, made.known_apparatus(wider(SHARE))),
+        ),
+        (
+            "apparatus",
+            (QUIET, made.known_apparatus(conversion_uncertainty=SHARE)),
+            (STRONGER, EXACT),
+        ),
+    ],
+    ids=["position scale", "film", "width of G", "conversion constant"],
+)
+def test_what_is_uncertain_counts_as_much_as_it_changes(source, stated, wrong) -> None:
+    r = np.array([0.0, 1e-3, 1.5e-3, 3e-3])
+    found = memscal.restore(*stated)
+    changed = memscal.restore(*wrong, override=True)
     difference = np.append(changed.stress(r) - found.stress(r), changed.force - found.force)
     counted = np.append(apparatus_part(found, source, r), found.force_budget[source])
     size = np.append(np.full(r.size, found.sigma_zz[0]), found.force)
-    np.testing.assert_allclose(counted / size, np.abs(difference) / size, atol=3e-3)
+    np.testing.assert_allclose(counted / size, np.abs(difference) / size, atol=5e-4)
 
 
 def test_less_noise_resolves_more() -> None:
