@@ -23,8 +23,8 @@ def stating(certificate: Certificate, section: str, **values: str) -> Certificat
 
 def test_the_page_states_values_and_conditions_and_ends_with_its_mark(certificate):
     text = text_of(certificate)
-    # A = 1.01731(180)e-4 mV/Pa and σ = 0.5596(145) mm with k = 1 in the shipped artifact.
-    stated = ["(1.017 ± 0.036)×10⁻⁴ mV/Pa", "(0.560 ± 0.029) mm", "y ± U (k = 2)"]
+    # A = 1.00665(1974)e-4 mV/Pa and σ = 0.5574(147) mm with k = 1 in the shipped artifact.
+    stated = ["(1.007 ± 0.039)×10⁻⁴ mV/Pa", "(0.557 ± 0.029) mm", "y ± U (k = 2)"]
     stated += ["(23.00 ± 0.60) °C", "(45.0 ± 6.0) %"]
     assert [value for value in stated if value not in text] == []
     assert text.strip().endswith(f"— End of certificate {certificate.number} —")
@@ -34,10 +34,10 @@ def test_a_factor_of_coverage_is_that_of_its_degrees_of_freedom(apparatus, labor
     configuration = {"effective_degrees": {"conversion_constant": 10.0}}
     process = replace(apparatus.process, configuration=configuration)
     certificate = certify(replace(apparatus, process=process), laboratory)
-    # u(A) is 0.0180e-4 mV/Pa, and k = 2.28 by table G.2 of the GUM.
+    # u(A) is 0.0197e-4 mV/Pa, and k = 2.28 by table G.2 of the GUM.
     text = text_of(certificate)
     assert "y ± U (k = 2 to 2.28)" in text
-    assert "(1.017 ± 0.041)×10⁻⁴ mV/Pa" in text
+    assert "(1.007 ± 0.045)×10⁻⁴ mV/Pa" in text
     listed = re.findall(r"coverageFactorXMLList>([^<]+)<", certificate_xml(certificate).decode())
     assert [round(float(factor), 2) for factor in listed[0].split()[:2]] == [2.28, 2.0]
 
