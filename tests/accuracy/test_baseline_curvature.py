@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.outside import ROUND, SIGMA, A
+from helpers.outside import ROUND
 from helpers.outside import scan as perturbed_scan
+from helpers.outside_study import TRUTHS, deviates
 from scipy.stats import norm
 
 import memscal
@@ -19,7 +20,6 @@ pytestmark = pytest.mark.accuracy
 
 SEEDS = 40 if FULL else 10
 CHANCE = 1e-4
-TRUTHS = {"conversion_constant": A, "gaussian_sigma": SIGMA}
 METHODS = ("white-noise", "bayesian")
 
 
@@ -36,7 +36,7 @@ def found(method: str, parabola: float, held: bool) -> tuple[np.ndarray, np.ndar
             scan = replace(scan, baseline_curvature_uncertainty=0.0)
         apparatus = memscal.calibrate(scan, method=method, other=False).apparatus
         p = apparatus.parameters
-        z.append([(p[name] - truth) / p.uncertainty(name) for name, truth in TRUTHS.items()])
+        z.append(deviates(p))
         u.append([p.uncertainty(name) / truth for name, truth in TRUTHS.items()])
         passed.append(apparatus.passed)
     return np.array(z), np.array(u), np.array(passed)

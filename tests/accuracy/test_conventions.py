@@ -11,6 +11,7 @@ import pytest
 from accuracy.test_design import scan_of
 from helpers.bounds import FULL
 from helpers.direct import direct_scan
+from helpers.outside_study import deviates
 from helpers.scans import CONVERSION, GAUSSIAN, SIGMA, TAILS, simulate
 from scipy.stats import chi2, norm
 
@@ -45,7 +46,7 @@ def deviations(scans: list[Scan], **options: object) -> np.ndarray:
     rows = []
     for scan in scans:
         p = memscal.calibrate(scan, other=False, **options).apparatus.parameters
-        rows.append([(p[name] - truth) / p.uncertainty(name) for name, truth in TRUTHS.items()])
+        rows.append(deviates(p, TRUTHS))
     return np.array(rows)
 
 

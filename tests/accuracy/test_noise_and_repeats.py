@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL, RARE, root_mean_square_limit
 from helpers.outside import ROUND, SIGMA, A, line, scan
+from helpers.outside_study import deviates
 from scipy.interpolate import make_interp_spline
 from scipy.stats import binom
 
@@ -22,10 +23,6 @@ pytestmark = pytest.mark.accuracy
 RASTERS, OUTLIERS, REPEATS, GAINS = (64, 25, 150, 40) if FULL else (3, 4, 12, 4)
 HALF = 8e-3
 ERROR = 10e-6
-
-
-def fails(made: memscal.ApparatusFunction) -> bool:
-    return any(not check.passed for check in made.checks)
 
 
 @lru_cache
@@ -44,7 +41,7 @@ def test_a_good_raster_of_unknown_noise_fails_a_check_as_rarely_as_is_meant() ->
         for seed in range(RASTERS):
             noise = np.random.default_rng([seed, side]).normal(0.0, 0.005 * u.max(), u.shape)
             raster = replace(scan(ROUND, 0), x=x, y=x, u_zz=u + noise, u_zz_errors=None)
-            failed += fails(memscal.calibrate(raster, other=False).apparatus)
+            failed += not memscal.calibrate(raster, other=False).passed
     # Ten of the checks are tests at 1/1000.
     assert failed <= binom.isf(RARE, len(sides) * RASTERS, 0.01)
 
@@ -53,7 +50,7 @@ def test_a_good_raster_of_unknown_noise_fails_a_check_as_rarely_as_is_meant() ->
 def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_other_route(
     share: float,
 ) -> None:
-    deviates = []
+    off = []
     for seed in range(OUTLIERS):
         made = scan(ROUND, seed)
         rng = np.random.default_rng([seed, 1])
@@ -64,8 +61,8 @@ def test_outliers_move_a_division_by_its_uncertainty_from_the_truth_and_the_othe
         assert apparatus.other is not None
         bayesian = apparatus.other.parameters["conversion_constant"]
         error = apparatus.conversion_constant - np.array([A, bayesian])
-        deviates.append(error / apparatus.parameters.uncertainty("conversion_constant"))
-    rms = np.sqrt(np.mean(np.square(deviates), axis=0))
+        off.append(error / apparatus.parameters.uncertainty("conversion_constant"))
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
     assert (rms < root_mean_square_limit(1.0, OUTLIERS, RARE)).all()
 
 
@@ -76,7 +73,7 @@ def test_errors_of_positions_are_as_stated(anew: bool) -> None:
     film: Any = {"thickness_uncertainty": None, "poisson_ratio_uncertainty": None}
     stated = scan(ROUND, 0)
     stated = replace(stated, load_uncertainty=None, film=replace(stated.film, **film))
-    deviates = []
+    off = []
     for seed in range(REPEATS):
         rng = np.random.default_rng([seed, 11])
         moved = line() + ERROR * rng.normal(size=(3 if anew else 1, line().size))
@@ -89,17 +86,17 @@ def test_errors_of_positions_are_as_stated(anew: bool) -> None:
             new_position_errors=anew,
         )
         found = memscal.calibrate(made).apparatus.parameters
-        sigma = (found["gaussian_sigma"] - SIGMA) / found.uncertainty("gaussian_sigma")
-        deviates.append([sigma, found["centre"] / found.uncertainty("centre")])
-    rms = np.sqrt(np.mean(np.square(deviates), axis=0))
+        off.append(deviates(found, {"gaussian_sigma": SIGMA, "centre": 0.0}))
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
     assert (rms < root_mean_square_limit(1.1, REPEATS, RARE)).all()
     assert (rms > (0.7 if FULL else 0.4)).all()
-    assert np.mean(np.abs(deviates) < 2) >= binom.ppf(RARE, 2 * REPEATS, 0.95) / (2 * REPEATS)
+    assert np.mean(np.abs(off) < 2) >= binom.ppf(RARE, 2 * REPEATS, 0.95) / (2 * REPEATS)
 
 
 def test_gains_that_vary_between_repeats_are_estimated_and_counted() -> None:
     u = ROUND.voltages(line())
-    deviates = []
+    names = ("conversion_constant", "conversion_constant_gaussian")
+    off = []
     for seed in range(GAINS):
         rng = np.random.default_rng([seed, 3])
         varying = rng.normal(1.0, 0.02, (5, 1)) * u + rng.normal(0.0, 0.005 * u.max(), (5, u.size))
@@ -107,9 +104,7 @@ def test_gains_that_vary_between_repeats_are_estimated_and_counted() -> None:
             scan(ROUND, 0), u_zz=varying, u_zz_errors=np.full(varying.shape, 0.005 * u.max())
         )
         found = memscal.calibrate(replace(made, load_uncertainty=None), other=False).apparatus
-        names = ("conversion_constant", "conversion_constant_gaussian")
-        values = [found.parameters[name] - A for name in names]
-        deviates.append(np.divide(values, [found.parameters.uncertainty(name) for name in names]))
+        off.append(deviates(found.parameters, dict.fromkeys(names, A)))
         assert 0 < found.budget["conversion_constant"]["between_repeats"] < 0.025 * A
-    rms = np.sqrt(np.mean(np.square(deviates), axis=0))
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
     assert (rms < root_mean_square_limit(1.2, GAINS, RARE)).all()

@@ -141,14 +141,10 @@ def test_departures_are_as_strong_as_was_chosen_on_other_contacts(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_no_contact_is_left_out_of_the_band(case: str) -> None:
-    within = np.concatenate([study(case, noise)[:, 0] for noise in NOISES])
-    assert within.mean() > 0.90 - SIGMAS * within.std() / np.sqrt(within.size)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_error_is_about_as_large_as_stated(case: str) -> None:
+def test_no_contact_is_left_out_of_the_band_or_has_another_error_than_stated(case: str) -> None:
     found = np.concatenate([study(case, noise) for noise in NOISES])
+    within = found[:, 0]
+    assert within.mean() > 0.90 - SIGMAS * within.std() / np.sqrt(within.size)
     error, stated = np.mean(found[:, 1:3] ** 2, axis=0)
     assert 0.3 < np.sqrt(error / stated) < 1.5
 

@@ -10,7 +10,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
-from helpers.outside import FILM, ROUND, SIGMA, A, line, scan
+from helpers.outside import FILM, ROUND, line, scan
+from helpers.outside_study import TRUTHS, deviates
 from scipy.signal import lfilter
 
 from memscal.calibration.calibrate import Calibration, calibrate, uncertainties
@@ -18,7 +19,6 @@ from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.accuracy
 
-TRUTH = {"conversion_constant": A, "gaussian_sigma": SIGMA}
 COUNT = 100 if FULL else 40
 """Scans without an alarm."""
 CHANCE = 1e-3
@@ -71,15 +71,9 @@ WHITE = correlated(0.0, 0.0, 0.005)
 def errors(calibration: Calibration) -> dict[str, float]:
     """Errors of A by both routes and of sigma over their stated uncertainties."""
     apparatus = calibration.apparatus
-    parameters = apparatus.parameters
-    found = {
-        name: (parameters[name] - true) / parameters.uncertainty(name)
-        for name, true in TRUTH.items()
-    }
-    other = apparatus.other
-    assert other is not None
-    name = "conversion_constant"
-    found["bayesian"] = (other.parameters[name] - A) / other.parameters.uncertainty(name)
+    found = dict(zip(TRUTHS, deviates(apparatus.parameters), strict=True))
+    assert apparatus.other is not None
+    found["bayesian"] = deviates(apparatus.other.parameters)[0]
     return found
 
 
@@ -112,7 +106,7 @@ def test_white_noise_is_at_most_a_tenth_wider():
         white = replace(solution, estimate=replace(solution.estimate, slow=None))
         results = uncertainties(white, white.deconvolution, calibration.effects, {})
         parameters = calibration.apparatus.parameters
-        by_name = [parameters.uncertainty(n) / results.parameters.uncertainty(n) for n in TRUTH]
+        by_name = [parameters.uncertainty(n) / results.parameters.uncertainty(n) for n in TRUTHS]
         growth.append(by_name)
     mean = np.mean(growth, axis=0)
     of_mean = np.std(growth, axis=0) / np.sqrt(len(growth))
@@ -126,7 +120,7 @@ def test_the_coverage_factor_holds_for_21_points():
         calibration = calibration_of(seed, WHITE, step=0.8e-3)
         factor = calibration.apparatus.coverage_factor
         found = errors(calibration)
-        held.append([abs(found[name]) < factor(name) for name in TRUTH])
+        held.append([abs(found[name]) < factor(name) for name in TRUTHS])
     coverage = np.mean(held, axis=0)
     chance = np.sqrt(0.95 * 0.05 / len(held))
     assert np.all(coverage > 0.95 - 3 * chance), coverage

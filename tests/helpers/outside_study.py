@@ -19,6 +19,7 @@ from helpers.outside import scan as perturbed_scan
 
 import memscal
 from memscal import ApparatusFunction, Scan
+from memscal.model.apparatus import ParameterSet
 
 RUNS = 30 if FULL else 6
 DRAWS = 60 if FULL else 6
@@ -31,6 +32,14 @@ _RATIO = 1.25
 COUNTED = 1.4
 ALARMED = 0.9
 NAMED = 1.5
+
+
+def deviates(parameters: ParameterSet, truths: dict[str, float] = TRUTHS) -> list[float]:
+    """Return errors of parameters over their standard uncertainties."""
+    return [
+        (parameters[name] - true) / parameters.uncertainty(name) for name, true in truths.items()
+    ]
+
 
 Stated = Callable[[Scan, float], Scan]
 
@@ -89,8 +98,7 @@ class Row:
 
     def deviation(self, apparatus: ApparatusFunction) -> float:
         """Error of the parameter over its standard uncertainty."""
-        p = apparatus.parameters
-        return (p[self.parameter] - TRUTHS[self.parameter]) / p.uncertainty(self.parameter)
+        return deviates(apparatus.parameters, {self.parameter: TRUTHS[self.parameter]})[0]
 
     def sizes_at(self, deviations: Sequence[float]) -> list[float]:
         """Sizes at which the mean error is so many uncertainties; infinite if none is."""
