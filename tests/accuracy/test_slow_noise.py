@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
-from helpers.outside import FILM, ROUND, line, scan
+from helpers.outside import FILM, ROUND, A, line, scan
 from helpers.outside_study import TRUTHS, deviates
 from scipy.signal import lfilter
 
@@ -73,7 +73,7 @@ def errors(calibration: Calibration) -> dict[str, float]:
     apparatus = calibration.apparatus
     found = dict(zip(TRUTHS, deviates(apparatus.parameters), strict=True))
     assert apparatus.other is not None
-    found["bayesian"] = deviates(apparatus.other.parameters)[0]
+    found["bayesian"] = deviates(apparatus.other.parameters, {"conversion_constant": A})[0]
     return found
 
 
