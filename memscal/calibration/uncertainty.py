@@ -69,7 +69,7 @@ _GAUSSIAN_PARAMETERS = (
     "ellipticity",
     "ellipticity_diagonal",
 )
-_CURVATURE = "baseline_curvature"
+CURVATURE = "baseline_curvature"
 #: Other scans of one sensor reach from this share of a scan's reach on.
 _LEAST_REACH = 0.5
 #: Sources that are the same error in every scan at the same positions.
@@ -120,7 +120,7 @@ def _taken_for_granted(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict
     stated = {}
     for name in STATED_ERRORS:
         u = np.array([getattr(scan, f"{name}_uncertainty") or 0.0 for scan in scans])
-        if u.any() and name not in ("gain", _CURVATURE, *measured_by(estimate.points)):
+        if u.any() and name not in ("gain", CURVATURE, *measured_by(estimate.points)):
             stated[name] = u[estimate.points.scan]
     found = influences(scans, estimate) if stated else {}
     effects = {}
@@ -219,7 +219,7 @@ class Results:
     radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
-    radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
+    radial_scatter: FloatArray  # (n,): u of G(r) by noise, baseline and inputs, in 1/m^2
     by_voltage: VoltageMap  # (p, n): derivatives of the parameters
     effective_degrees: Mapping[str, float]  # by parameter, where noise is estimated
     # (n,) by input, where none are correlated: of A G(r) over A by one uncertainty, in 1/m^2
@@ -280,7 +280,7 @@ def propagate(
         "noise": estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.hidden_root,
         "window": derivatives.hidden,
-        "baseline_curvature": _curvature_columns(estimate, names, by_voltage),
+        CURVATURE: _curvature_columns(estimate, names, by_voltage),
     }
     rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -302,7 +302,8 @@ def propagate(
     count = len(names)
     stop = count + g.size
     stored = everything[:stop] @ everything[:stop].T
-    scatter = np.hstack([columns["noise"], *(independent[-1:] if effects else [])])
+    drawn_again = [columns["noise"], columns[CURVATURE], *(independent[-1:] if effects else [])]
+    scatter = np.hstack(drawn_again)
     g_over_a = g / deconvolution.conversion_constant
     kernel_changes = {}
     for source in effects if not correlations else ():
@@ -331,7 +332,7 @@ def _curvature_columns(
     deviations = points.curvature[points.curved]
     errors = by_voltage @ (estimate.model.curvature_columns * deviations)
     for i, deviation in enumerate(deviations.tolist()):
-        errors[names.index(_CURVATURE + _suffix(points.curved[i])), i] -= deviation
+        errors[names.index(CURVATURE + _suffix(points.curved[i])), i] -= deviation
     return errors
 
 
@@ -535,7 +536,7 @@ def _nuisances(points: ScanPoints) -> tuple[list[str], FloatArray]:
         along = [("drift", "drift_y")[axis] + suffix for axis in np.flatnonzero(directions)]
         names += ["baseline" + suffix, *along]
         scales += [1.0, *(2.0 for _ in along)]
-    names += [_CURVATURE + _suffix(i) for i in points.curved]
+    names += [CURVATURE + _suffix(i) for i in points.curved]
     return names, np.array(scales + [1.0] * points.curved.size)
 
 

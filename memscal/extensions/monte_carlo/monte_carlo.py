@@ -15,6 +15,7 @@ from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
     BUDGETED,
+    CURVATURE,
     NOT_RANDOM,
     InputEffect,
     correlation_matrix,
@@ -80,9 +81,12 @@ class DrawnScans:
         noise: FloatArray = rng.standard_normal(points.u.size)
         if estimate.correlation is not None:
             noise = estimate.correlation.correlate(noise)
+        deviations = points.curvature[points.curved]
+        curvatures = deviations * rng.standard_normal(deviations.size)
+        curved = estimate.model.curvature_columns @ curvatures
         residual = points.u - drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
-        voltages = self.voltages(standard) + stray + estimate.noise * noise
+        voltages = self.voltages(standard) + curved + stray + estimate.noise * noise
         return [
             _with_voltages(scan, points.channel, voltages[points.scan == i])
             for i, scan in enumerate(self.solution.scans)
@@ -225,7 +229,7 @@ class BudgetComparison:
     sampling_error: float  # standard uncertainty of ``uncertainty`` for the number of draws
     symmetric: tuple[float, float]  # coverage intervals of 95 %
     shortest: tuple[float, float]
-    first_order: float  # the budget's standard uncertainty by noise and inputs
+    first_order: float  # the budget's standard uncertainty by what was drawn
     stated: float  # the same with what regularisation and window hide
     reason: str = ""  # why draws and budget do not agree, or empty
 
@@ -249,7 +253,7 @@ class MonteCarlo(Result):
     draws, seed : int
         How many there are, and their seed.
     sources : tuple of str
-        What was drawn: noise, then the inputs whose uncertainty is stated.
+        What was drawn: noise, curvatures of baselines, then the inputs whose uncertainty is stated.
     samples : ndarray, shape (m, 5)
         A (V/Pa), both widths (m), full width at half maximum (m) and noise-equivalent area (m^2)
         of the m draws that could be calibrated.
@@ -262,7 +266,7 @@ class MonteCarlo(Result):
     g_symmetric, g_shortest : ndarray, shape (2, n)
         Coverage intervals of 95 % at each radius, in 1/m^2.
     g_first_order : ndarray, shape (n,)
-        Standard uncertainty of G to first order in noise and inputs, in 1/m^2.
+        Standard uncertainty of G to first order in what was drawn, in 1/m^2.
     messages : tuple of Message
         What was drawn, and what was not.
 
@@ -320,7 +324,8 @@ def monte_carlo(
     r"""Propagate the distributions of noise and inputs through a calibration.
 
     Every draw is calibrated by the same method.  Its voltages are those of the calibration's A
-    and G under the drawn film, rod, load and positions, with new noise.  Inputs are normal, cut off
+    and G under the drawn film, rod, load and positions, on a baseline of drawn curvature, with new
+    noise.  Inputs are normal, cut off
     where no film is (a Poisson's ratio above 1/2), or rectangular (the model's form).
 
     Parameters
@@ -384,10 +389,11 @@ def monte_carlo(
     for name, column in zip(BUDGETED, samples.T, strict=True):
         comparisons.append(_compared(calibration, name, expected[name], column))
     first_order = uncertainties(solution, deconvolution, effects, calibration.correlations)
+    curved = [CURVATURE] if solution.estimate.points.curved.size else []
     return MonteCarlo(
         draws=draws,
         seed=seed,
-        sources=("noise", *effects),
+        sources=("noise", *curved, *effects),
         samples=samples,
         comparisons=tuple(comparisons),
         r=deconvolution.g.r,

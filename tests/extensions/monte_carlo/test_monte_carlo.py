@@ -194,9 +194,9 @@ def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle()
 
 def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be():
     found = memscal.monte_carlo(replace(uncertain(noise=0.004), effects={}), draws=3)
-    assert found.sources == ("noise",)
+    assert found.sources == ("noise", "baseline_curvature")
     assert [m.kind for m in found.messages][:1] == ["uncertainty_unstated"]
-    assert "3 draws of noise" in repr(found)
+    assert "3 draws of noise, baseline_curvature" in repr(found)
     messy = memscal.calibrate(incomplete(simulated(noise=0.004)), method="evidence")
     found = memscal.monte_carlo(messy, draws=25)
     assert found["gaussian_sigma"].ratio == pytest.approx(1.0, abs=spread_limit(25))
