@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 RUNS = 10
 DRAWS = 20
 HEAD = [
-    *("not as stated", "wrong", "by 2 u at", "by 3 u at", "counted: rms z", "alarmed at 3 u"),
+    *("not as stated", "wrong", "by 2 u at", "by 3 u at", "counted: rms z", "alarmed there"),
     *("named over found", "told by", "shown by"),
 ]
 

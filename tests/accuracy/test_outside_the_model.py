@@ -13,7 +13,18 @@ import pytest
 from helpers.bounds import root_mean_square_limit
 from helpers.outside import ROUND, A, World, elliptic
 from helpers.outside import scan as perturbed_scan
-from helpers.outside_study import ALARMED, COUNTED, DRAWS, ROWS, RUNS, outcome
+from helpers.outside_study import (
+    ALARMED,
+    COUNTED,
+    DRAWS,
+    ROWS,
+    RUNS,
+    NoiseRow,
+    StatesRow,
+    calibrated,
+    of_rubber,
+    outcome,
+)
 from scipy.stats import binom
 
 import memscal
@@ -48,10 +59,17 @@ def unstated(world: World, noise: float) -> memscal.Scan:
     return replace(made, u_zz=world.voltages(made.x), film=film, load_uncertainty=None)
 
 
-@pytest.mark.parametrize("noise", [0.001, 0.005])
-@pytest.mark.parametrize("method", ["white-noise", "bayesian"])
+@pytest.mark.parametrize(
+    ("method", "noise"),
+    [
+        ("white-noise", 0.005),
+        ("bayesian", 0.001),
+        pytest.param("white-noise", 0.001, marks=pytest.mark.full_study),
+        pytest.param("bayesian", 0.005, marks=pytest.mark.full_study),
+    ],
+)
 def test_sizes_for_one_uncertainty_are_those_of_perturbed_scans(method: str, noise: float) -> None:
-    exact = memscal.calibrate(unstated(ROUND, noise), method=method).apparatus
+    exact = calibrated(unstated(ROUND, noise), method=method).apparatus
     sizes = {assumption.name: assumption.sizes for assumption in exact.assumptions}
     assert set(PERTURBED) <= set(sizes)
     ratios = {}
@@ -64,7 +82,7 @@ def test_sizes_for_one_uncertainty_are_those_of_perturbed_scans(method: str, noi
             moved = []
             for signed in (size, -size) if name in EITHER_SIGN else (size,):
                 scan = unstated(perturbed(signed), noise)
-                made = memscal.calibrate(scan, method=method).apparatus
+                made = calibrated(scan, method=method).apparatus
                 moved.append(abs(made.parameters[parameter] - exact.parameters[parameter]))
             ratios[name, parameter] = max(moved) / exact.parameters.uncertainty(parameter)
     assert {name for name, _ in ratios} == set(PERTURBED)
@@ -79,7 +97,15 @@ with (Path(__file__).parents[2] / "docs" / "outside_study.csv").open(encoding="u
     TABLE = {row["not as stated"]: row for row in csv.DictReader(file)}
 
 
-@pytest.mark.parametrize("name", ROWS)
+#: Rows of which CI runs studies of their own.
+BY_NIGHT = {
+    name: pytest.mark.full_study
+    for name, row in ROWS.items()
+    if isinstance(row, NoiseRow | StatesRow) or row.world is of_rubber
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=BY_NIGHT.get(n, ())) for n in ROWS])
 def test_what_a_scan_does_not_state_is_counted_alarmed_or_named_as_the_page_says(name: str) -> None:
     stated = TABLE[name]
     told = set(stated["told by"].split(", "))
@@ -101,7 +127,7 @@ def test_a_tail_shows_at_little_noise_beside_a_baseline_stated_as_straight() -> 
     failed = 0
     for seed in range(RUNS):
         scan = replace(perturbed_scan(world, seed, noise=0.001), baseline_curvature_uncertainty=0.0)
-        failed += not memscal.calibrate(scan).apparatus.passed
+        failed += not calibrated(scan).passed
     assert failed >= binom.ppf(CHANCE, RUNS, ALARMED)
 
 

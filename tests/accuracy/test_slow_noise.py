@@ -3,27 +3,23 @@
 Thickness, Poisson's ratio and load are drawn from what the scans state of them.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
-from helpers.outside import FILM, ROUND, A, line, scan
-from helpers.outside_study import TRUTHS, deviates
-from scipy.signal import lfilter
+from helpers.outside import FILM, ROUND, A, Noise, correlated, line, scan
+from helpers.outside_study import TRUTHS, calibrated, deviates
 
-from memscal.calibration.calibrate import Calibration, calibrate, uncertainties
+from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.accuracy
 
-COUNT = 100 if FULL else 40
+COUNT = 100 if FULL else 12
 """Scans without an alarm."""
 CHANCE = 1e-3
-
-Noise = Callable[[np.random.Generator, int], FloatArray]
 
 
 @lru_cache
@@ -45,24 +41,12 @@ def true_voltages(rng: np.random.Generator, step: float) -> FloatArray:
     return u * (1 + 0.01 * rng.standard_normal())
 
 
-def correlated(kept: float, size: float, white: float) -> Noise:
-    """Return noise of this size that keeps a share from point to point, beside white noise."""
-
-    def noise(rng: np.random.Generator, count: int) -> FloatArray:
-        steps = np.sqrt(1 - kept**2) * rng.standard_normal(count)
-        steps[0] = rng.standard_normal()
-        walk = lfilter([1.0], [1.0, -kept], steps)
-        return np.asarray(size * walk + white * rng.standard_normal(count))
-
-    return noise
-
-
 def calibration_of(seed: int, noise: Noise, step: float = 0.25e-3) -> Calibration:
     """Calibrate a scan whose noise is not stated, in shares of its largest signal."""
     rng = np.random.default_rng([seed, 35])
     u = true_voltages(rng, step)
     u = u + np.abs(u).max() * noise(rng, u.size)
-    return calibrate(replace(scan(ROUND, 0, x=line(step=step), noise_stated=False), u_zz=u))
+    return calibrated(replace(scan(ROUND, 0, x=line(step=step), noise_stated=False), u_zz=u))
 
 
 WHITE = correlated(0.0, 0.0, 0.005)

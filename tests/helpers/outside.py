@@ -7,13 +7,14 @@ radius is an eighth of the film's thickness the base stress is right to 3e-5.  T
 double Fourier sum over the plane, so that G and the line may be anything.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
+from scipy.signal import lfilter
 from scipy.special import j1
 
 from memscal import ElasticFilm, LoadCell, Rod, Scan
@@ -188,6 +189,21 @@ def scan(
         film=FILM,
         load_cell=LoadCell(),
     )
+
+
+Noise = Callable[[np.random.Generator, int], FloatArray]
+
+
+def correlated(kept: float, size: float, white: float) -> Noise:
+    """Return noise of this size that keeps a share from point to point, beside white noise."""
+
+    def noise(rng: np.random.Generator, count: int) -> FloatArray:
+        steps = np.sqrt(1 - kept**2) * rng.standard_normal(count)
+        steps[0] = rng.standard_normal()
+        walk = lfilter([1.0], [1.0, -kept], steps)
+        return np.asarray(size * walk + white * rng.standard_normal(count))
+
+    return noise
 
 
 FILM = ElasticFilm(

@@ -9,22 +9,29 @@ from it are counted, at two and at three; where a calibration names a size, it i
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
+from helpers import two_states
 from helpers.bounds import FULL
-from helpers.outside import ROUND, SIGMA, A, World, elliptic, lobe, tail
+from helpers.direct import LOADS, TABLE, base_stresses
+from helpers.outside import ROUND, SIGMA, A, Noise, World, correlated, elliptic, lobe, tail
 from helpers.outside import scan as perturbed_scan
+from scipy.interpolate import make_interp_spline
+from scipy.special import j0
 
 import memscal
-from memscal import ApparatusFunction, Scan
+from memscal import ApparatusFunction, Calibration, Scan
 from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import FloatArray
 
 RUNS = 30 if FULL else 6
 DRAWS = 60 if FULL else 6
 TRUTHS = {"conversion_constant": A, "gaussian_sigma": SIGMA}
-SYMBOLS = {"conversion_constant": "A", "gaussian_sigma": "σ"}
+SYMBOLS = {"conversion_constant": "A", "gaussian_sigma": "σ", "friction": "μ"}
 #: Sizes are tried up to this factor of the first one, each larger by this ratio.
 _FARTHEST = 32.0
 _RATIO = 1.25
@@ -32,6 +39,12 @@ _RATIO = 1.25
 COUNTED = 1.4
 ALARMED = 0.9
 NAMED = 1.5
+
+
+def calibrated(scan: Scan, **options: Any) -> Calibration:
+    """Calibrate a scan, and spend no time on what explains the checks that it fails."""
+    with patch("memscal.calibration.calibrate.explained", lambda _, checks: (checks, [])):
+        return memscal.calibrate(scan, **options)
 
 
 def deviates(parameters: ParameterSet, truths: dict[str, float] = TRUTHS) -> list[float]:
@@ -74,16 +87,21 @@ class Row:
     parameter: str = "conversion_constant"
     signs: tuple[float, ...] = (-1.0, 1.0)
 
-    def calibrated(self, size: float) -> ApparatusFunction:
+    def shift(self, size: float) -> float:
+        """Mean error by a size, over the standard uncertainty."""
+        exact = self.deviation(self.exactly(0.0))
+        return abs(self.deviation(self.exactly(size)) - exact)
+
+    def exactly(self, size: float) -> ApparatusFunction:
         """Calibrate a scan of a size without noise, which it states as it is."""
         world = self.world(size)
         scan = perturbed_scan(world, 0)
         scan = replace(scan, u_zz=world.voltages(scan.x))
-        return memscal.calibrate(scan, other=False).apparatus
+        return calibrated(scan, other=False).apparatus
 
     def failed(self, size: float, seed: int) -> list[str]:
-        """Names of the checks that a scan of a size fails, with all that a user gets."""
-        apparatus = memscal.calibrate(perturbed_scan(self.world(size), seed)).apparatus
+        """Names of the checks that a scan of a size fails."""
+        apparatus = calibrated(perturbed_scan(self.world(size), seed)).apparatus
         return [check.name for check in apparatus.checks if not check.passed]
 
     def stated_deviations(self, size: float, draws: int) -> list[float]:
@@ -93,7 +111,7 @@ class Row:
             drawn = size * abs(np.random.default_rng([35, seed]).normal())
             sign = self.signs[seed % len(self.signs)]
             scan = self.stated(perturbed_scan(self.world(sign * drawn), seed), size)
-            z.append(self.deviation(memscal.calibrate(scan, other=False).apparatus))
+            z.append(self.deviation(calibrated(scan, other=False).apparatus))
         return z
 
     def deviation(self, apparatus: ApparatusFunction) -> float:
@@ -102,16 +120,93 @@ class Row:
 
     def sizes_at(self, deviations: Sequence[float]) -> list[float]:
         """Sizes at which the mean error is so many uncertainties; infinite if none is."""
-        exact = self.deviation(self.calibrated(0.0))
         tried = [0.0]
         found = [0.0]
         size = self.first
         while size < _FARTHEST * self.first and found[-1] < max(deviations):
             tried.append(size)
-            found.append(abs(self.deviation(self.calibrated(size)) - exact))
+            found.append(self.shift(size))
             size *= _RATIO
         largest = np.maximum.accumulate(found)
         return [float(np.interp(each, largest, tried, right=np.inf)) for each in deviations]
+
+
+@dataclass(frozen=True)
+class StatesRow(Row):
+    """One thing of a lubricated scan that neither it nor the dry one states."""
+
+    parameter: str = "friction"
+    perturbed: str = ""  # the argument of two_states.perturbed that the size changes
+    stating: str = ""  # the argument that states it
+    relative: bool = True  # whether the size is one less a factor of one
+
+    def outcome(self, size: float, seed: int, **stated: float) -> two_states.Outcome:
+        """Compare an experiment of a size."""
+        changed = {"lubricated": 0.0} | {self.perturbed: size + self.relative}
+        return two_states.perturbed(seed=seed, **changed, **stated)
+
+    def shift(self, size: float) -> float:
+        """Mean error by a size, over the standard uncertainty, with the noise of one seed."""
+        return abs(self.outcome(size, 0).deviation - self.outcome(0.0, 0).deviation)
+
+    def failed(self, size: float, seed: int) -> list[str]:
+        """Names of the checks that an experiment of a size fails."""
+        return list(self.outcome(size, seed).failed)
+
+    def stated_deviations(self, size: float, draws: int) -> list[float]:
+        """Deviations where sizes are drawn from what scans state as a standard uncertainty."""
+        z = []
+        for seed in range(draws):
+            drawn = size * abs(np.random.default_rng([35, seed]).normal())
+            sign = self.signs[seed % len(self.signs)]
+            z.append(self.outcome(sign * drawn, seed, **{self.stating: size}).deviation)
+        return z
+
+
+@dataclass(frozen=True)
+class NoiseRow(Row):
+    """Noise whose correlation, as its size, no scan states: its errors have no mean."""
+
+    noise: Noise = field(default=lambda rng, count: np.zeros(count))
+
+    def sizes_at(self, deviations: Sequence[float]) -> list[float]:
+        """No size moves the mean."""
+        return [math.inf for _ in deviations]
+
+    def stated_deviations(self, size: float, draws: int) -> list[float]:
+        """Deviations of scans without an alarm."""
+        z: list[float] = []
+        seed = 0
+        while len(z) < draws:
+            scan = perturbed_scan(ROUND, seed, noise=0.0, noise_stated=False)
+            noise = self.noise(np.random.default_rng([35, seed]), scan.x.size)
+            scan = replace(scan, u_zz=scan.u_zz + size * scan.u_zz.max() * noise)
+            calibration = calibrated(scan)
+            seed += 1
+            if calibration.passed:
+                z.append(self.deviation(calibration.apparatus))
+        return z
+
+
+@dataclass(frozen=True)
+class NeoHookean(World):
+    """A film of rubber, in a world else as stated: its base stress is of finite elements."""
+
+    def base(self, k: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Transforms of normal stress and shear at the base per newton, at wavenumbers (n,)."""
+        # Per newton, linear in the load between those that are solved.
+        solved = base_stresses(self.radius, "neo-hookean")
+        linear = base_stresses(self.radius, "linear")
+        per_newton = [linear[LOADS[0]] / LOADS[0], *(solved[load] / load for load in LOADS)]
+        shares = np.array(
+            [np.interp(self.load, (0.0, *LOADS), row) for row in np.eye(len(per_newton))]
+        )
+        stress = shares @ per_newton
+        grid = np.linspace(0.0, 25 / self.thickness, 600)
+        kernel = j0(np.multiply.outer(grid, TABLE)) * TABLE
+        transform = 2 * np.pi * np.trapezoid(kernel * stress, TABLE, axis=1)
+        normal = make_interp_spline(grid, transform)(np.minimum(k, grid[-1]))
+        return normal * (k < grid[-1]), np.zeros_like(k)
 
 
 @dataclass(frozen=True)
@@ -121,7 +216,7 @@ class Outcome:
     row: Row
     two: float
     three: float
-    alarmed: float  # share of runs at the latter with a failed check
+    alarmed: float  # share of runs at the largest of these with a failed check
     check: str  # that fails most often
     counted: tuple[float, ...]  # rms of error over uncertainty where the scan states the sizes
     named: float | None  # the size of two uncertainties as named, over that found
@@ -145,23 +240,29 @@ def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
     two, three = row.sizes_at((2.0, 3.0))
     failed: Counter[str] = Counter()
     alarmed = math.nan
-    if math.isfinite(three):
-        by_run = [row.failed(three, seed) for seed in range(runs)]
+    sizes = [size for size in (two, three) if math.isfinite(size)]
+    if sizes:
+        by_run = [row.failed(sizes[-1], seed) for seed in range(runs)]
         alarmed = sum(map(bool, by_run)) / runs
         for names in by_run:
             failed.update(names)
-    sizes = [size for size in (two, three) if math.isfinite(size)]
-    by_size = [row.stated_deviations(size, draws) for size in sizes] if row.stated else []
+    stated = sizes or [row.first]
+    by_size = [row.stated_deviations(size, draws) for size in stated] if row.stated else []
     counted = [float(np.sqrt(np.mean(np.square(z)))) for z in by_size]
     named = None
     if row.assumption and math.isfinite(two):
-        assumptions = {each.name: each for each in row.calibrated(0.0).assumptions}
+        assumptions = {each.name: each for each in row.exactly(0.0).assumptions}
         size = assumptions[row.assumption].sizes[row.parameter]
         # Of an offset the error grows with the square.
         factor = math.sqrt(2) if row.assumption == "line_offset" else 2.0
         named = factor * size / row.named(two)
     check = failed.most_common(1)[0][0] if failed else ""
     return Outcome(row, two, three, alarmed, check, tuple(counted), named)
+
+
+def of_rubber(load: float) -> World:
+    """Return the world of a film of rubber under a load; none is a vanishing one."""
+    return NeoHookean(load=max(load, 1e-3))
 
 
 def _ratio_of_lobe(distance: float) -> float:
@@ -314,6 +415,62 @@ ROWS = {
             1e3,
             shown_by="the line scanned back: its centre moves by twice the lag",
             parameter="gaussian_sigma",
+        ),
+        Row(
+            "law stated as linear, film of rubber: the load",
+            of_rubber,
+            0.1,
+            "N",
+            stated=lambda scan, _: replace(scan, film=replace(scan.film, law="")),
+            signs=(1.0,),
+        ),
+        NoiseRow(
+            "slow noise, AR(0.9)",
+            lambda _: ROUND,
+            0.004,
+            "%",
+            100.0,
+            stated=states("noise"),
+            noise=correlated(0.9, 1.0, 0.75),
+        ),
+        NoiseRow(
+            "slow noise, AR(0.98)",
+            lambda _: ROUND,
+            0.005,
+            "%",
+            100.0,
+            stated=states("noise"),
+            noise=correlated(0.98, 1.0, 0.4),
+        ),
+        StatesRow(
+            "friction of lubricated contacts",
+            lambda _: ROUND,
+            0.01,
+            stated=states("friction"),
+            perturbed="lubricated",
+            stating="width",
+            relative=False,
+            signs=(1.0,),
+        ),
+        StatesRow(
+            "gain of lubricated scans",
+            lambda _: ROUND,
+            0.004,
+            "%",
+            100.0,
+            stated=states("gain"),
+            perturbed="gain",
+            stating="gain_uncertainty",
+        ),
+        StatesRow(
+            "loads of lubricated scans",
+            lambda _: ROUND,
+            0.008,
+            "%",
+            100.0,
+            stated=states("load"),
+            perturbed="load",
+            stating="load_uncertainty",
         ),
     )
 }
