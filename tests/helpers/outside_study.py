@@ -9,7 +9,7 @@ from it are counted, at two and at three; where a calibration names a size, it i
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 from unittest.mock import patch
@@ -71,12 +71,17 @@ def states_of_film(name: str) -> Stated:
     return stated
 
 
+def by_default(scan: Scan, size: float) -> Scan:
+    """Say that a scan need not state the size."""
+    return scan
+
+
 @dataclass(frozen=True)
 class Row:
     """One thing that a scan does not state."""
 
     name: str
-    world: Callable[[float], World]
+    world: Callable[[float], World]  # of a size
     first: float  # a size of which less than two uncertainties come, in SI units
     unit: str = ""
     per_unit: float = 1.0  # of what the table shows
@@ -109,10 +114,13 @@ class Row:
         z = []
         for seed in range(draws):
             drawn = size * abs(np.random.default_rng([35, seed]).normal())
-            sign = self.signs[seed % len(self.signs)]
-            scan = self.stated(perturbed_scan(self.world(sign * drawn), seed), size)
-            z.append(self.deviation(calibrated(scan, other=False).apparatus))
+            z.append(self.stated_deviation(self.signs[seed % len(self.signs)] * drawn, size, seed))
         return z
+
+    def stated_deviation(self, drawn: float, size: float, seed: int) -> float:
+        """Deviation of a scan that is made with one size and states another."""
+        scan = self.stated(perturbed_scan(self.world(drawn), seed), size)
+        return self.deviation(calibrated(scan, other=False).apparatus)
 
     def deviation(self, apparatus: ApparatusFunction) -> float:
         """Error of the parameter over its standard uncertainty."""
@@ -135,14 +143,15 @@ class Row:
 class StatesRow(Row):
     """One thing of a lubricated scan that neither it nor the dry one states."""
 
+    stated: Stated | None = by_default
     parameter: str = "friction"
     perturbed: str = ""  # the argument of two_states.perturbed that the size changes
-    stating: str = ""  # the argument that states it
-    relative: bool = True  # whether the size is one less a factor of one
+    none: float = 1.0  # which is this where nothing is off
+    stating: str = ""  # the argument that states the size
 
     def outcome(self, size: float, seed: int, **stated: float) -> two_states.Outcome:
         """Compare an experiment of a size."""
-        changed = {"lubricated": 0.0} | {self.perturbed: size + self.relative}
+        changed = {"lubricated": 0.0} | {self.perturbed: self.none + size}
         return two_states.perturbed(seed=seed, **changed, **stated)
 
     def shift(self, size: float) -> float:
@@ -153,21 +162,17 @@ class StatesRow(Row):
         """Names of the checks that an experiment of a size fails."""
         return list(self.outcome(size, seed).failed)
 
-    def stated_deviations(self, size: float, draws: int) -> list[float]:
-        """Deviations where sizes are drawn from what scans state as a standard uncertainty."""
-        z = []
-        for seed in range(draws):
-            drawn = size * abs(np.random.default_rng([35, seed]).normal())
-            sign = self.signs[seed % len(self.signs)]
-            z.append(self.outcome(sign * drawn, seed, **{self.stating: size}).deviation)
-        return z
+    def stated_deviation(self, drawn: float, size: float, seed: int) -> float:
+        """Deviation of an experiment that is made with one size and states another."""
+        return self.outcome(drawn, seed, **{self.stating: size}).deviation
 
 
 @dataclass(frozen=True)
 class NoiseRow(Row):
     """Noise whose correlation, as its size, no scan states: its errors have no mean."""
 
-    noise: Noise = field(default=lambda rng, count: np.zeros(count))
+    stated: Stated | None = by_default
+    noise: Noise | None = None
 
     def sizes_at(self, deviations: Sequence[float]) -> list[float]:
         """No size moves the mean."""
@@ -198,10 +203,7 @@ class NeoHookean(World):
         solved = base_stresses(self.radius, "neo-hookean")
         linear = base_stresses(self.radius, "linear")
         per_newton = [linear[LOADS[0]] / LOADS[0], *(solved[load] / load for load in LOADS)]
-        shares = np.array(
-            [np.interp(self.load, (0.0, *LOADS), row) for row in np.eye(len(per_newton))]
-        )
-        stress = shares @ per_newton
+        stress = make_interp_spline((0.0, *LOADS), per_newton, k=1)(min(self.load, LOADS[-1]))
         grid = np.linspace(0.0, 25 / self.thickness, 600)
         kernel = j0(np.multiply.outer(grid, TABLE)) * TABLE
         transform = 2 * np.pi * np.trapezoid(kernel * stress, TABLE, axis=1)
@@ -258,6 +260,11 @@ def outcome(row: Row, runs: int = RUNS, draws: int = DRAWS) -> Outcome:
         named = factor * size / row.named(two)
     check = failed.most_common(1)[0][0] if failed else ""
     return Outcome(row, two, three, alarmed, check, tuple(counted), named)
+
+
+def no_other(size: float) -> World:
+    """Return the world as stated."""
+    return ROUND
 
 
 def of_rubber(load: float) -> World:
@@ -426,49 +433,44 @@ ROWS = {
         ),
         NoiseRow(
             "slow noise, AR(0.9)",
-            lambda _: ROUND,
+            no_other,
             0.004,
             "%",
             100.0,
-            stated=states("noise"),
             noise=correlated(0.9, 1.0, 0.75),
         ),
         NoiseRow(
             "slow noise, AR(0.98)",
-            lambda _: ROUND,
+            no_other,
             0.005,
             "%",
             100.0,
-            stated=states("noise"),
             noise=correlated(0.98, 1.0, 0.4),
         ),
         StatesRow(
             "friction of lubricated contacts",
-            lambda _: ROUND,
+            no_other,
             0.01,
-            stated=states("friction"),
             perturbed="lubricated",
             stating="width",
-            relative=False,
+            none=0.0,
             signs=(1.0,),
         ),
         StatesRow(
             "gain of lubricated scans",
-            lambda _: ROUND,
+            no_other,
             0.004,
             "%",
             100.0,
-            stated=states("gain"),
             perturbed="gain",
             stating="gain_uncertainty",
         ),
         StatesRow(
             "loads of lubricated scans",
-            lambda _: ROUND,
+            no_other,
             0.008,
             "%",
             100.0,
-            stated=states("load"),
             perturbed="load",
             stating="load_uncertainty",
         ),
