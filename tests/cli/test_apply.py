@@ -10,7 +10,6 @@ import memscal
 from memscal.cli.failures import CHECK_FAILED
 
 LOADS = (0.69, 2.75)
-REFUSED = 3
 
 
 def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run: Run, artifact: Path, folder: Path):
@@ -20,14 +19,3 @@ def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run: Run, artifact: Pat
     assert "FAILED: applied force" in done.out
     assert "gain, load or a unit differ" in done.err
     assert "gain.stress.h5" in names(folder)
-
-
-def test_another_film_is_refused_or_its_override_told(run: Run, artifact: Path, folder: Path):
-    scan = contact_scan(1, load=LOADS)
-    film = replace(scan.film, thickness=2.1e-3)
-    memscal.write_scan(replace(scan, film=film), folder / "other.h5")
-    done = run("apply", artifact, "other.h5").exits(REFUSED)
-    for words in ("other.h5", "2.1 mm (u", "2 mm (u", "--override"):
-        assert words in done.err
-    assert "other.stress.h5" not in names(folder)
-    assert "Overridden: film thickness" in run("apply", artifact, "other.h5", "--override").err
