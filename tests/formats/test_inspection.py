@@ -35,14 +35,6 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: P
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-@pytest.mark.parametrize(("name", "passed"), [("scan", True), ("artifact", False)])
-def test_only_an_artifact_must_have_a_digest(folder: Path, name, passed):
-    with h5py.File(folder / f"{name}.h5", "r+") as file:
-        del file.attrs["memscal_content_sha256"]
-    digest = next(f for f in check(folder / f"{name}.h5") if f.name == "digest")
-    assert digest.passed is passed
-
-
 def test_a_scan_of_another_program_fails_at_what_it_lacks(folder: Path):
     with h5py.File(folder / "scan.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"], file["/entry/indenter/radius"]

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,11 +83,3 @@ def test_one_gain_of_calibration_and_contacts_cancels() -> None:
     )
     on_axis = [np.sum(each.columns["apparatus"][0, 16] ** 2) for each in (one, unstated)]
     assert on_axis[1] - on_axis[0] == pytest.approx((SHARE * signal) ** 2, rel=0.05)
-
-
-def test_a_file_of_measured_stress_keeps_stage_and_gain(tmp_path: Path) -> None:
-    stress = measured(STAGE, SHARE)
-    stress.save(tmp_path / "dry.stress.h5")
-    read = memscal.read_stress(tmp_path / "dry.stress.h5")
-    assert read == stress
-    assert (read.scans[0].stage, read.scans[0].gain_uncertainty) == (STAGE, SHARE)
