@@ -185,9 +185,3 @@ def test_positions_are_whole_steps_within_the_range(step, half_range, count):
     assert scan.x.size == count
     np.testing.assert_allclose(np.diff(scan.x), step)
     assert scan.x[-1] <= half_range * (1 + 1e-6)
-
-
-def test_noise_is_a_share_of_the_signal_above_the_sensor():
-    plan = Plan(noise=0.02)
-    assert plan.point_noise == pytest.approx(0.02 * float(plan.scan().u_zz.max()), rel=1e-6)
-    assert Plan(noise_voltage=3e-5).point_noise == 3e-5

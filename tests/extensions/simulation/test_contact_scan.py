@@ -179,9 +179,7 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface():
 
 @pytest.mark.parametrize(("options", "problem"), [
     ({"gain": 0.0}, "gain is 0"), ({"thickness_factor": -1.0}, "thickness_factor"),
-    ({"load_uncertainty": -0.1}, "uncertainty of the load"), ({"seed": -1}, "seed is -1"),
-    ({"loads": []}, "list of loads is empty"), ({"rod_load": 0.0}, "load"),
-    ({"repeats": 0}, "one row"),
+    ({"seed": -1}, "seed is -1"),
 ])  # fmt: skip
 def test_an_experiment_that_cannot_be_made_is_refused(options, problem):
     with pytest.raises(InputError, match=problem):
