@@ -79,7 +79,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 _COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "repeat", "branch")
 _LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds")
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
-_UNCERTAINTIES = ("noise", "load_uncertainty", "new_position_errors")
+_UNCERTAINTIES = ("noise", "load_uncertainty", "position_errors_by_repeat")
 #: Powers of ten of the units in which what a scan takes for granted is stated.
 _TAKEN_FOR_GRANTED = {
     "position_scale_uncertainty": -2,
@@ -103,7 +103,7 @@ _ONLY = {
         *_TAKEN_FOR_GRANTED,
         "load_scatter",
         "position_error",
-        "new_position_errors",
+        "position_errors_by_repeat",
         "figures",
         "laboratory",
         *_SENSOR_NAMES.values(),
@@ -167,7 +167,9 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--position-error", NonNegative("um"))(
     "Scan: standard uncertainty of each position, one for all repeats at it, in um."
 )
-@option("--new-position-errors", is_flag=True)("Scan: errors of positions are new in each repeat.")
+@option("--position-errors-by-repeat", is_flag=True)(
+    "Scan: errors of positions are new in each repeat."
+)
 @option("--position-scale-uncertainty", NonNegative("percent"))(
     "Scan: standard uncertainty of the stage's scale, common to all positions, in percent."
 )
@@ -264,7 +266,7 @@ def command(
     kept in the notes of the file.
     """
     mesh = hook("is_mesh")(table)
-    given = ("repeat", "missing", "figures", "holds", "new_position_errors")
+    given = ("repeat", "missing", "figures", "holds", "position_errors_by_repeat")
     options |= {name: options[name] or None for name in given}
     _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}

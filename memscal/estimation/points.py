@@ -287,7 +287,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         x_errors=np.broadcast_to(x_errors, u.shape)[keep],
         repeat=scan.passes[keep],
         owner=np.zeros(int(keep.sum()), dtype=np.intp),
-        anew=np.full(int(keep.sum()), scan.new_position_errors),
+        anew=np.full(int(keep.sum()), scan.position_errors_by_repeat),
         branch=branch[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),

@@ -101,6 +101,9 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
                 if axis not in keys:
                     children.setdefault(axis, writer.index_axis(axis, size))
             children[quantity.key] = si(value, quantity.dimension, quantity.axes)
+            if quantity.of is not None:
+                value_of = quantity.key.removesuffix("_errors")
+                children.setdefault(value_of, si(quantity.of, quantity.dimension))
         elif value is not None and kind is not None and (value or kind.always):
             children[quantity.key] = kind.write(quantity, value)
     plot: dict[str, Attribute] = {"signal": record.signal, "axes": record.axes}

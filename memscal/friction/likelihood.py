@@ -126,7 +126,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     middle = (position.max() + position.min()) / 2
     drift = (position - middle) / (np.ptp(position) / 2)
     places = None
-    if points.x_errors.any() and not profile.scan.new_position_errors:
+    if points.x_errors.any() and not profile.scan.position_errors_by_repeat:
         places = _own(np.round(position, 12).tolist())
     return LoadPoints(
         u=points.u,

@@ -322,7 +322,7 @@ def measured_scan(scan: Scan) -> MeasuredScan:
         lubrication=scan.lubrication,
         position_scale_uncertainty=scan.position_scale_uncertainty,
         gain_uncertainty=scan.gain_uncertainty,
-        new_position_errors=scan.new_position_errors,
+        position_errors_by_repeat=scan.position_errors_by_repeat,
         synthetic=bool(scan.synthetic),
         source=scan.source,
         unit="" if scan.unit == "V" else scan.unit,

@@ -45,8 +45,8 @@ class MeasuredScan:
     """What is known of a scan beside its points.
 
     ``width``: its largest extent, in m; ``position_scale_uncertainty``, ``gain_uncertainty``:
-    relative, of the stage and of the sensor's chain; ``new_position_errors``: whether the errors
-    of its positions are new in each repeat;
+    relative, of the stage and of the sensor's chain; ``position_errors_by_repeat``: whether the
+    errors of its positions are new in each repeat;
     ``synthetic``: whether it was simulated; ``source``: the file it was read from; ``unit``: SI
     unit of its readings where they are no voltages.
 
@@ -70,7 +70,7 @@ class MeasuredScan:
     lubrication: str = ""
     position_scale_uncertainty: float | None = None
     gain_uncertainty: float | None = None
-    new_position_errors: bool = False
+    position_errors_by_repeat: bool = False
     synthetic: bool = False
     source: SourceFile | None = None
     unit: str = ""

@@ -88,6 +88,7 @@ class Quantity:
     shown: str = ""  # the unit where it is not its dimension's
     origin: str = ""  # the name among the origins of a file where it says where data come from
     label: str = ""  # the name in JSON and in data frames where it is another
+    of: float | None = None  # of an uncertainty: the value that stands beside it in files
 
     @property
     def key(self) -> str:

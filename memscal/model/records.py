@@ -8,6 +8,8 @@ from memscal.model.scan import STATED_ERRORS
 
 _L = "length"
 _LENGTHS = ("line_offset", "shear_sensitivity")
+#: What a scan states an uncertainty of that is one, and not none, where all is as it should be.
+_FACTORS = ("position_scale", "gain")
 _P = "stress"
 _U = "voltage"
 _ONE = "dimensionless"
@@ -132,10 +134,15 @@ TAKEN_FOR_GRANTED = record(
     "NXdata",
     Quantity("line_offset", _L, "distance of the line from the sensor"),
     *(
-        Quantity(f"{name}_uncertainty", _L if name in _LENGTHS else _ONE, stored=f"{name}_errors")
+        Quantity(
+            f"{name}_uncertainty",
+            _L if name in _LENGTHS else _ONE,
+            stored=f"{name}_errors",
+            of=float(name in _FACTORS),
+        )
         for name in STATED_ERRORS
     ),
-    Quantity("new_position_errors", "truth", "whether x_errors are new in each repeat"),
+    Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
 )
 """What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(
@@ -354,9 +361,9 @@ MEASURED_SCAN = record(
         Quantity("width", _L, "extent of the positions"),
         Quantity("synthetic", "truth", "whether the scan is synthetic"),
     ),
-    Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors"),
-    Quantity("gain_uncertainty", _ONE, _OF_GAIN, stored="gain_errors"),
-    Quantity("new_position_errors", "truth", "whether x_errors are new in each repeat"),
+    Quantity("position_scale_uncertainty", _ONE, _OF_SCALE, stored="position_scale_errors", of=1.0),
+    Quantity("gain_uncertainty", _ONE, _OF_GAIN, stored="gain_errors", of=1.0),
+    Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
     Quantity("unit", "text", "unit of readings that are no voltages"),
 )
 

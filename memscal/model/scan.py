@@ -190,7 +190,7 @@ class Scan:
         point to point, in N.
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from position to position, in m.
-    new_position_errors : bool
+    position_errors_by_repeat : bool
         Whether these errors are new in each repeat; else all repeats at a position share its error.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
         Correlation of the noise between the points of one repeat (of kind points: between all);
@@ -256,7 +256,7 @@ class Scan:
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
     x_errors: FloatArray | None = None
-    new_position_errors: bool = False
+    position_errors_by_repeat: bool = False
     u_zz_correlation: FloatArray | None = None
     direction: str = "x"
     position_scale_uncertainty: float | None = None

@@ -83,7 +83,7 @@ def test_errors_of_positions_are_as_stated(anew: bool) -> None:
             u_zz=u,
             u_zz_errors=np.full(u.shape, 0.005 * at(0.0)),
             x_errors=np.full(line().size, ERROR),
-            new_position_errors=anew,
+            position_errors_by_repeat=anew,
         )
         found = memscal.calibrate(made).apparatus.parameters
         off.append(deviates(found, {"gaussian_sigma": SIGMA, "centre": 0.0}))

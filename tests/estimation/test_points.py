@@ -66,7 +66,7 @@ def test_repeats_share_the_error_of_their_position(anew: bool, correlation: floa
     scan = replace(
         scan,
         x_errors=np.full(9, 10e-6),
-        new_position_errors=anew,
+        position_errors_by_repeat=anew,
         u_zz_correlation=correlation**apart if correlation else None,
     )
     points = measured_points(scan)

@@ -39,7 +39,7 @@ def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
     scan = dataclasses.replace(
         plain,
         x_errors=np.linspace(1e-6, 2e-6, 33),
-        new_position_errors=True,
+        position_errors_by_repeat=True,
         position_scale_uncertainty=2e-3,
         gain_uncertainty=5e-3,
         gain_curvature_uncertainty=0.01,

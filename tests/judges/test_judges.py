@@ -6,12 +6,14 @@ import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers.nexus import definitions_folder, violations
 
 import memscal
 from memscal.extensions.certificate.laboratory import read_laboratory
+from memscal.model.scan import STATED_ERRORS
 
 pytestmark = pytest.mark.judges
 
@@ -39,7 +41,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     scan = memscal.read_scan(experiment / "rod_scan.h5")
     raster = data / "rod_scan_raster.h5"
     apparatus = memscal.calibrate(scan).apparatus
-    memscal.write_scan(scan, files["line"])
+    # NeXus has another meaning of names that end with "_offset".
+    names = [name for name in STATED_ERRORS if name != "line_offset"]
+    stated: Any = {f"{name}_uncertainty": 1e-3 for name in names}
+    memscal.write_scan(replace(scan, position_errors_by_repeat=True, **stated), files["line"])
     memscal.write_scan(memscal.read_scan(raster), files["raster"])
     run = [sys.executable, "-m", "memscal", "reference", "rod", "--load", "1"]
     subprocess.run([*run, "-o", files["reference"]], check=True)

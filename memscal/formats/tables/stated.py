@@ -115,7 +115,7 @@ class ScanUncertainties:
         Of the load, common to all points, in N; and of each point's own, relative.
     x_error, position_scale_uncertainty : float, optional
         Of each position, in m; and of the stage's scale, relative.
-    new_position_errors : bool
+    position_errors_by_repeat : bool
         Whether errors of positions are new in each repeat; else the repeats share them.
     gain_uncertainty, gain_curvature_uncertainty, roundness_uncertainty : float, optional
         As in :class:`memscal.Scan`, with the next four; relative, or a share.
@@ -139,7 +139,7 @@ class ScanUncertainties:
     load_uncertainty: float | None = None
     load_scatter: float | None = None
     x_error: float | None = None
-    new_position_errors: bool = False
+    position_errors_by_repeat: bool = False
     position_scale_uncertainty: float | None = None
     gain_uncertainty: float | None = None
     gain_curvature_uncertainty: float | None = None
