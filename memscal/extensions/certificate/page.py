@@ -164,12 +164,14 @@ def _sources(apparatus: ApparatusFunction) -> str:
 
 
 def _assumptions(apparatus: ApparatusFunction) -> str:
-    """List what the values take for granted, and the size of each that moves A by one u."""
-    items = []
+    """Say what the values take for granted, and the size of each that moves A by one u."""
+    texts: dict[str, str] = {}
     for each in apparatus.assumptions:
         size = f"{each.measure}: {each.size_text('conversion_constant')}"
-        items.append(f"<li>{escape(f'{each.sentence} {each.state.capitalize()}; {size}.')}</li>")
-    return f"<ul>{''.join(items)}</ul>" if items else "<p>None is recorded.</p>"
+        text = f" {each.sentence.removesuffix('.')} ({size})."
+        texts[each.state] = texts.get(each.state, "") + text
+    paragraphs = [f"<b>{state.capitalize()}.</b>{escape(t)}" for state, t in texts.items()]
+    return " ".join(paragraphs) or "None is recorded."
 
 
 def _expanded(value: float, u: float | None, scale: float, unit: str = "mm") -> str:
