@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from html import unescape
 
 from memscal.extensions.certificate.certificate import Certificate, certify
 from memscal.extensions.certificate.dcc import certificate_xml
@@ -51,7 +52,7 @@ def test_it_is_no_accredited_certificate_unless_the_laboratory_says_otherwise(ce
 
 def test_what_the_values_take_for_granted_is_listed_with_its_sizes(apparatus, laboratory):
     assumed = tuple(Assumption(name, "assumed", dict.fromkeys(MOVED, 0.05)) for name in NAMES)
-    text = text_of(certify(replace(apparatus, assumptions=assumed), laboratory))
+    text = unescape(text_of(certify(replace(apparatus, assumptions=assumed), laboratory)))
     assert all(each.sentence.removesuffix(".") in text for each in assumed)
     assert "The sensor is round (axis ratio less one: 0.05). The line" in text
 
