@@ -18,13 +18,13 @@ import numpy as np
 
 from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.formats.files import damage_named, read_bytes
+from memscal.formats.tables.dialect import find_decimal
 from memscal.formats.tables.text_table import (
     Lines,
     NamedColumns,
     Sheet,
     TextTable,
     Wanted,
-    find_decimal,
 )
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import printable

@@ -7,7 +7,7 @@ import itertools
 import os
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -17,7 +17,22 @@ from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError, placed
 from memscal.formats.files import FilePath, read_pieces
-from memscal.formats.units import is_common_unit, is_unit, same_unit, to_si
+from memscal.formats.tables.dialect import (
+    DELIMITERS,
+    GROUPED,
+    MISSING,
+    NUMBER,
+    Rows,
+    cut_head,
+    filled,
+    find_decimal,
+    find_delimiter,
+    first_of_numbers,
+    is_number,
+    number_of,
+    units_in,
+)
+from memscal.formats.units import is_unit, same_unit, to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Profile
 from memscal.model.notation import printable
@@ -31,17 +46,8 @@ from memscal.model.sizes import (
 )
 from memscal.progress import Task
 
-_DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
-_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 #: Begins a line of cells, which is no comment: what a spreadsheet writes for an error is a cell.
 _CELLS = re.compile(r"\s*(?:[^\s#%]|#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?))", re.IGNORECASE)
-#: A number with a separator of thousands, such as -4.000,0.
-_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
-#: A name and its unit: x (mm) or x [mm], and x/mm.
-_HEADS = (re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"), re.compile(r"([^/]+?)\s*/(.+)"))
-#: Cells that mean a missing value, in capital or small letters.
-MISSING = ("", "-", "nan", "na", "n/a", "#n/a", "<na>", "nat", "null", "none")
 _MAX_NAME = 80
 _MAX_COMMENTS = 20
 _MAX_COMMENT = 300
@@ -51,10 +57,7 @@ _NAMED = 5
 _SAMPLE = 250
 _BLOCK = 2**16
 _LONGEST = 2**22
-#: Rows that tell which columns hold numbers: the last ones, for a preamble stands above them.
-_LAST = 50
 
-Rows = list[list[str]]
 Numbered = list[tuple[int, str]]
 Lines = range | list[int] | NDArray[np.int32]
 
@@ -82,7 +85,7 @@ class NamedColumns:
         self._name = name
         self._unit_row = tuple[str, ...]()
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
-        self._sentinels = [_float(w.replace(",", ".")) for w in missing if _NUMBER.fullmatch(w)]
+        self._sentinels = [number_of(w.replace(",", ".")) for w in missing if NUMBER.fullmatch(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
         self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
         # First row of each part, and the lines of its rows.
@@ -117,7 +120,7 @@ class NamedColumns:
         """Return the unit of a column: of its head, of the row of units, or the one given."""
         index = self._index(column)
         below = self._unit_row[index] if index < len(self._unit_row) else ""
-        head = next((u for u in _cut(self.names[index])[1:] if is_unit(u)), "")
+        head = next((u for u in cut_head(self.names[index])[1:] if is_unit(u)), "")
         if below and head and not same_unit(below, head):
             problem = f"{self.where(column)} has the unit {head!r} in its head, and {below!r}."
             raise InputError(problem, why="One of them is wrong.", cure="Correct the table.")
@@ -159,7 +162,7 @@ class NamedColumns:
     def _index(self, column: str | int) -> int:
         if isinstance(column, str) and self.names.count(column) == 1:
             return self.names.index(column)
-        heads = [_cut(name)[0] for name in self.names]
+        heads = [cut_head(name)[0] for name in self.names]
         sought = str(column)
         if heads.count(sought) > 1:
             named = [n for n, head in zip(self.names, heads, strict=True) if head == sought]
@@ -222,7 +225,7 @@ class NamedColumns:
         text = cell.replace(",", ".") if self.decimal == "," else cell
         with suppress(ValueError):
             if not (self._comma_alone and "." in cell):
-                return _float(text)
+                return number_of(text)
         lines, cells = self._wrong.setdefault(item.column, ([], []))
         lines.append(line)
         if len(cells) < _NAMED:
@@ -236,7 +239,7 @@ class NamedColumns:
             lines, cells = self._wrong[item.column]
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
-            grouped = any(map(_GROUPED.fullmatch, cells))
+            grouped = any(map(GROUPED.fullmatch, cells))
             raise FormatError(
                 f"{self.where(item.column)} holds what is not "
                 f"{' or '.join(['a number', *item.words])} in {self._row} {named}{more}.",
@@ -245,20 +248,6 @@ class NamedColumns:
                 "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
                 "stand before the header (--skip-rows N).",
             )
-
-
-def _float(text: str) -> float:
-    """Return a number; D as in Fortran begins its power of ten, too."""
-    return float(text.replace("D", "E").replace("d", "e"))
-
-
-def _cut(name: str) -> tuple[str, ...]:
-    """Return the name of a column and, if there is one, its unit."""
-    for head in _HEADS:
-        match = head.fullmatch(name)
-        if match:
-            return match.groups()
-    return (name,)
 
 
 class Sheet(NamedTuple):
@@ -311,7 +300,7 @@ class TextTable(NamedColumns):
         if not below:
             cure = "Give a table with one row per reading."
             raise FormatError(f"{self._name} holds no table.", cure=cure)
-        self._delimiter = delimiter or ("\t" if sheet else _find_delimiter([s for _, s in below]))
+        self._delimiter = delimiter or ("\t" if sheet else find_delimiter([s for _, s in below]))
         self._find_head(below, [(n, s) for n, s in comments if n > skip_rows])
         self._said = [line for n, line in sorted(lines + comments) if n < self._header]
         self._comments = [n for n, _ in comments if n > self._first[1][0]]
@@ -322,7 +311,7 @@ class TextTable(NamedColumns):
         """Find the first row of numbers, and the header and the row of units above it."""
         cut, places = self._rows(lines)
         rows = [[cell.strip() for cell in row] for row in cut]
-        start = _first_of_numbers(rows, self._missing)
+        start = first_of_numbers(rows, self._missing)
         if start is None:
             sheet = f"sheet {self._sheet.name!r} of " if self._sheet else ""
             cure = self._sheet.cure if self._sheet else "Give a table with rows of numbers."
@@ -333,11 +322,11 @@ class TextTable(NamedColumns):
             above = self._commented_heads(comments, places[start], width)
         names: list[str] = []
         self._header = places[start]
-        if above and _filled(above[-1][1]) >= min(2, width):
+        if above and filled(above[-1][1]) >= min(2, width):
             self._header, names = above.pop()
             line, title = above[-1] if above else (0, [])
-            units = _units_in(names)
-            whole = _filled(title) >= _filled(names) and not any(map(_is_number, title))
+            units = units_in(names)
+            whole = filled(title) >= filled(names) and not any(map(is_number, title))
             if units and line == self._header - 1 and whole:
                 self._unit_row = units
                 self._header = line
@@ -382,7 +371,7 @@ class TextTable(NamedColumns):
             apart = f"of the sheet {self._sheet.name!r}"
         else:
             mark = "comma" if self.decimal == "," else "point"
-            delimiter = _DELIMITERS.get(self._delimiter, repr(self._delimiter))
+            delimiter = DELIMITERS.get(self._delimiter, repr(self._delimiter))
             apart = f"separated by a {delimiter}, with a decimal {mark}"
         notes.append(f"Read {count} rows of {self._width} columns {apart}.")
         self.notes = tuple(notes)
@@ -552,87 +541,6 @@ def _line_end(text: bytes) -> int:
         if place:
             return place
     return 0
-
-
-def _filled(cells: Sequence[str]) -> int:
-    return sum(map(bool, cells))
-
-
-def _units_in(cells: Sequence[str]) -> tuple[str, ...]:
-    """Return the units in a row that holds units alone, "" where a cell is none."""
-    bare = [cell.strip("()[]- ") for cell in cells]
-    if not any(map(is_common_unit, bare)):
-        return ()
-    units = tuple(text if text and is_unit(text) else "" for text in bare)
-    return units if 2 * _filled(units) >= _filled(bare) else ()
-
-
-def _is_number(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell) is not None
-
-
-def _first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
-    """Return the first row of a table, below preamble, header and units; none without numbers."""
-    counts = [sum(map(_is_number, row)) for row in rows]
-    most = min(2, max(counts, default=0))
-    if not most:
-        return None
-    dense = [row for row, count in zip(rows, counts, strict=True) if count >= most]
-    numeric = []
-    for i, column in enumerate(itertools.zip_longest(*dense[-_LAST:], fillvalue="")):
-        stated = [_is_number(cell) for cell in column if cell.lower() not in missing]
-        if 2 * sum(stated) >= len(stated) > 0:
-            numeric.append(i)
-    good = []
-    some = []
-    for row in rows:
-        cells = [row[i] for i in numeric if i < len(row)]
-        some.append(any(map(_is_number, cells)))
-        whole = all(_is_number(cell) or cell.lower() in missing for cell in cells)
-        good.append(some[-1] and whole)
-    start = good.index(True) if any(good) else some.index(True)
-    while start and some[start - 1]:  # a row with a wrong cell, which is refused later
-        start -= 1
-    return start
-
-
-def _find_delimiter(lines: list[str]) -> str:
-    """Take the delimiter that cuts the most lines into equally many pieces, of numbers."""
-    best = " "
-    highest = 0.0
-    for delimiter in _DELIMITERS:
-        rows = [line.split(None if delimiter == " " else delimiter) for line in lines[-_LAST:]]
-        widths = [len(row) for row in rows]
-        common = max(set(widths), key=widths.count)
-        cells = itertools.chain(*(row for row in rows if len(row) == common))
-        numbers = sum(_is_number(cell.strip(' "')) for cell in cells)
-        equal = widths.count(common)
-        score = equal * (0.1 + numbers / (common * equal))
-        if common > 1 and score > highest:
-            best = delimiter
-            highest = score
-    return best
-
-
-def find_decimal(rows: Rows, delimiter: str = "") -> str:
-    """A comma is the decimal mark only where cells hold one comma each and no point."""
-    if delimiter == ",":
-        return "."
-    some = rows[:200]
-    cells = [cell for cell in itertools.chain(*some) if _is_number(cell)]
-    if not any("," in c for c in cells) or any("." in c for c in cells):
-        return "."
-    for column in itertools.zip_longest(*some, fillvalue=""):
-        commas = [c for c in column if "," in c and _is_number(c)]
-        bare = [c for c in column if "," not in c and _is_number(c)]
-        if commas and bare and all(map(_THOUSANDS.fullmatch, commas)):
-            raise FormatError(
-                f"The commas of {commas[0]!r} may separate thousands: {bare[0]!r} in the same "
-                "column has none.",
-                why="Separators of thousands are not read.",
-                cure="Take them out, or state that commas are decimal (--decimal ,).",
-            )
-    return ","
 
 
 def read_indenter_table(path: FilePath, *, r_unit: str, z_unit: str) -> Profile:
