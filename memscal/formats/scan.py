@@ -1,6 +1,7 @@
 """memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from memscal.errors import FormatError, placed
@@ -21,12 +22,14 @@ from memscal.model.sizes import too_large
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
+_SIGNAL = f"{_DATA}/u_zz"
 _SAMPLE = "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OWN_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
+_AS_SIGNAL = _DECLARED.keys() - _OWN_SHAPE
 _POINTS = ("point",)
 _PAIRS = ("point", "point_prime")
 _BRANCHES = ", ".join(["0 not stated", *(f"{i} {name}" for name, i in BRANCHES.items())])
@@ -77,7 +80,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     """Read the scan of an open memscal-scan file; one of more than ``most`` points is refused."""
     values.require_schema(file, writer.SCAN_SCHEMA)
     if most is not None:
-        size = file.claimed_number(f"{_DATA}/u_zz")
+        size = file.claimed_number(_SIGNAL)
         if size > most:
             cure = "Average neighbouring readings, thin the raster, or leave out repeats."
             raise too_large(file.name, size, most, "points", cure=cure)
@@ -86,12 +89,14 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
     film, indenter = groups.read_stated(file)
-    reading = reading_of(units_of(file, f"{_DATA}/u_zz") or "V", file.where(f"{_DATA}/u_zz"))
-    axes = _check_axes(file)
+    reading = reading_of(units_of(file, _SIGNAL) or "V", file.where(_SIGNAL))
+    axes = _find_axes(file)
     points = axes == _POINTS
-    only_y = points and not file.has(f"{_DATA}/x")
-    along = "y" if only_y or axes in _ALONG_Y.values() else "x"
+    only_y = axes is not None and not file.has(f"{_DATA}/x")
+    along = "y" if only_y or axes == ("y",) else "x"
     arrays = _read_arrays(file, along, reading)
+    if axes is not None and axes[-1] != along:
+        arrays |= {name: arrays[name].T for name in arrays.keys() & _AS_SIGNAL}
     # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
     repeat = file.array(f"{_DATA}/repeat") if points and file.has(f"{_DATA}/repeat") else None
     if "branch" in arrays:
@@ -224,28 +229,49 @@ def _nodes(
     }
 
 
-def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
-    """Return the axes: a square raster with them swapped would pass every other test."""
-    axes = file.attribute(_DATA, "axes")
-    if isinstance(axes, str):
-        axes = tuple(axes.replace(":", " ").replace(",", " ").split())
-    if axes is None:
-        return None
-    if axes not in (_POINTS, *_AXES.values(), *_ALONG_Y.values()):
+def _find_axes(file: SafeFile) -> tuple[str, ...] | None:
+    """Return the axes of the readings as they are stored; none where the shape alone tells them."""
+    shape = file.array(_SIGNAL).shape if file.has(_SIGNAL) else ()
+    present = tuple(name for name in "yx" if file.has(f"{_DATA}/{name}"))
+    forms = [_POINTS, present[:1]]
+    if len(shape) == 2:
+        form = present if len(present) == 2 else ("repeat", *present)
+        forms = [form, form[::-1]]
+    stated = set(_stated_axes(file, len(shape)))
+    fitting = [form for form in forms if stated.issubset(enumerate(form))]
+    if not fitting:
+        words = ", ".join(f"{name} as axis {i}" for i, name in sorted(stated))
         raise FormatError(
-            f"{file.where(_DATA)}@axes is {axes}.",
-            why="A scan is stored along [x], [repeat, x], [y], [repeat, y], [y, x] (a raster) or "
-            "[point].",
-            cure="Transpose the data, or correct the attribute.",
+            f"{file.where(_DATA)} states of its axes: {words}.",
+            why="A scan is stored along [x], [repeat, x], [y], [repeat, y] or [point], or [y, x] "
+            f"where {_DATA}/y makes it a raster; a square one that is turned would look right.",
+            cure="Transpose the data, or correct what states its axes.",
         )
-    if axes != _POINTS and ("y" in axes) != file.has(f"{_DATA}/y"):
-        stated = "names y, but there is no" if "y" in axes else "does not name y, but there is a"
+    if len(fitting) == 1:
+        return fitting[0]
+    if shape[:-1] == shape[1:] != ():
         raise FormatError(
-            f"{file.where(_DATA)}@axes {stated} {_DATA}/y.",
-            why="Without it a raster and a repeated line scan look the same.",
-            cure="Add the missing axis, or correct the attribute.",
+            f"{file.where(_SIGNAL)} is as long as wide, and nothing states which axis is which.",
+            cure=f"Add the attribute axes to {_DATA}, such as {list(form)}.",
         )
-    return axes
+    return None
+
+
+def _stated_axes(file: SafeFile, rank: int) -> Iterator[tuple[int, str]]:
+    """Yield the name of each axis of the readings that a file states, in whatever way."""
+    for path in (_DATA, _SIGNAL):
+        names = file.attribute(path, "axes") if file.has(path) else None
+        if isinstance(names, str):
+            names = tuple(re.findall(r"[\w.]+", names))
+        if isinstance(names, tuple) and len(names) == rank:
+            yield from enumerate(map(str, names))
+    if rank == 2:  # of points all axes are one
+        for name in ("x", "y", "repeat"):
+            index = file.attribute(_DATA, f"{name}_indices")
+            if isinstance(index, int):
+                yield index, name
+            for i in file.scaled_by(_SIGNAL, f"{_DATA}/{name}"):
+                yield i, name
 
 
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:

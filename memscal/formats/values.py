@@ -50,6 +50,8 @@ def require_schema(file: SafeFile, schema: str) -> str:
 def units_of(file: SafeFile, path: str) -> str | None:
     """Return the unit that stands at a path, or ``None``."""
     units = file.attribute(path, "units")
+    if isinstance(units, tuple) and len(units) == 1:
+        units = units[0]
     return None if units is None else str(units)
 
 

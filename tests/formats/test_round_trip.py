@@ -300,7 +300,7 @@ def test_what_is_missing_or_wrong_is_named_by_file_and_path(
 
 
 def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path: Path):
-    for name, words in (("swapped", r"axes(.|\n)*Transpose"), ("one", "there is no /entry/data/y")):
+    for name, words in (("swapped", r"axes(.|\n)*Transpose"), ("one", "y as axis 0")):
         path = tmp_path / f"{name}.h5"
         write_scan(make_scan("raster"), path)
         with h5py.File(path, "r+") as file:

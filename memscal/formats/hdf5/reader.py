@@ -25,8 +25,12 @@ from memscal.model.sizes import MOST_HDF5_BYTES
 
 _MAX_ATTRIBUTE_BYTES = 2**16
 _MAX_ATTRIBUTE_ITEMS = 64
-StoredAttribute = str | int | float | tuple[str, ...] | None
-"""Text, a number, a few texts, or nothing."""
+_SCALES = b"DIMENSION_LIST"
+#: What changes the numbers of an array: beside it, and among its attributes (unless it is this).
+_BESIDE = ("_scaling_factor", "_offset", "_mask")
+_HARMLESS = {"scale_factor": 1, "add_offset": 0, "_FillValue": None, "missing_value": None}
+StoredAttribute = str | int | float | tuple[str, ...] | tuple[float, ...] | None
+"""Text, a number, a few of either, or nothing."""
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -120,6 +124,7 @@ class SafeFile:
                 whole = of.kind.get_class() == h5py.h5t.INTEGER
                 values = np.empty(of.shape, dtype=np.int64 if whole else np.float64)
                 dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
+                self._require_plain(path, values)
                 values.setflags(write=False)
                 self._arrays[path] = values
         return self._arrays[path]
@@ -157,6 +162,39 @@ class SafeFile:
             with damage_named(f"{self.where(path)}@{name} cannot be read"):
                 self._attributes[path, name] = self._read_attribute(path, name)
         return self._attributes[path, name]
+
+    def scaled_by(self, path: str, scale: str) -> list[int]:
+        """Return the axes of a dataset to which the dimension scale at a path is attached."""
+        item = self._existing(path)
+        axes: list[int] = []
+        if h5py.h5a.exists(item, _SCALES):
+            with damage_named(f"{self.where(path)}@DIMENSION_LIST cannot be read"):
+                attribute = h5py.h5a.open(item, _SCALES)
+                lists = np.empty(attribute.shape, dtype=attribute.dtype)
+                self._check_texts(path, item, _SCALES, lists.size)
+                attribute.read(lists)
+                for i, references in enumerate(lists):
+                    with contextlib.suppress(KeyError):  # of a scale that was deleted
+                        scales = [h5py.h5r.dereference(at, item) for at in references]
+                        axes += [i] * (self._open(scale) in scales)
+        return axes
+
+    def _require_plain(self, path: str, values: np.ndarray[Any, Any]) -> None:
+        """Refuse numbers that others scale, shift or leave out before they use them."""
+        changes = [path + name for name in _BESIDE if values.ndim and self._open(path + name)]
+        for name, harmless in _HARMLESS.items():
+            stated = self.attribute(path, name)
+            if stated not in (None, harmless):
+                # A value may have been stored in fewer digits than the numbers.
+                fills = np.isclose(values[..., None], np.array(stated, float), 1e-6, 0)
+                if harmless is not None or fills.any():
+                    changes.append(f"{path}@{name}")
+        if changes:
+            raise FormatError(
+                f"{self.where(path)} is not as it is meant: {changes[0]} changes its numbers.",
+                why="Numbers are read as they are stored.",
+                cure="Store them as they are meant, NaN where one is missing, and nothing beside.",
+            )
 
     def _open(self, path: str) -> Any:
         """Return the object at a path, each part of which is a hard link; ``None`` if absent."""
@@ -205,6 +243,11 @@ class SafeFile:
             raise refuse(self.where(path), f"claims a text of {length:,} bytes", why)
         self._spend(path, length)
 
+    def _check_texts(self, path: str, item: Any, key: bytes, number: int) -> None:
+        address = h5py.h5o.get_info(item).addr
+        for length in limits.attribute_text_lengths(self._data, address, key, number, self._heaps):
+            self._check_length(path, length)
+
     def _read_attribute(self, path: str, name: str) -> StoredAttribute:
         item = self._existing(path)
         key = name.encode("ascii")
@@ -220,12 +263,11 @@ class SafeFile:
         limits.check_type(where, kind, text=text)
         self._spend(path, size)
         if text and kind.is_variable_str():
-            place = self._data, h5py.h5o.get_info(item).addr
-            for length in limits.attribute_text_lengths(*place, key, number, self._heaps):
-                self._check_length(f"{path}@{name}", length)
+            self._check_texts(path, item, key, number)
         values = np.empty(shape, dtype=kind.dtype)
         attribute.read(values)
         if not text:
-            return values.flat[0].item() if number else None
+            numbers = tuple(values.ravel().tolist())
+            return numbers if number > 1 else next(iter(numbers), None)
         texts = tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in values.flat)
         return texts if shape else texts[0]

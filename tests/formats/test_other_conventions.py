@@ -1,0 +1,92 @@
+"""Scans in which other programs state axes, scales and missing values in their own ways."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from helpers.builders import make_scan
+
+from memscal.errors import InputError
+from memscal.formats.inspection import check
+from memscal.formats.scan import read_scan, write_scan
+
+SIDE = np.linspace(-4e-3, 4e-3, 9)
+U = np.exp(-((SIDE - 1e-3) ** 2 + (SIDE[:, None] + 2e-3) ** 2) / 8e-6)
+
+
+def scales(file: h5py.File, order: str) -> None:
+    for i, name in enumerate(order):
+        file[name].make_scale(name)
+        file["u_zz"].dims[i].attach_scale(file[name])
+
+
+WAYS = {
+    "list": lambda file, order: file.attrs.update(axes=[*order]),
+    "text": lambda file, order: file.attrs.update(axes=",".join(order)),
+    "of the signal": lambda file, order: file["u_zz"].attrs.update(axes=":".join(order)),
+    "indices": lambda file, order: file.attrs.update(
+        x_indices=order.index("x"), y_indices=[order.index("y")]
+    ),
+    "one index": lambda file, order: file.attrs.update(x_indices=order.index("x")),
+    "dimension scales": scales,
+}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A square raster whose axes nothing states, as another program may write it."""
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
+        del file["/entry/data"], file.attrs["memscal_content_sha256"]
+        for name, values in {"x": SIDE, "y": SIDE, "u_zz": U}.items():
+            file[f"/entry/data/{name}"] = values
+            file[f"/entry/data/{name}"].attrs["units"] = ["V" if name == "u_zz" else "m"]
+    return path
+
+
+@pytest.mark.parametrize("order", ["yx", "xy"])
+@pytest.mark.parametrize("way", WAYS)
+def test_a_square_raster_lies_as_its_axes_are_stated(path: Path, way: str, order: str):
+    with pytest.raises(InputError, match=r"nothing states which axis is which(.|\n)*axes to"):
+        read_scan(path)
+    with h5py.File(path, "r+") as file:
+        data = file["/entry/data"]
+        data["u_zz"][...] = U if order == "yx" else U.T
+        WAYS[way](data, order)
+    np.testing.assert_array_equal(read_scan(path).u_zz, U)
+    with h5py.File(path, "r+") as file:
+        other = "of the signal" if way != "of the signal" else "list"
+        WAYS[other](file["/entry/data"], order[::-1])
+    with pytest.raises(InputError, match=r"x as axis 0, .*x as axis 1(.|\n)*Transpose"):
+        read_scan(path)
+
+
+LARGEST = U.max()
+
+
+@pytest.mark.parametrize(
+    ("stated", "beside", "changed"),
+    [
+        ({"scale_factor": 1.0, "add_offset": 0, "_FillValue": np.nan}, (), False),
+        ({"missing_value": [-9999.0, 7.0]}, (), False),
+        ({"scale_factor": 1e-3}, (), True),
+        ({"add_offset": [2.0]}, (), True),
+        ({"_FillValue": np.float32(LARGEST)}, (), True),
+        ({"missing_value": [-1.0, LARGEST]}, (), True),
+        ({}, ("u_zz_scaling_factor",), True),
+        ({}, ("x_offset",), True),
+        ({}, ("u_zz_mask",), True),
+    ],
+)
+def test_numbers_that_another_statement_changes_are_refused(path: Path, stated, beside, changed):
+    with h5py.File(path, "r+") as file:
+        scales(file["/entry/data"], "yx")
+        file["/entry/data/u_zz"].attrs.update(stated)
+        for name in beside:
+            file[f"/entry/data/{name}"] = 2.0
+    assert check(path)[-1].passed is not changed
+    if changed:
+        with pytest.raises(InputError, match=f"{[*stated, *beside][0]} changes its numbers"):
+            read_scan(path)
