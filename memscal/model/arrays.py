@@ -118,9 +118,18 @@ def require_range(name: str, value: float, low: float, high: float, unit: str = 
         )
 
 
+def unmasked(values: Any) -> Any:
+    """Return values with None in the place of each that numpy has masked."""
+    parts = values if isinstance(values, list | tuple) else [values]
+    if any(map(np.ma.isMaskedArray, parts)):
+        array = np.ma.array(values)
+        return np.where(np.ma.getmaskarray(array), np.array(None), array.data)
+    return values
+
+
 def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:
-    """Return a read-only copy, so that a frozen dataclass stays frozen."""
-    array = np.array(values, dtype=dtype)
+    """Return a read-only copy, so that a frozen dataclass stays frozen; NaN where it is masked."""
+    array = np.array(unmasked(values), dtype=dtype)
     array.setflags(write=False)
     return array
 
@@ -168,7 +177,7 @@ def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
 
 def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Return a read-only copy of a vector of whole numbers."""
-    array = np.asarray(values, dtype=np.float64)
+    array = frozen_array(values)
     if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
         problem = f"{name} has shape {array.shape}, or holds values that are no whole numbers."
         raise InputError(problem, cure="Give one whole number for each point.")

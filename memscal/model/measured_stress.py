@@ -346,4 +346,4 @@ def _freeze(owner: object, *names: str, scale: float = 1.0) -> None:
     for name in names:
         values = getattr(owner, name)
         if values is not None:
-            object.__setattr__(owner, name, frozen_array(np.asarray(values) * scale / scale))
+            object.__setattr__(owner, name, frozen_array(frozen_array(values) * scale / scale))

@@ -80,7 +80,7 @@ def require_rod_friction(friction: float | None) -> None:
 
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
-    values = np.asarray(stated)
+    values = np.asarray(arrays.unmasked(stated))
     numbers = values
     named = {"": 0, **BRANCHES}
     if values.dtype.kind not in "biuf":

@@ -14,7 +14,7 @@ from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
 from memscal.formats.tables.text_table import NamedColumns, Wanted
 from memscal.formats.units import reading_of, to_si
-from memscal.model.arrays import keyword_array_record
+from memscal.model.arrays import frozen_array, keyword_array_record, unmasked
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
@@ -187,13 +187,15 @@ def import_table(
 
 def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
     """Return a scan of arrays like ``u``, of which some options are; a row of ``u`` is a pass."""
-    readings = np.asarray(u, dtype=np.float64)
+    readings = frozen_array(u)
     given = {name: options.pop(name) for name in _ARRAYS if options.get(name) is not None}
     if readings.ndim == 2 and not given.keys() & {"y", "repeat"}:
         given["repeat"] = np.arange(len(readings))[:, None]
     columns = {"u": readings, "x": x, **given}
     try:
-        table = {n: np.broadcast_to(v, readings.shape).ravel() for n, v in columns.items()}
+        table = {
+            n: np.broadcast_to(unmasked(v), readings.shape).ravel() for n, v in columns.items()
+        }
     except ValueError as error:
         problem = f"An array does not have the shape of u, {readings.shape}: {error}."
         raise InputError(problem, cure="Give one value for each reading.") from error

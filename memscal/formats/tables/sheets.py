@@ -26,7 +26,7 @@ from memscal.formats.tables.text_table import (
     TextTable,
     Wanted,
 )
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, unmasked
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_FILE_BYTES, MOST_OTHER_TAGS, MOST_TAGS, too_large
@@ -177,7 +177,7 @@ class FrameTable(NamedColumns):
     def _converted(self, item: Wanted, lines: Lines) -> FloatArray:
         index = self._index(item.column)
         with _reading(f"{self._name} cannot be read"):
-            values = np.asarray(self._column(index))
+            values = np.asarray(unmasked(self._column(index)))
         if values.shape != (self._rows,):
             problem = f"{self.where(item.column)} has shape {values.shape} in {self._rows} rows."
             raise InputError(problem, cure="Give one value for each row.")
