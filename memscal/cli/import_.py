@@ -245,7 +245,7 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
 @common.rod_friction_option(common.FREE_OR_STUCK)
-@option("--sheet", "NAME")("Sheet of a workbook.  [default: the first]")
+@option("--sheet", "NAME")("Sheet of a workbook.  [default: the first that is visible]")
 @option("--skip-rows", click.IntRange(1), metavar="N")(
     "Lines before the header.  [default: found from the table]"
 )

@@ -1,6 +1,7 @@
 """Tables that are no text: workbooks, Parquet files, and columns in memory."""
 
 import io
+import re
 import sys
 import zipfile
 from datetime import date
@@ -53,6 +54,69 @@ def test_a_sheet_of_a_workbook_is_read_below_its_title_and_named_by_its_rows(tmp
         imported(book, x="x", u="U")
     with pytest.raises(InputError, match=r"no sheet 'Data'(.|\n)*Info, Daten"):
         imported(book, sheet="Data", x="x", u="U")
+
+
+def edited(path: Path, change: Any) -> Path:
+    """A hidden sheet and a visible one of x and U, which a change turns into another."""
+    book = openpyxl.Workbook()
+    for sheet, factor in ((book.active, 9), (book.create_sheet("new"), 1)):
+        sheet.append(["x (mm)", "U (mV)", "note"])
+        for x, u in zip(X, U, strict=True):
+            sheet.append([x, factor * u, "ok"])
+    book.active.sheet_state = "hidden"
+    change(book["new"])
+    book.save(path)
+    return path
+
+
+def hide(sheet: Any) -> None:
+    sheet.auto_filter.ref = "A1:C4"
+    for row in (2, 4):
+        sheet.row_dimensions[row].hidden = True
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda _: None, r"3 columns of the sheet 'new'"),
+        (hide, r"Hidden, and read as all others: rows 2, 4\."),
+        (lambda sheet: sheet.merge_cells("C2:C4"), "Read 3 rows"),
+    ],
+)
+def test_the_first_visible_sheet_is_read_with_its_hidden_rows_named(tmp_path: Path, change, words):
+    scan = imported(edited(tmp_path / "a.xlsx", change), x="x", u="U")
+    np.testing.assert_allclose(scan.u_zz, [1e-3 * u for u in U])
+    assert re.search(words, scan.notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda sheet: sheet.merge_cells("B3:B4"), "rows 3 to 4 are merged"),
+        (lambda sheet: sheet.merge_cells("A3:C3"), "rows 3 to 3 are merged"),
+        (lambda sheet: sheet.__setitem__("B3", "=A3*2"), "row 3 .*without a stored result"),
+        (
+            lambda sheet: [sheet.__setitem__(f"{c}{r}", "=ROW()") for c in "AB" for r in (2, 3, 4)],
+            "no row of numbers(.|\n)*results must be stored",
+        ),
+    ],
+)
+def test_merged_cells_and_formulas_without_results_are_refused(tmp_path: Path, change, words):
+    with pytest.raises(FormatError, match=words):
+        imported(edited(tmp_path / "a.xlsx", change), x="x", u="U")
+
+
+def test_a_formula_has_the_result_that_is_stored_and_an_empty_text_is_one(tmp_path: Path):
+    path = edited(tmp_path / "a.xlsx", lambda sheet: sheet.__setitem__("B3", "=A3"))
+    for stored, u in ((b' t="str"><f>A3</f><v></v>', np.nan), (b"><f>A3</f><v>2</v>", 2e-3)):
+        parts = io.BytesIO()
+        with zipfile.ZipFile(path) as packed, zipfile.ZipFile(parts, "w") as written:
+            for name in packed.namelist():
+                text = packed.read(name).replace(b"><f>A3</f><v></v>", stored)
+                written.writestr(name, text)
+        (tmp_path / "b.xlsx").write_bytes(parts.getvalue())
+        scan = imported(tmp_path / "b.xlsx", x="x", u="U")
+        np.testing.assert_allclose(scan.u_zz[1], u)
 
 
 SHEET = (

@@ -37,6 +37,15 @@ _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 #: Options of reading by the kinds of tables that have a use for them.
 _USES = {"delimiter": ("text",), "skip_rows": ("text", "workbook"), "sheet": ("workbook",)}
 _PIECE = 2**16
+#: What a sheet holds besides its values: hidden rows, merged cells, and formulas without results
+#: (of an empty text the result is empty), in whose place openpyxl would give nothing.
+_HIDDEN = re.compile(rb'<(?:\w+:)?row\b(?=[^>]*\bhidden="(?:1|true)")[^>]*?\br="(\d+)"')
+_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\b[^>]*\bref="([A-Z0-9:]+)"')
+_NO_RESULT = re.compile(
+    rb'<(\w+:)?c\b(?![^>]*\bt="str")(?:[^>]*?(\br="\w+"))?[^>]*>\s*<(?:\w+:)?f\b[^>]*(?:/>|>[^<]*</[^>]*>)'
+    rb"\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</[^>]*>)?\s*</(?:\w+:)?c>"
+)
+_SAID = rb'<\1c \2 t="str"><\1v>a formula without a stored result</\1v></\1c>'
 _MAX_NAME = 80
 
 
@@ -78,13 +87,15 @@ _reading = partial(damage_named, why="Its reader gave no table back", cure="Save
 def _sheet_table(
     openpyxl: Any, name: str, data: bytes, *, sheet: str | None = None, **reading: Any
 ) -> TextTable:
-    """Return a sheet of a workbook, by default the first, as text."""
+    """Return a sheet of a workbook, by default the first that is visible, as text."""
     plain = _inflated(data, name)
     book = openpyxl.load_workbook(plain, read_only=True, data_only=True, keep_links=False)
     if sheet is not None and sheet not in book.sheetnames:
         why = f"Its sheets are: {', '.join(book.sheetnames)}."
         raise InputError(f"{name} has no sheet {sheet!r}.", why=why, cure="Give one of them.")
-    chosen = book[sheet] if sheet else book.worksheets[0]
+    visible = [one.title for one in book.worksheets if one.sheet_state == "visible"]
+    chosen = book[sheet or visible[0]]
+    xml = zipfile.ZipFile(plain).read(chosen._worksheet_path)
     claimed = chosen.max_row or 0
     chosen.reset_dimensions()  # which may claim billions of cells
     text = io.BytesIO()
@@ -94,8 +105,18 @@ def _sheet_table(
         if cells > MOST_TAGS:
             raise too_large(name, cells, MOST_TAGS, "cells", cure="Save it as CSV.")
         text.write("\t".join(map(_cell, row)).encode() + b"\n")
-    cure = f"Name the sheet of the table (--sheet): {', '.join(book.sheetnames)}."
-    content = Sheet(chosen.title, text.getvalue(), hashlib.sha256(data).hexdigest(), cure)
+    cure = (
+        f"Name the sheet of the table (--sheet): {', '.join(book.sheetnames)}. Of formulas the "
+        "results must be stored: save it in a spreadsheet program."
+    )
+    content = Sheet(
+        name=chosen.title,
+        text=text.getvalue(),
+        sha256=hashlib.sha256(data).hexdigest(),
+        cure=cure,
+        hidden=[*map(int, _HIDDEN.findall(xml))],
+        merged=[openpyxl.utils.range_boundaries(ref.decode()) for ref in _MERGED.findall(xml)],
+    )
     return TextTable(name, sheet=content, **reading)
 
 
@@ -120,7 +141,7 @@ def _inflated(data: bytes, name: str) -> io.BytesIO:
                     tags[in_sheet] += piece.count(b"<")
                     _limit(name, tags[in_sheet], most, f"tags of XML in its {part}")
                     _limit(name, total, MOST_FILE_BYTES, "bytes when it is unpacked")
-            xml = b"".join(pieces)
+            xml = _NO_RESULT.sub(_SAID, b"".join(pieces))
             # Entities multiply, and other encodings hide them.
             encoding = re.search(rb"encoding\s*=\s*[\"']([^\"']*)", xml[:200])
             if b"\0" in xml or b"<!" in xml or (encoding and encoding[1].lower() != b"utf-8"):

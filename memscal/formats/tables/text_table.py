@@ -257,6 +257,9 @@ class Sheet(NamedTuple):
     text: bytes
     sha256: str
     cure: str
+    #: Rows that are hidden, and the first and last column and row of merged cells.
+    hidden: list[int]
+    merged: list[tuple[int, int, int, int]]
 
 
 class TextTable(NamedColumns):
@@ -369,6 +372,9 @@ class TextTable(NamedColumns):
             )
         if self._sheet:
             apart = f"of the sheet {self._sheet.name!r}"
+            hidden = self._sheet.hidden
+            if hidden:
+                notes.append(f"Hidden, and read as all others: {self._named(hidden, len(hidden))}.")
         else:
             mark = "comma" if self.decimal == "," else "point"
             delimiter = DELIMITERS.get(self._delimiter, repr(self._delimiter))
@@ -455,6 +461,13 @@ class TextTable(NamedColumns):
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
         indices = [self._index(item.column) for item in wanted]
         rows, places = self._first
+        for left, top, right, bottom in self._sheet.merged if self._sheet else ():
+            if bottom >= places[0] and any(left <= i + 1 <= right for i in indices):
+                raise FormatError(
+                    f"{self._name}: cells of the rows {top} to {bottom} are merged.",
+                    why="Which row, and which column, the one value belongs to is not known.",
+                    cure="Split them, and write into each cell what is meant.",
+                )
         yield places, self._columns_of(rows, places, indices, wanted)
         for block in self._blocks:
             numbers = self._bare_numbers(block)
