@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from memscal.errors import FormatError, InputError, UnitWarning
 from memscal.formats.tables.reference import read_reference_table
 from memscal.formats.tables.scan import ImportedScan, import_table
 from memscal.formats.tables.stated import TableLayout
+from memscal.formats.tables.text_table import read_indenter_table
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan
@@ -421,6 +423,19 @@ def test_an_error_of_a_spreadsheet_is_a_cell_and_a_comment_among_rows_is_told(tm
     found = scan_table(tmp_path, "x,u\n0,1\n1,2\n#2,3\n3,4\n4,5\n")
     assert found.x.size == 4
     assert any("Left out as comments: line 4." in text for text in marked_texts(found.messages))
+
+
+@pytest.mark.parametrize(("apex", "lowest"), [(0.0, 0.0), (3.0, 3.0), (0.4, 0.5), (6.0, 6.0)])
+def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path: Path, apex, lowest):
+    r = np.arange(0.0, 6.5, 0.5)
+    table = tmp_path / "tip.csv"
+    table.write_text(rows(*map(np.ndarray.tolist, (r, 5 * (r - apex) ** 2)), header="r,z"))
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        read_indenter_table(table, r_unit="mm", z_unit="um")
+    assert [f"lowest height is {lowest:g} mm from" in str(each.message) for each in seen] == [
+        True
+    ] * (apex > 0)
 
 
 def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):

@@ -167,6 +167,8 @@ _AXISYMMETRIC = 4
 _SIX = 6
 _NINE = 9
 _MOST_LISTED = 30
+#: Share of the largest normal stress that a shear may have and be zero.
+_ZERO = 1e-3
 
 
 @value_record
@@ -177,7 +179,7 @@ class Component:
     at_points: bool
     column: int
     meaning: str
-    tensor: bool = False
+    tensor: int = 0  # how many components it has
 
 
 def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
@@ -200,7 +202,7 @@ def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
     if counts[field] == _SCALAR:
         return Component(field, field in at_points, 0, "the value")
     column, meaning = _tensor_component(mesh, frame, field, counts[field], axis)
-    return Component(field, field in at_points, column, meaning, tensor=True)
+    return Component(field, field in at_points, column, meaning, counts[field])
 
 
 def _tensor_component(
@@ -305,6 +307,8 @@ def read_reference_mesh(
         _component_note(normal, "Normal stress", treatment),
     ]
     if tangential is not None:
+        if tangential.tensor == _SIX:
+            _require_order(mesh, frame, footing, tangential, _ZERO * np.abs(values).max())
         turned = footing.outward if shear_sign is None else shear_sign
         values = _at_base(mesh, frame, footing, tangential)[1]
         columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
@@ -357,6 +361,20 @@ def _shear_component(
             )
         return component
     return _find(mesh, frame, normal.field, frame.radial[0]) if normal.tensor else None
+
+
+def _require_order(mesh: Mesh, frame: Frame, base: Base, shear: Component, zero: float) -> None:
+    """Refuse six components of a section of which another shear than that in it is not zero."""
+    for column in {3, 4, 5} - {shear.column}:
+        if np.abs(_at_base(mesh, frame, base, replace(shear, column=column))[1]).max() > zero:
+            other = f"{shear.field}:{column + 1}"
+            raise InputError(
+                f"In {mesh.source.file_name} {other!r} is not zero, as a shear across it is in a "
+                "section.",
+                why=f"So its components are not in the order {', '.join(_SYMMETRIC)}.",
+                cure=f'Name the shear (shear; --shear "{other}"), and the normal stress likewise '
+                "(sigma; --sigma).",
+            )
 
 
 def _at_base(

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import os
 import re
+import warnings
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -49,6 +50,8 @@ from memscal.progress import Task
 #: Begins a line of cells, which is no comment: what a spreadsheet writes for an error is a cell.
 _CELLS = re.compile(r"\s*(?:[^\s#%]|#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?))", re.IGNORECASE)
 _MAX_NAME = 80
+#: Share of an indenter's height by which its axis may lie above the lowest point.
+_HOLLOW = 1e-3
 _MAX_COMMENTS = 20
 _MAX_COMMENT = 300
 _NAMED = 5
@@ -561,6 +564,15 @@ def read_indenter_table(path: FilePath, *, r_unit: str, z_unit: str) -> Profile:
     table = TextTable(path)
     units = {1: r_unit, 2: z_unit}
     columns = table.columns({str(i): Wanted(i, unit, "length") for i, unit in units.items()})
-    with placed(os.path.basename(os.fspath(path))):
+    name = os.path.basename(os.fspath(path))
+    with placed(name):
         # What a microscope calls zero is anywhere.
-        return Profile(r=columns["1"], z=columns["2"] - columns["2"].min())
+        profile = Profile(r=columns["1"], z=columns["2"] - columns["2"].min())
+    if profile.z[0] > _HOLLOW * profile.z.max():
+        lowest = profile.r[profile.z.argmin()]
+        warnings.warn(
+            f"{name}: the lowest height is {lowest * 1e3:.4g} mm from the axis, so that a ring "
+            "touches first. If the table goes across the tip, let r begin at its apex.",
+            stacklevel=2,
+        )
+    return profile

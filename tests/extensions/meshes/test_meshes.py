@@ -117,6 +117,26 @@ def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path, sigma, pl
     assert_is_the_section(imported(saved(section(plane), tmp_path / "film.vtu"), sigma))
 
 
+@pytest.mark.parametrize(("plane", "order", "shear"), [
+    ("xz", [0, 1, 2, 3, 5, 4], "S6:5"),  # of Abaqus: xy, xz, yz
+    ("xy", [0, 1, 2, 4, 5, 3], "S6:6"),  # of Voigt: yz, xz, xy
+    ("yz", [0, 1, 2, 4, 5, 3], "S6:4"),
+])  # fmt: skip
+@pytest.mark.parametrize("kept", ["point_data", "cell_data"])
+def test_shears_of_a_section_in_another_order_are_refused_unless_named(
+    tmp_path, plane, order, shear, kept
+):
+    mesh = section(plane)
+    six = mesh.point_data["S6"][:, order]
+    mesh.point_data = {"S6": six} if kept == "point_data" else {}
+    mesh.cell_data = {"S6": [six[mesh.cells[0].data].mean(axis=1)]} if kept == "cell_data" else {}
+    path = saved(mesh, tmp_path / "film.vtu")
+    with pytest.raises(InputError, match=f"'{shear}' is not zero(.|\n)*--shear \"{shear}"):
+        imported(path, "S6")
+    found = imported(path, "S6", shear=shear).profile
+    assert np.abs(found.sigma_rz).max() > 0.05 * found.sigma_zz.max()
+
+
 def test_the_axis_across_the_film_can_be_named(tmp_path):
     path = saved(section("yx"), tmp_path / "film.vtu")  # y is the radius, x the height
     (warning,) = [note for note in imported(path).notes if note.kind == "vertical_axis"]
