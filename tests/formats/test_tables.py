@@ -438,6 +438,35 @@ def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path: Path, ap
     ] * (apex > 0)
 
 
+@pytest.mark.parametrize(
+    ("dead", "left", "place"),
+    [
+        ([], 0, ""),
+        ([np.s_[-1]], 9, r"y from 4 to 4 mm"),
+        ([np.s_[:2]], 18, r"y from -4 to -3 mm"),
+        ([np.s_[:, -1]], 9, r"x from 4 to 4 mm"),
+        ([np.s_[0], np.s_[:, 0]], 17, r"y from -4 to -4 mm(.|\n)*x from -4 to -4 mm"),
+        ([np.s_[4]], 0, ""),
+        ([np.s_[::8], np.s_[1, :4], np.s_[1, 6:]], 9, "y from 4 to 4 mm"),  # a signal that ends
+        ([np.s_[-1, 2:]], 0, ""),
+    ],
+)
+@pytest.mark.parametrize("passes", [1, 2])
+def test_dead_rows_at_the_edge_of_a_raster_are_left_out_and_named(dead, left, place, passes):
+    side = np.arange(-4.0, 5.0)
+    x, y = np.meshgrid(side, side)
+    u = np.random.default_rng(1).normal(np.exp(-(x**2 + y**2) / 8), 0.01)
+    for rows_of_zeros in dead:
+        u[rows_of_zeros] = 0.0
+    columns = {"x": x, "y": y, "u": u, "r": np.zeros_like(x)}
+    table = {name: np.tile(values.ravel(), passes) for name, values in columns.items()}
+    table["r"] = np.repeat(np.arange(passes), u.size)
+    found = imported(table, x="x", y="y", u="u", repeat="r", x_unit="mm", u_unit="mV")
+    assert found.u_zz.size == passes * (u.size - left)
+    assert re.search(place, found.notes)
+    assert ("rows of zeros" in found.notes) is bool(left)
+
+
 def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):
     found = scan_table(tmp_path, "x,u\n−1,1\n0,1D5\n1,2\n2,3\n", missing=["1d5"])
     assert found.x[0] == -1e-3

@@ -25,6 +25,7 @@ from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
+from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
 from memscal.readings.find_places import places_of
 from memscal.readings.mistaken_unit import require_plausible, require_recorded, require_span
@@ -177,6 +178,7 @@ def import_table(
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
+    columns = without_dead_rows(columns, notes)
     scan = _scan_of(columns, notes, reading, conditions, uncertainties, table.source, holds)
     del columns  # the scan has copies, and ten million rows are many
     if scan.film is not None:
