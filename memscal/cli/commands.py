@@ -28,7 +28,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find a command; suggest names close to a misspelt one."""
+        """Find a command, suggest names close to a misspelt one; refuse an option given twice."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
             from difflib import get_close_matches
@@ -36,7 +36,14 @@ class LazyGroup(click.Group):
             close = get_close_matches(name, COMMANDS)
             hint = f"Did you mean {' or '.join(close)}?" if close else ""
             ctx.fail(f"There is no command {name!r}. {hint}".strip())
-        return super().resolve_command(ctx, args)
+        found, command, rest = super().resolve_command(ctx, args)
+        if command is not None and not ctx.resilient_parsing:
+            inner = click.Context(command, ctx, found)
+            given = command.make_parser(inner).parse_args([*rest])[2]
+            for option in given:
+                if given.count(option) > 1 and not (option.multiple or option.type is click.BOOL):
+                    inner.fail(f"{option.opts[0]} is given twice, but has one value.")
+        return found, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click passes it
         """List the commands from what stands here, without importing them."""

@@ -69,10 +69,10 @@ Examples:
       --sigma S --sigma-unit MPa --load 1
 
 \b
-Columns are given by their names in the header, or by their numbers counted from 1. Units stand in
-the header (x [mm], x/mm) or in a row below it. Missing values are empty cells and the words
-nan, na, n/a, #n/a, nat, null, none and -. Workbooks and Parquet need the extra tables:
-pip install "memscal[tables]".
+Columns are given by their names in the header, or by their numbers counted from 1 where no name
+is a number. Units stand in the header (x [mm], x/mm) or in a row below it. Missing values are
+empty cells and the words nan, na, n/a, #n/a, nat, null, none and -. Workbooks and Parquet need the
+extra tables: pip install "memscal[tables]".
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
@@ -246,13 +246,13 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @common.film_options()
 @common.rod_friction_option(common.FREE_OR_STUCK)
 @option("--sheet", "NAME")("Sheet of a workbook.  [default: the first that is visible]")
-@option("--skip-rows", click.IntRange(1), metavar="N")(
-    "Lines before the header.  [default: found from the table]"
+@option("--skip-rows", click.IntRange(0), metavar="N")(
+    "Lines before the header, or the first reading.  [default: found from the table]"
 )
 @option("--missing", "WORD", multiple=True)(
     "A word, or a number such as -9999, that means a missing value, besides those below."
 )
-@option("--delimiter", "CHAR")("What separates columns; found from the table by default.")
+@option("--delimiter", "CHAR")("What separates columns, or TAB; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
 def command(

@@ -77,7 +77,8 @@ class Quantity(_Number):
         try:
             number = float(value)
         except ValueError:
-            self.fail(f"{value!r} is not a number{in_unit}.", param, ctx)
+            point = " Write a decimal point, not a comma." if "," in str(value) else ""
+            self.fail(f"{value!r} is not a number{in_unit}.{point}", param, ctx)
         finite = math.isfinite(number) or (self.infinite and number == math.inf)
         above = number > self.low if self.open_low else number >= self.low
         if not (finite and above and number <= self.high):

@@ -1,8 +1,10 @@
 """Mistaken units: lengths and loads of a scan that no film, rod and sensor can have."""
 
+import warnings
+
 import numpy as np
 
-from memscal.errors import InputError
+from memscal.errors import InputError, UnitWarning
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -39,6 +41,21 @@ _BEYOND = 0.3
 _MOST_POINTS = 1_000_000
 #: Share of points within a peak's width that lie above its half.
 _CROWDED = 0.7
+
+
+#: Volts that no sensor's amplifier gives, and that no noise has.
+_LARGEST_READING = 20.0
+_LARGEST_NOISE = 1.0
+
+
+def warn_of_readings(scan: Scan) -> None:
+    """Warn of voltages and of a noise that no sensor has, and name the units that were meant."""
+    noise = 0.0 if scan.u_zz_errors is None else np.nanmax(scan.u_zz_errors, initial=0.0)
+    largest = np.nanmax(np.abs(scan.u_zz))
+    if scan.unit == "V" and (largest > _LARGEST_READING or noise > _LARGEST_NOISE):
+        noisy = f" with a noise of {noise:.4g} V" if noise else ""
+        text = f"Readings up to {largest:.4g} V{noisy}: were mV meant, or uV? MV are megavolts."
+        warnings.warn(text, UnitWarning, stacklevel=2)
 
 
 def mistaken_unit(factor: float) -> str:

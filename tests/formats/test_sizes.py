@@ -95,8 +95,8 @@ def big_table(path: Path, rows: int) -> Path:
 
 def test_a_column_that_no_row_has_is_missing_throughout(tmp_path: Path):
     path = tmp_path / "t.txt"
-    path.write_text("x u n m\n" + "1 2 3\n" * 20_000)
-    found = TextTable(path).columns({"u": Wanted("u"), "m": Wanted("m")})
+    path.write_text("x,u,n,m\n" + "1,2,3\n" * 20_000)
+    found = TextTable(path, delimiter=",").columns({"u": Wanted("u"), "m": Wanted("m")})
     assert (found["u"].sum(), found["m"].size) == (40_000, 20_000)
     assert np.isnan(found["m"]).all()
 

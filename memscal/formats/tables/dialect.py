@@ -1,6 +1,7 @@
 """The dialect of a table of text: what parts its cells, its decimal mark, head and first row."""
 
 import itertools
+import math
 import re
 from collections.abc import Sequence, Set
 
@@ -8,12 +9,20 @@ from memscal.errors import FormatError
 from memscal.formats.units import is_common_unit, is_unit
 
 DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
-NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+#: D begins a power of ten, as in Fortran, where a sign or a decimal mark tells it from a name, 1D5.
+NUMBER = re.compile(
+    r"[+-]?(?:(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+|[dD][+-]\d+)?|\d*[.,]\d*[dD]\d+)"
+)
+_MEASURED = re.compile(rf"{NUMBER.pattern}\s*([^\d\s].*)")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 #: A number with a separator of thousands, such as -4.000,0.
 GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 #: A name and its unit: x (mm) or x [mm], and x/mm.
 _HEADS = (re.compile(r"(.+?)[\s/]*[(\[]([^()\[\]]+)[)\]]"), re.compile(r"([^/]+?)\s*/(.+)"))
+UNIT = re.compile(r"[fpnuµμmkMG]?(?:V|A|T|Pa|N)|[nuµμmc]?m")
+#: A word between blanks; one that is a name has the unit in brackets that follows it.
+_WORD = re.compile(r"[^\W\d]\S*\s+(?:\([^()]*\)|\[[^\[\]]*\])|\S+")
+_REMARK = re.compile(r"comment|remark|note|bemerk|kommentar", re.IGNORECASE)
 #: Cells that mean a missing value, in capital or small letters.
 MISSING = ("", "-", "nan", "na", "n/a", "#n/a", "<na>", "nat", "null", "none")
 #: Rows that tell which columns hold numbers: the last ones, for a preamble stands above them.
@@ -23,8 +32,27 @@ Rows = list[list[str]]
 
 
 def number_of(text: str) -> float:
-    """Return a number; D as in Fortran begins its power of ten, too."""
-    return float(text.replace("D", "E").replace("d", "e"))
+    """Return a number, or NaN; Python's ``1_0`` and ``inf`` are none."""
+    number = float(text.replace("D", "E").replace("d", "e"))
+    if not is_number(text) and not math.isnan(number):
+        raise ValueError(text)
+    return number
+
+
+def holds_unit(cell: str) -> bool:
+    """Whether a cell is a number and its unit, such as -6 mm."""
+    match = _MEASURED.fullmatch(cell)
+    return match is not None and is_unit(match[1])
+
+
+def are_units(cells: Sequence[str]) -> bool:
+    """Whether all cells are units of readings, and one has a prefix: letters alone may be flags."""
+    return all(map(UNIT.fullmatch, cells)) and max(map(len, cells)) > 1
+
+
+def words_of(line: str) -> list[str]:
+    """Cut a line at its blanks, but not between a name and its unit in brackets."""
+    return _WORD.findall(line)
 
 
 def cut_head(name: str) -> tuple[str, ...]:
@@ -39,6 +67,12 @@ def cut_head(name: str) -> tuple[str, ...]:
 def filled(cells: Sequence[str]) -> int:
     """Return how many cells are not empty."""
     return sum(map(bool, cells))
+
+
+def named_columns(heads: Sequence[str]) -> int:
+    """Return the number of the last column with a name; rows may lack one for remarks."""
+    stated = [i for i, head in enumerate(heads, 1) if head and not _REMARK.match(head)]
+    return max(stated, default=0)
 
 
 def units_in(cells: Sequence[str]) -> tuple[str, ...]:
@@ -80,40 +114,62 @@ def first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
     return start
 
 
+def _several_numbers(cell: str) -> bool:
+    words = cell.split()
+    return len(words) > 1 and all(map(is_number, words))
+
+
 def find_delimiter(lines: list[str]) -> str:
     """Take the delimiter that cuts the most lines into equally many pieces, of numbers."""
     best = " "
     highest = 0.0
+    last = lines[-_LAST:]
+    by_tabs = [line.split("\t") for line in last[len(last) // 2 :]]
+    # Blanks would close up a column that is empty.
+    count = {len(row) for row in by_tabs}
+    tabs = len(count) == 1 < max(count)
+    tabs &= not any(map(_several_numbers, itertools.chain(*by_tabs)))
     for delimiter in DELIMITERS:
-        rows = [line.split(None if delimiter == " " else delimiter) for line in lines[-_LAST:]]
+        if delimiter == " " and tabs:
+            break
+        rows = [line.split(None if delimiter == " " else delimiter) for line in last]
         widths = [len(row) for row in rows]
         common = max(set(widths), key=widths.count)
-        cells = itertools.chain(*(row for row in rows if len(row) == common))
-        numbers = sum(is_number(cell.strip(' "')) for cell in cells)
-        equal = widths.count(common)
-        score = equal * (0.1 + numbers / (common * equal))
+        whole = itertools.chain(*(row for row in rows if len(row) == common))
+        cells = [cell.strip(' "') for cell in whole if cell.strip()]
+        tests = (is_number(c) or c.lower() in MISSING or holds_unit(c) for c in cells)
+        score = widths.count(common) * (0.1 + sum(tests) / max(len(cells), 1))
         if common > 1 and score > highest:
             best = delimiter
             highest = score
     return best
 
 
-def find_decimal(rows: Rows, delimiter: str = "") -> str:
-    """A comma is the decimal mark only where cells hold one comma each and no point."""
-    if delimiter == ",":
+def find_decimal(rows: Rows, marks: str = ",.") -> str:
+    """Return the decimal mark of rows; of these marks one is refused that may part thousands.
+
+    A comma is it only where cells hold one comma each and no point.
+    """
+    by_column = itertools.zip_longest(*rows[:200], fillvalue="")
+    columns = [[cell for cell in column if is_number(cell)] for column in by_column]
+    columns = [column for column in columns if column]
+    written = "".join(itertools.chain(*columns))
+    mark = "," if "," in written and "." not in written else "."
+    if mark not in marks:
         return "."
-    some = rows[:200]
-    cells = [cell for cell in itertools.chain(*some) if is_number(cell)]
-    if not any("," in c for c in cells) or any("." in c for c in cells):
-        return "."
-    for column in itertools.zip_longest(*some, fillvalue=""):
-        commas = [c for c in column if "," in c and is_number(c)]
-        bare = [c for c in column if "," not in c and is_number(c)]
-        if commas and bare and all(map(_THOUSANDS.fullmatch, commas)):
-            raise FormatError(
-                f"The commas of {commas[0]!r} may separate thousands: {bare[0]!r} in the same "
-                "column has none.",
-                why="Separators of thousands are not read.",
-                cure="Take them out, or state that commas are decimal (--decimal ,).",
-            )
-    return ","
+    shown = [column for column in columns if any(mark in cell for cell in column)]
+    doubtful = []
+    mixed = False
+    for column in shown:
+        marked = [cell for cell in column if mark in cell]
+        if all(map(_THOUSANDS.fullmatch, marked)):
+            doubtful.append(marked[0])
+            mixed |= mark == "," and len(marked) < len(column)
+    alone = len(doubtful) == len(shown) < len(columns) and (mark == "," or len(shown) == 1)
+    if mixed or alone:
+        raise FormatError(
+            f"{doubtful[0]!r} has a decimal mark, or its {mark!r} may separate thousands.",
+            why="Separators of thousands are not read.",
+            cure=f"State that the mark is decimal (--decimal {mark}), or take the separators out.",
+        )
+    return mark

@@ -20,7 +20,6 @@ from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
 from memscal.model.old_keywords import with_old_keywords
-from memscal.model.provenance import SourceFile
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
@@ -28,7 +27,12 @@ from memscal.progress import Listener, reported
 from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
 from memscal.readings.find_places import places_of
-from memscal.readings.mistaken_unit import require_plausible, require_recorded, require_span
+from memscal.readings.mistaken_unit import (
+    require_plausible,
+    require_recorded,
+    require_span,
+    warn_of_readings,
+)
 
 Column = str | int
 Columns = dict[str, NDArray[Any]]
@@ -92,8 +96,9 @@ def import_table(
     source : path, data frame or mapping of str to array
         Text (CSV; UTF-8, UTF-16 or Latin-1), .xlsx, Parquet, or columns in memory.
     x, y, u : str or int
-        Columns of the positions and of the normal channel's readings, by name, or by number from
-        1.  Of positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.
+        Columns of the positions and of the normal channel's readings, by name, or by number from 1
+        where no column has a number as its name (a frame's column 1 is the one named 1).  Of
+        positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.
     u_errors : str or int, optional
         Column of the standard uncertainty of each reading.
     u_xz, u_yz, load_column, branch : str or int, optional
@@ -179,8 +184,9 @@ def import_table(
             columns["u_zz_errors"] = holds.u_errors
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
-    scan = _scan_of(columns, notes, reading, conditions, uncertainties, table.source, holds)
+    scan = _scan_of(columns, notes, reading, conditions, uncertainties, table, holds)
     del columns  # the scan has copies, and ten million rows are many
+    warn_of_readings(scan)
     if scan.film is not None:
         require_film = require_plausible if isinstance(scan.indenter, Rod) else require_span
         require_film(scan)
@@ -296,7 +302,7 @@ def _scan_of(
     reading: Reading,
     conditions: ScanConditions,
     uncertainties: ScanUncertainties,
-    source: SourceFile | None,
+    table: NamedColumns,
     holds: Holds | None,
 ) -> ImportedScan:
     """Return the scan of columns without gaps in their positions, and add to the notes."""
@@ -310,7 +316,7 @@ def _scan_of(
         columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
     along = _direction(columns, notes)
     stated["direction"] = conditions.direction or along
-    notes += _counted(columns)
+    notes += _counted(columns, table.others)
     notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
     noise = "not stated"
     if "u_zz_errors" in columns:
@@ -330,7 +336,7 @@ def _scan_of(
         **arrays,
         **stated,
         unit=reading.si,
-        source=source,
+        source=table.source,
         channels=channels,
         notes="\n".join(marked_texts(messages)),
         messages=tuple(messages),
@@ -431,6 +437,8 @@ def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str])
     finite = np.logical_and.reduce([np.isfinite(values) for values in stated])
     if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
+    if np.isnan(columns["u_zz"]).all():
+        raise InputError("No row of the table has a reading.", cure="Check the columns.")
     for name, values in columns.items():
         rows = np.flatnonzero(finite & np.isnan(values))
         if rows.size:
@@ -444,7 +452,7 @@ def _placed(columns: Columns, notes: list[str], name_rows: Callable[[Any], str])
     return columns
 
 
-def _counted(columns: Columns) -> list[str]:
+def _counted(columns: Columns, others: str) -> list[str]:
     x = columns["x"]
     y = columns.get("y", np.zeros(columns["x"].size))
     repeat = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
@@ -463,6 +471,13 @@ def _counted(columns: Columns) -> list[str]:
         counts = [(columns["branch"] == number).sum() for number in (1, 2, 0)]
         words = "{} readings on approach, {} on retreat, {} of neither branch."
         notes.append(words.format(*counts))
+    passes = (places.index * number + repeat) * 3 + columns.get("branch", 0)
+    several = round(x.size / np.unique(passes).size)
+    if several > 1 and "repeat" in columns:
+        notes.append(
+            f"{several} readings at each place of each repeat. Other columns that differ: "
+            f"{others}. If one of them numbers lines, name it (--repeat; --branch)."
+        )
     full = number * places.count - x.size
     if number > 1 and full > 0:
         notes.append(f"{full} more would make every repeat complete.")

@@ -51,7 +51,7 @@ _MAX_NAME = 80
 
 def open_table(source: Any, **reading: Any) -> NamedColumns:
     """Open a table of any kind: a path, or columns in memory (a mapping, a data frame)."""
-    reading = {name: value for name, value in reading.items() if value}
+    reading = {name: value for name, value in reading.items() if value or value == 0}
     path = isinstance(source, str) or hasattr(source, "__fspath__")
     ending = PurePath(source).suffix.lower() if path else ""
     kind = _KINDS.get(ending, "text") if path else "table in memory"
@@ -206,7 +206,7 @@ class FrameTable(NamedColumns):
             return values.astype(np.float64)
         cells = ["" if value is None else str(value).strip() for value in values.tolist()]
         with placed(self.where(item.column)):
-            self.decimal = self.decimal or find_decimal([[cell] for cell in cells])
+            self.decimal = self.decimal or find_decimal([[cell, "0"] for cell in cells], ",")
         return self._numbers(cells, lines, item)
 
     def _describe(self, count: int) -> None:

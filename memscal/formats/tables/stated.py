@@ -25,8 +25,8 @@ class TableLayout:
         The table is a log in the order of time: holds are found, and each is averaged.
     sheet : str, optional
         Sheet of a workbook, by default the first.
-    skip_rows : int
-        Lines before the header.
+    skip_rows : int, optional
+        Lines before the header, or before the first reading where there is no header.
     missing : sequence of str
         Words, or numbers as text, that mean a missing value.
     delimiter, decimal : str, optional
@@ -47,7 +47,7 @@ class TableLayout:
     u_sign: int = 1
     holds: bool = False
     sheet: str | None = None
-    skip_rows: int = 0
+    skip_rows: int | None = None
     missing: Sequence[str] = ()
     delimiter: str | None = None
     decimal: str | None = None

@@ -8,7 +8,7 @@ import os
 import re
 import warnings
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -22,16 +22,20 @@ from memscal.formats.tables.dialect import (
     DELIMITERS,
     GROUPED,
     MISSING,
-    NUMBER,
+    UNIT,
     Rows,
+    are_units,
     cut_head,
     filled,
     find_decimal,
     find_delimiter,
     first_of_numbers,
+    holds_unit,
     is_number,
+    named_columns,
     number_of,
     units_in,
+    words_of,
 )
 from memscal.formats.units import is_unit, same_unit, to_si
 from memscal.model.arrays import FloatArray
@@ -55,6 +59,18 @@ _HOLLOW = 1e-3
 _MAX_COMMENTS = 20
 _MAX_COMMENT = 300
 _NAMED = 5
+#: No quantity is as large: instruments write such numbers, mostly 9.9E37, for an overload.
+_OVERLOAD = 1e30
+#: What cells that are not read may be.
+_CAUSES = (
+    (GROUPED.fullmatch, "Separators of thousands are not read."),
+    (holds_unit, "Units stand in the cells; they are read in the head of the column alone."),
+    (
+        re.compile(r".+E[3-9]\d+").fullmatch,
+        "Instruments write such a number for an overload; --missing 9.9E37 leaves that one out.",
+    ),
+    (UNIT.fullmatch, "Units change from row to row; one is read for the whole column."),
+)
 #: Lines from which delimiter, decimal mark and header are found; bytes that are cut into cells at
 #: once, and those of the longest line.
 _SAMPLE = 250
@@ -80,6 +96,8 @@ class NamedColumns:
     names: tuple[str, ...] = ()
     source: SourceFile | None = None
     notes: tuple[str, ...] = ()
+    others = ""
+    """Names of the columns that were not asked for; of a text those that vary in its first rows."""
     decimal: str | None = None
     #: What a row is called in messages.
     _row = "row"
@@ -87,8 +105,14 @@ class NamedColumns:
     def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
         self._name = name
         self._unit_row = tuple[str, ...]()
+        # Why a head was not taken, and lines in which a head stands once more.
+        self._unfit = ""
+        self._again = set[int]()
+        # Columns not asked for, in whose cells other words are no readings.
+        self._others: list[Wanted] = []
+        self._last = 0
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
-        self._sentinels = [number_of(w.replace(",", ".")) for w in missing if NUMBER.fullmatch(w)]
+        self._sentinels = [number_of(w.replace(",", ".")) for w in missing if is_number(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
         self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
         # First row of each part, and the lines of its rows.
@@ -98,6 +122,8 @@ class NamedColumns:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
+        asked = [self._index(item.column) for item in wanted.values()]
+        self.others = ", ".join(n for i, n in enumerate(self.names) if i not in asked)
         rows = self._expected(len(wanted))
         count = 0
         # Lines may have other ends than were counted; room that stays empty is no memory.
@@ -105,11 +131,14 @@ class NamedColumns:
         parts = self._parts([*wanted.values()])
         for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
             self._lines_of.append((count, lines))
-            for column, numbers in zip(values, part, strict=True):
+            for item, column, numbers in zip(wanted.values(), values, part, strict=True):
                 if self._sentinels:
                     numbers = np.where(np.isin(numbers, self._sentinels), np.nan, numbers)
+                for i in np.flatnonzero(np.abs(numbers) >= _OVERLOAD):
+                    self._reject(f"{numbers[i]:g}".replace("e+", "E"), lines[i], item.column)
                 column[count : count + len(lines)] = numbers
             count += len(lines)
+            self._last = lines[-1] if len(lines) else self._last
         self._refuse_wrong([*wanted.values()])
         self._describe(count)
         return {
@@ -173,15 +202,17 @@ class NamedColumns:
             raise InputError(problem, cure="Give the number of the column, counted from 1.")
         if sought in heads:
             return heads.index(sought)
-        number = int(sought) if sought.isdecimal() else 0
-        if not 1 <= number <= len(self.names):
+        counted = [str(i + 1) for i in range(len(heads))]
+        # Where numbers are names, one that is none of them does not count columns.
+        if sought not in counted or any(map(str.isdecimal, {*heads} - {*counted})):
             raise InputError(
                 f"{self._name} has no column {column!r}.",
-                why="Its columns are: " + ", ".join(self.names) + ".",
-                cure="Give one of these names, or a number counted from 1. If the columns of the "
-                "table are others, state what separates its cells (--delimiter).",
+                why=self._unfit or "Its columns are: " + ", ".join(self.names) + ".",
+                cure="Give one of these names, or a number counted from 1 where no name is a "
+                "number. If the columns of the table are others, state what separates its cells "
+                "(--delimiter).",
             )
-        return number - 1
+        return int(sought) - 1
 
     def _expected(self, columns: int) -> int:
         """Return how many rows to expect; refuse more of some columns than are taken."""
@@ -206,10 +237,13 @@ class NamedColumns:
 
     def _numbers(self, cells: Sequence[str], lines: Lines, item: Wanted) -> FloatArray:
         """Return cells of a column as numbers; those that are none are kept for the message."""
+        written = "".join(cells)
         texts = [cell.replace(",", ".") for cell in cells] if self.decimal == "," else cells
-        if not (self._comma_alone and any("." in cell for cell in cells)):
+        if "_" not in written and not (self._comma_alone and "." in written):
             with suppress(ValueError):
-                return np.fromiter(map(float, texts), np.float64, len(cells))
+                numbers = np.fromiter(map(float, texts), np.float64, len(cells))
+                if not np.isinf(numbers).any():
+                    return numbers
         pairs = zip(cells, lines, strict=True)
         return np.array([self._number(cell, line, item) for cell, line in pairs])
 
@@ -229,24 +263,37 @@ class NamedColumns:
         with suppress(ValueError):
             if not (self._comma_alone and "." in cell):
                 return number_of(text)
-        lines, cells = self._wrong.setdefault(item.column, ([], []))
-        lines.append(line)
-        if len(cells) < _NAMED:
-            cells.append(printable(cell, _MAX_NAME))
+        self._reject(cell, line, item.column)
         return np.nan
 
+    def _reject(self, cell: str, line: int, column: str | int) -> None:
+        lines, cells = self._wrong.setdefault(column, ([], []))
+        lines.append(line)
+        if cell in self.names:
+            self._again.add(line)
+        if len(cells) < _NAMED:
+            cells.append(printable(cell, _MAX_NAME))
+
     def _refuse_wrong(self, wanted: list[Wanted]) -> None:
-        for item in wanted:
-            if item.column not in self._wrong:
+        if self._again:
+            again = self._named(sorted(self._again), len(self._again))
+            problem = f"{self._name}: the head of the table stands again in {again}."
+            raise FormatError(
+                problem, why="Another table begins there.", cure="Give each a file of its own."
+            )
+        for item in wanted + self._others:
+            lines, cells = self._wrong.get(item.column, ([], []))
+            # Others count where the table ends in words, as a summary does, or a unit changes.
+            stray = item in self._others and not item.words and lines[-1:] != [self._last]
+            if stray or not lines:
                 continue
-            lines, cells = self._wrong[item.column]
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
-            grouped = any(map(GROUPED.fullmatch, cells))
+            why = next((text for test, text in _CAUSES if any(map(test, cells))), "")
             raise FormatError(
                 f"{self.where(item.column)} holds what is not "
                 f"{' or '.join(['a number', *item.words])} in {self._row} {named}{more}.",
-                why="Separators of thousands are not read." if grouped else "",
+                why=why,
                 cure="Correct or remove these lines; name a word that means a missing value "
                 "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
                 "stand before the header (--skip-rows N).",
@@ -278,7 +325,7 @@ class TextTable(NamedColumns):
         delimiter: str | None = None,
         decimal: str | None = None,
         missing: Sequence[str] = (),
-        skip_rows: int = 0,
+        skip_rows: int | None = None,
         sheet: Sheet | None = None,
     ) -> None:
         super().__init__(os.path.basename(os.fspath(path)), missing)
@@ -287,14 +334,15 @@ class TextTable(NamedColumns):
         self._row = "row" if sheet else "line"
         self._digest = hashlib.sha256()
         self._latin = False
-        self._width = 0
+        self._reach = 0  # cells of the longest row
         self._line = 1
         self._blocks = self._whole_lines()
         lines = Numbered()
         comments = Numbered()
+        skipped = skip_rows or 0
         seen = 0
         # A head of a few endless lines, or of comments alone, is looked at no further than this.
-        while len(lines) < _SAMPLE + skip_rows and seen <= _LONGEST:
+        while len(lines) < _SAMPLE + skipped and seen <= _LONGEST:
             block = next(self._blocks, b"")
             if not block:
                 break
@@ -302,16 +350,22 @@ class TextTable(NamedColumns):
             more_lines, more_comments = self._numbered(block)
             lines += more_lines
             comments += more_comments
-        below = [(number, line) for number, line in lines if number > skip_rows]
+        below = [(number, line) for number, line in lines if number > skipped]
         if not below:
             cure = "Give a table with one row per reading."
             raise FormatError(f"{self._name} holds no table.", cure=cure)
-        self._delimiter = delimiter or ("\t" if sheet else find_delimiter([s for _, s in below]))
-        self._find_head(below, [(n, s) for n, s in comments if n > skip_rows])
+        stated = "\t" if sheet or delimiter == "TAB" else delimiter
+        self._sure = stated is not None
+        self._delimiter = stated or find_delimiter([s for _, s in below])
+        self._find_head(below, [(n, s) for n, s in comments if n > skipped])
         self._said = [line for n, line in sorted(lines + comments) if n < self._header]
-        self._comments = [n for n, _ in comments if n > self._first[1][0]]
+        self._comments: list[int] = []
+        self._leave_out([entry for entry in comments if entry[0] > self._first[1][0]])
+        if skip_rows is None and not self._headed:
+            self._refuse_counted()
+        marks = {",": ""}.get(self._delimiter, "," if sheet else ",.")
         with placed(self._name):
-            self.decimal = decimal or find_decimal(self._first[0], self._delimiter)
+            self.decimal = decimal or find_decimal(self._first[0], marks)
 
     def _find_head(self, lines: Numbered, comments: Numbered) -> None:
         """Find the first row of numbers, and the header and the row of units above it."""
@@ -321,11 +375,14 @@ class TextTable(NamedColumns):
         if start is None:
             sheet = f"sheet {self._sheet.name!r} of " if self._sheet else ""
             cure = self._sheet.cure if self._sheet else "Give a table with rows of numbers."
-            raise FormatError(f"{sheet}{self._name} has no row of numbers.", cure=cure)
+            cells = [cell for cell in rows[-1] if holds_unit(cell)]
+            why = f"Units stand in its cells ({cells[0]!r}), not in its head." if cells else ""
+            raise FormatError(f"{sheet}{self._name} has no row of numbers.", why=why, cure=cure)
         width = len(rows[start])
         above = [(places[i], rows[i]) for i in range(start) if any(rows[i])]
         if not above:
-            above = self._commented_heads(comments, places[start], width)
+            before = [(number, line) for number, line in comments if number < places[start]]
+            above = self._commented_heads(before, {width, width - (not rows[start][-1])})
         names: list[str] = []
         self._header = places[start]
         if above and filled(above[-1][1]) >= min(2, width):
@@ -337,29 +394,62 @@ class TextTable(NamedColumns):
                 self._unit_row = units
                 self._header = line
                 names = title
+        unfit = [len(row) for row in (names, self._unit_row) if len(row) not in (0, width)]
+        if unfit and self._delimiter == " ":
+            self._unfit = (
+                f"The head in {self._row} {self._header} has {unfit[0]} words, the rows {width} "
+                "cells: a name has a blank, or the first cells are names of rows."
+            )
+            if unfit[0] == width - 1 and rows[start][0] in ("1", '"1"'):  # as R writes them
+                cure = f"Name all columns, or leave this line out (--skip-rows {self._header})."
+                raise FormatError(f"{self._name}: {self._unfit}", cure=cure)
+            names = []
+            self._unit_row = ()
+            self._header = places[start]
         self._headed = bool(names)
+        self._width = max(len(names), *map(len, rows[start:]))
         heads = [*names, *[""] * (self._width - len(names))]
         self.names = tuple(printable(c, _MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
         by_rows = not names or self._delimiter == " "
         self._columns = width if by_rows else len(names)
+        self._named_columns = named_columns(names)
         after = places[start - 1] if start else 0
         self._require_whole(*self._first, [entry for entry in lines if entry[0] > after])
 
-    def _commented_heads(
-        self, comments: Numbered, before: int, width: int
-    ) -> list[tuple[int, list[str]]]:
+    def _refuse_counted(self) -> None:
+        """Refuse a first row that may number the columns, from 0 or 1, perhaps but the first."""
+        first = self._first[0][0]
+        counted = first[not is_number(first[0]) :]
+        numbers = [*map(str, range(len(counted) + 1))]
+        line = self._first[1][0]
+        if len(first) > 1 and counted in (numbers[:-1], numbers[1:]):
+            raise FormatError(
+                f"{self._name}: {self._row} {line} ({', '.join(first)}) looks like numbers of "
+                "columns, but may be a reading.",
+                cure="State how many lines stand before the first reading: "
+                f"--skip-rows {line}, or --skip-rows {line - 1}.",
+            )
+
+    def _commented_heads(self, comments: Numbered, widths: Set[int]) -> list[tuple[int, list[str]]]:
         """Return comments with as many cells as a row: numpy.savetxt writes the header as one."""
         heads = []
         for number, line in comments:
             text = line.lstrip(" \t#%")
-            if number < before and text:
+            if text:
                 (row,) = self._rows([(number, text)])[0]
-                if len(row) == width:
+                if len(row) in widths:
                     heads.append((number, [cell.strip() for cell in row]))
         return heads
 
+    def _leave_out(self, comments: Numbered) -> None:
+        """Leave out comments among the rows, and look for a head in them."""
+        self._comments += [number for number, _ in comments]
+        heads = self._commented_heads(comments, {self._columns}) if self._headed else []
+        self._again.update(number for number, cells in heads if {*cells} <= {*self.names})
+
     def _describe(self, count: int) -> None:
+        self._refuse_more_names()
         sha256 = self._sheet.sha256 if self._sheet else self._digest.hexdigest()
         self.source = SourceFile(self._name, sha256)
         notes = [f"Imported from {self._name} (sha256 {sha256})."]
@@ -385,6 +475,16 @@ class TextTable(NamedColumns):
         notes.append(f"Read {count} rows of {self._width} columns {apart}.")
         self.notes = tuple(notes)
 
+    def _refuse_more_names(self) -> None:
+        """Refuse names without cells, unless the delimiter is stated: rows may end in one."""
+        if not self._sure and self._reach < self._named_columns:
+            raise FormatError(
+                f"{self._name}: the head in {self._row} {self._header} has {self._named_columns} "
+                f"names, but no row more than {self._reach} cells.",
+                why="The last columns are empty, or the names are not above their cells.",
+                cure="If columns are empty, state what separates cells (--delimiter ',' or TAB).",
+            )
+
     @property
     def _comma_alone(self) -> bool:
         # The numbers of a workbook have points, whatever its texts have.
@@ -401,6 +501,8 @@ class TextTable(NamedColumns):
                 cure="Take quotation marks out of the rows of numbers, or close them.",
             )
         stated = self._columns
+        for row in rows:  # an empty last cell is none: rows may end in a delimiter
+            self._reach = max(self._reach, len(row) - (not row[-1].strip()))
         if self._delimiter == " ":
             wrong = (i for i, row in enumerate(rows) if len(row) != stated)
             by = "first row"
@@ -411,9 +513,10 @@ class TextTable(NamedColumns):
             raise FormatError(
                 f"{self._name}: {self._row} {places[i]} has {len(rows[i])} cells, the {by} "
                 f"{stated}.",
-                why="Which cell belongs to which column is not known.",
-                cure="Correct the table; state what separates its cells (--delimiter), or "
-                "write numbers with a decimal point where commas separate them.",
+                why="Which cell belongs to which column is not known, or another table begins.",
+                cure="Correct the table, or give each a file of its own; state what separates its "
+                "cells (--delimiter), or write numbers with a decimal point where commas separate "
+                "them.",
             )
 
     def _sayings(self) -> Iterator[str]:
@@ -463,6 +566,7 @@ class TextTable(NamedColumns):
 
     def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
         indices = [self._index(item.column) for item in wanted]
+        count = len(wanted)
         rows, places = self._first
         for left, top, right, bottom in self._sheet.merged if self._sheet else ():
             if bottom >= places[0] and any(left <= i + 1 <= right for i in indices):
@@ -471,19 +575,36 @@ class TextTable(NamedColumns):
                     why="Which row, and which column, the one value belongs to is not known.",
                     cure="Split them, and write into each cell what is meant.",
                 )
-        yield places, self._columns_of(rows, places, indices, wanted)
+        self.others = ", ".join(self._look_at_others(indices))
+        wanted = wanted + self._others
+        yield places, self._columns_of(rows, places, indices, wanted)[:count]
         for block in self._blocks:
             numbers = self._bare_numbers(block)
             if numbers is not None and max(indices) < self._columns:
-                yield range(self._line, self._line + len(numbers)), [*numbers.T[indices]]
+                self._reach = self._columns
+                yield range(self._line, self._line + len(numbers)), [*numbers.T[indices[:count]]]
                 self._line += len(numbers)
                 continue
             lines, comments = self._numbered(block)
-            self._comments += [number for number, _ in comments]
+            self._leave_out(comments)
             rows, places = self._rows(lines)
             self._require_whole(rows, places, lines)
             columns = self._columns_of(rows, places, indices, wanted)
-            yield np.array(places, dtype=np.int32), columns
+            yield np.array(places, dtype=np.int32), columns[:count]
+
+    def _look_at_others(self, read: list[int]) -> Iterator[str]:
+        """Yield names of columns that vary; read those that begin with numbers or units, too."""
+        rows, _ = self._first
+        for i, cells in enumerate(itertools.zip_longest(*rows, fillvalue="")):
+            begun = [cell for cell in cells[: len(rows) // 2] if cell.lower() not in self._missing]
+            if i in read or not begun:
+                continue
+            if len({*cells}) > 1:
+                yield self.names[i]
+            units = {begun[0].lower(): 0.0} if are_units(begun) else {}
+            if units or all(map(is_number, begun)):
+                self._others.append(Wanted(self.names[i], words=units))
+                read.append(i)
 
     def _bare_numbers(self, block: bytes) -> FloatArray | None:
         """Return a block of bare numbers in full rows, in a fifth of the time that cells take."""
@@ -496,7 +617,8 @@ class TextTable(NamedColumns):
             numbers = np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2)
         except ValueError:
             return None
-        return numbers if numbers.shape == (len(rows), self._columns) else None
+        whole = numbers.shape == (len(rows), self._columns) and not np.isinf(numbers).any()
+        return numbers if whole else None
 
     def _columns_of(
         self, rows: Rows, places: list[int], indices: list[int], wanted: list[Wanted]
@@ -534,7 +656,7 @@ class TextTable(NamedColumns):
         places = [number for number, _ in lines]
         texts = [line for _, line in lines]
         if self._delimiter == " ":
-            rows = [line.split() for line in texts]
+            rows = [words_of(line) for line in texts]
         else:
             try:
                 reader = csv.reader(texts, delimiter=self._delimiter, skipinitialspace=True)
@@ -543,10 +665,10 @@ class TextTable(NamedColumns):
                 raise FormatError(f"{self._name} cannot be cut into columns: {error}.") from error
             rows = [row for row, _ in cut]
             places = [places[line - 1] for _, line in cut]
-        self._width = max(self._width, *map(len, rows), 0)
-        if self._width > MOST_COLUMNS:
+        widest = max(map(len, rows), default=0)
+        if widest > MOST_COLUMNS:
             cure = "Leave out columns."
-            raise too_large(self._name, self._width, MOST_COLUMNS, "columns", cure=cure)
+            raise too_large(self._name, widest, MOST_COLUMNS, "columns", cure=cure)
         return rows, places
 
 
