@@ -187,7 +187,7 @@ NOT_WRITTEN = {
     "calibrate scan.h5 --sweep-figure no/out.png": CREATE,
     "certificate sensor.apparatus.h5 --lab lab.toml -o no/c.xml": CREATE,
     "compare sensor.apparatus.h5 scan.h5 --figures no/such/folder": CREATE,
-    "$columns $film --thickness 2 -o table.csv --force": INPUT,
+    "import table.csv -o table.csv --x x --x-unit mm --u u --u-unit mV --force": INPUT,
     "simulate --experiment sphere -o no/such/folder": CREATE,
     "simulate --experiment sphere -o scan.h5": "not a folder",
 }
