@@ -46,6 +46,10 @@ def calibration_messages(
             f"{solution.scan.stated_load:.4g} N (--relative takes none)."
         )
         messages.append(Message("load_of_reference", text))
+    solved = prepared.request.reference is None and prepared.as_stated[0].reference is None
+    if prepared.reading.per == "relative" and unloaded and solved:
+        text = "No load is stated: 1 N is taken, under which the shape of the stress is calculated."
+        messages.append(Message("load_of_reference", text))
     messages += quality.failed_check_messages(checks)
     if estimate.points.order:
         text = (

@@ -86,10 +86,13 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
     if request.reference is None:
         as_stated = tuple(chain(*map(crossed_lines, as_stated)))
     as_stated = require_one_sensor(as_stated)
+    loaded = as_stated
+    if request.relative and request.reference is None:
+        loaded = tuple(map(_with_some_load, as_stated))
     references = _references(request.reference, as_stated, request)
-    for scan, given in zip(as_stated, references, strict=True):
+    for scan, given in zip(loaded, references, strict=True):
         require_calibration_rod(scan, given)
-    scans = [_with_law(s, r, request) for s, r in zip(as_stated, references, strict=True)]
+    scans = [_with_law(s, r, request) for s, r in zip(loaded, references, strict=True)]
     stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
     if request.relative:
         scans = [_without_loads(s, r) for s, r in zip(scans, stated, strict=True)]
@@ -150,6 +153,12 @@ def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Sca
     if request.rod_friction is not None:
         scan = replace(scan, rod_friction=request.rod_friction)
     return scan
+
+
+def _with_some_load(scan: Scan) -> Scan:
+    """Return the scan with a load: 1 N where none is stated, for a relative A knows no other."""
+    stated = scan.load is not None or scan.reference is not None
+    return scan if stated else replace(scan, load=1.0)
 
 
 def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:

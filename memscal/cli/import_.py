@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from memscal.formats.tables.reference import ImportedProfile
     from memscal.formats.tables.scan import ImportedScan
 
-_SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "solver")
+_SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "value", "solver")
 _TABLE_ONLY = ("r",)
 _MESH_ONLY = ("vertical", "base", "centre")
 _REFERENCE_NAMES = (*_TABLE_ONLY, *_SHARED, *_MESH_ONLY)
@@ -111,7 +111,7 @@ _ONLY = {
     ],
     "reference": _REFERENCE_NAMES,
 }
-_NEEDED = {"scan": ("x", "u"), "reference": ("sigma", "load")}
+_NEEDED = {"scan": ("x", "u"), "reference": ("sigma",)}
 _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 
 
@@ -154,7 +154,12 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 )
 @option("--u-xz", "COLUMN")("Scan: column of the channel xz.")
 @option("--u-yz", "COLUMN")("Scan: column of the channel yz.")
-@option("--load", Quantity("N"))("Normal load, in N.")
+@option("--load", Quantity("N"))(
+    "Normal load, in N.  [default: not stated; of a reference the force that it carries]"
+)
+@option("--value", Quantity("N"))(
+    "Reference without a load: the force, in N, that it is scaled to carry."
+)
 @option("--load-column", "COLUMN")("Scan: column of the load at each point.")
 @option("--load-unit", "UNIT")("Scan: unit of the column of loads.  [default: N]")
 @option("--load-uncertainty", NonNegative("N"))(
@@ -320,6 +325,8 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
     misplaced = _stated(options, _ONLY[other])
     if misplaced:
         raise click.UsageError(f"{common.named(misplaced)} belong to --format {other}.")
+    if options["value"] is not None and options["load"] is not None:
+        raise click.UsageError("Give --load, or --value in its place.")
     if options["rod_friction"] is not None and options["indenter"] == "sphere":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
     if options["figures"] is not None and options["holds"] is None:

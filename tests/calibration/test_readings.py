@@ -90,6 +90,16 @@ def test_a_relative_calibration_takes_no_load_and_states_no_pascals(bare, tmp_pa
             state()
 
 
+@pytest.mark.parametrize("options", [{}, {"film_law": "linear"}, {"method": "bayesian"}])
+def test_a_relative_calibration_of_a_scan_without_a_load_is_that_at_1_n(options):
+    scan = replace(SCAN, load=1.0, load_uncertainty=None, normal_load=None)
+    unloaded = memscal.calibrate(replace(scan, load=None), relative=True, **options).apparatus
+    stated = memscal.calibrate(scan, relative=True, **options).apparatus
+    assert unloaded.conversion_constant == stated.conversion_constant
+    assert any("1 N is taken" in message.text for message in unloaded.process.messages)
+    assert not any("1 N is taken" in message.text for message in stated.process.messages)
+
+
 def test_an_artifact_without_a_film_measures_the_stress_of_a_scan_that_states_its_own(bare):
     measured, usual = (memscal.measure_stress(SCAN, a).profiles[0] for a in (bare, CALIBRATED))
     np.testing.assert_allclose(measured.s_zz, usual.s_zz, rtol=0.01, atol=0.01 * usual.maximum)

@@ -438,6 +438,25 @@ def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path: Path, ap
     ] * (apex > 0)
 
 
+@pytest.mark.parametrize(("value", "load"), [(None, 1.0), (3.0, 3.0)])
+@pytest.mark.parametrize("unit", ["s (MPa)", "s"])
+def test_a_reference_without_a_load_is_scaled_by_its_own_integral(tmp_path, unit, value, load):
+    r = np.linspace(0.0, 8.0, 81)
+    sigma = np.exp(-(r**2) / 2) / (2 * np.pi)
+    table = rows(r.tolist(), sigma.tolist(), header=f"r (mm),{unit}")
+    (tmp_path / "p.csv").write_text(table)
+    if value is None and unit == "s":
+        with pytest.raises(InputError, match="states no unit"):
+            read_reference_table(tmp_path / "p.csv", r="r", sigma="s")
+        return
+    found = read_reference_table(tmp_path / "p.csv", r="r", sigma="s", value=value).profile
+    assert found.load == pytest.approx(load, rel=1e-5)
+    np.testing.assert_allclose(found.sigma_zz, 1e6 * load * sigma, rtol=1e-5)
+    (tmp_path / "p.csv").write_text("\n".join(table.splitlines()[:20]))
+    cut = read_reference_table(tmp_path / "p.csv", r="r", sigma="s", value=value or 1.0)
+    assert any("19.8% of the largest stress is left" in n.text for n in cut.notes)
+
+
 @pytest.mark.parametrize(
     ("dead", "left", "place"),
     [

@@ -269,6 +269,7 @@ def read_reference_mesh(
     vertical: str | None = None,
     base: float | None = None,
     centre: tuple[float, float] | None = None,
+    value: float | None = None,
     **stated: Any,
 ) -> reference.ImportedProfile:
     """Read the stress at the base of the film from a mesh; ``stated`` are the profile's fields."""
@@ -326,7 +327,7 @@ def read_reference_mesh(
         discretisation=f"{size}, {len(footing.nodes)} nodes on the base",
     )
     samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
-    return reference.profile_of(samples, stated)
+    return reference.profile_of(samples, stated, value)
 
 
 def _along_radius(

@@ -71,8 +71,11 @@ def require_numbers(samples: Samples) -> None:
             )
 
 
-def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
+def profile_of(
+    samples: Samples, stated: Mapping[str, Any], value: float | None = None
+) -> ImportedProfile:
     """Check samples of a stress, sort them by radius, and hold their force against the load."""
+    # Without a load it is their force, to which they are scaled where a value in N is given.
     name = samples.source.file_name
     require_numbers(samples)
     lowest = samples.columns["r"].min()
@@ -86,10 +89,23 @@ def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
     # Stated is what no table or mesh holds: load, film, indenter.
     profile = StressProfile(
         **_sorted_by_radius(samples, notes),
-        **stated,
+        **{"load": 1.0, **stated},
         discretisation=samples.discretisation,
         source=samples.source,
     )
+    if "load" not in stated:
+        force = abs(profile.force) or 1.0
+        load = value or force
+        kept = {
+            name: load / force * getattr(profile, name) for name in samples.columns.keys() - "r"
+        }
+        profile = replace(profile, load=load, **kept)
+        left = abs(profile.sigma_zz[-1]) / np.abs(profile.sigma_zz).max()
+        text = (
+            f"No load is stated: the force up to the last radius is taken for it, where {left:.1%} "
+            "of the largest stress is left."
+        )
+        notes.append(Message("force_as_load", text, "warning" if left > _DECAYED else "note"))
     notes += _compare_with_load(profile, samples)
     return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
 
@@ -184,6 +200,7 @@ def read_reference_table(
     shear: Column | None = None,
     shear_sign: int = 1,
     reading: Mapping[str, Any] | None = None,
+    value: float | None = None,
     **stated: Any,
 ) -> ImportedProfile:
     """Read the stress at the base of the film from a table; ``stated`` are the profile's fields."""
@@ -194,7 +211,8 @@ def read_reference_table(
     require_sign("shear sign", shear_sign)
     table = open_table(path, **(reading or {}))
     r_unit = table.unit_of(r, r_unit, "r_unit (--r-unit)")
-    sigma_unit = table.unit_of(sigma, sigma_unit, "sigma_unit (--sigma-unit)")
+    any_unit = "Pa" if value else None  # of what is scaled
+    sigma_unit = table.unit_of(sigma, sigma_unit, "sigma_unit (--sigma-unit)", any_unit)
     wanted = {"r": Wanted(r, r_unit, "length"), "sigma_zz": Wanted(sigma, sigma_unit, "stress")}
     if shear is not None:
         wanted["sigma_rz"] = Wanted(shear, sigma_unit, "stress")
@@ -212,4 +230,4 @@ def read_reference_table(
         sign=sign,
         spacing=_SAME * np.nanmax(np.abs(columns["r"]), initial=0.0),
     )
-    return profile_of(samples, stated)
+    return profile_of(samples, stated, value)
