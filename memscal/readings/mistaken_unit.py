@@ -6,7 +6,8 @@ import numpy as np
 
 from memscal.errors import InputError, UnitWarning
 from memscal.model.arrays import FloatArray
-from memscal.model.indenter import Rod
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan
 from memscal.readings.find_places import places_of
 
@@ -35,6 +36,15 @@ _MISTAKES = {
 }
 _NEAR = 0.15
 _FEWEST = 6
+#: Units of loads that are given without one, in N.
+_LOAD_UNITS = {"mN": 1e-3, "gf": 9.80665e-3, "uN": 1e-6}
+#: Depths in a linear film over its thickness beyond which rubber, which stiffens, does not give way
+#: by all of it; under a sphere its contact stiffens too. A usual load sinks by more than the last.
+_DEEPEST = {"rod": 2.0, "sphere": 0.5}
+_SHALLOWEST = 1e-3
+#: Stiffness of an incompressible film under a rod over a half-space's, as a polynomial of the
+#: rod's radius over the thickness (at most 1 % too large up to 1/2).
+_STIFFER = (0.4, 1.4, 1.1, 1.0)
 #: A nominal load may lie beyond those recorded by this share.
 _BEYOND = 0.3
 #: Of more points than these some tell the width of a peak.
@@ -76,6 +86,46 @@ def require_span(scan: Scan) -> None:
     lengths = _lengths(scan, h)
     if lengths["span"] > _LONGEST_SPAN * h:
         raise _implausible(scan, h, lengths, "The positions span", lengths["span"], _LONG)
+
+
+def require_depth(scan: Scan) -> None:
+    """Refuse a load that presses an indenter deeper than the film is thick."""
+    film = scan.film
+    indenter = scan.indenter
+    load = scan.load
+    if film is None or indenter is None or load is None:
+        return
+    h = film.thickness
+    depth = _depth(film, indenter, load)
+    if depth <= _DEEPEST[indenter.shape] * h:
+        return
+    fitting = [
+        f"{load:.4g} {unit} ({scale * load:.4g} N)"
+        for unit, scale in _LOAD_UNITS.items()
+        if _SHALLOWEST * h < _depth(film, indenter, scale * load) < h
+    ]
+    raise InputError(
+        f"Under {load:.4g} N the {indenter.shape} would sink by {depth * 1e3:.3g} mm into a film "
+        f"that is {h * 1e3:.4g} mm thick.",
+        why=f"A load of {' or of '.join(fitting)} would not." if fitting else "",
+        cure="Check the load and its unit (--load in N; --load-unit of a column), and those of the "
+        "film's modulus and thickness and of the indenter's radius.",
+    )
+
+
+def _depth(film: ElasticFilm, indenter: RoundIndenter, load: float) -> float:
+    """Return about how deep an indenter sinks into a linear, incompressible film, in m."""
+    # Any other film gives way more easily.
+    ratio = indenter.radius / film.thickness
+    if isinstance(indenter, Rod):
+        stiffer = np.polyval(_STIFFER, ratio)  # than a half-space
+        return float(load / (2 * indenter.radius * film.contact_modulus * stiffer))
+    # Hertz's contact on a half-space; Chadwick's on a film much thinner than the contact is wide
+    # (SIAM J. Appl. Math. 62, 1520, 2002). Their compliances in between: 6 % too deep at most.
+    scaled = load / (film.young_modulus * indenter.radius**2)
+    wide = film.thickness * (3 * scaled / (2 * np.pi)) ** (1 / 3)
+    narrow = indenter.radius * (9 * scaled**2 / 16) ** (1 / 3)
+    return float(1 / (1 / wide + 1 / narrow))
 
 
 def require_recorded(load: float, recorded: FloatArray) -> None:

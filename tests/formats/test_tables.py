@@ -438,6 +438,33 @@ def test_a_tip_that_is_lowest_away_from_its_axis_is_warned_of(tmp_path: Path, ap
     ] * (apex > 0)
 
 
+@pytest.mark.parametrize(
+    ("indenter", "load", "fitting"),
+    [
+        (Rod(radius=0.25e-3), 1.0, ""),
+        (Rod(radius=0.25e-3), 3.0, ""),
+        (Rod(radius=0.25e-3), 147.1, r"147.1 mN \(0.1471 N\) or of 147.1 gf \(1.443 N\)"),
+        (Rod(radius=0.25e-3), 2000.0, r"2000 mN \(2 N\)"),
+        (Rod(radius=0.25e-3), 1e9, "Check the load"),
+        (Sphere(radius=60e-3), 30.0, ""),
+        (Sphere(radius=60e-3), 2750.0, r"2750 mN \(2.75 N\)"),
+    ],
+)
+@pytest.mark.parametrize("column", [False, True])
+def test_a_load_that_would_sink_the_indenter_through_the_film_is_refused(
+    indenter, load, fitting, column
+):
+    x = np.linspace(-8e-3, 8e-3, 33)
+    table = {"x": x, "u": np.exp(-(x**2) / 8e-6), "F": np.full(33, load)}
+    given = {"load_column": "F"} if column else {"load": load}
+    given |= {"x_unit": "m", "u_unit": "mV", "film": make_film(), "indenter": indenter}
+    if not fitting:
+        assert imported(table, x="x", u="u", **given).load == load
+        return
+    with pytest.raises(InputError, match=f"would sink by (.|\n)*{fitting}"):
+        imported(table, x="x", u="u", **given)
+
+
 @pytest.mark.parametrize(("value", "load"), [(None, 1.0), (3.0, 3.0)])
 @pytest.mark.parametrize("unit", ["s (MPa)", "s"])
 def test_a_reference_without_a_load_is_scaled_by_its_own_integral(tmp_path, unit, value, load):

@@ -28,6 +28,7 @@ from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
 from memscal.readings.find_places import places_of
 from memscal.readings.mistaken_unit import (
+    require_depth,
     require_plausible,
     require_recorded,
     require_span,
@@ -190,6 +191,7 @@ def import_table(
     if scan.film is not None:
         require_film = require_plausible if isinstance(scan.indenter, Rod) else require_span
         require_film(scan)
+    require_depth(scan)
     return scan
 
 
