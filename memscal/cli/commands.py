@@ -41,7 +41,9 @@ class LazyGroup(click.Group):
             inner = click.Context(command, ctx, found)
             given = command.make_parser(inner).parse_args([*rest])[2]
             for option in given:
-                if given.count(option) > 1 and not (option.multiple or option.type is click.BOOL):
+                if given.count(option) > 1 and not (
+                    option.multiple or option.type.name == "boolean"
+                ):
                     inner.fail(f"{option.opts[0]} is given twice, but has one value.")
         return found, command, rest
 

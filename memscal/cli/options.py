@@ -75,7 +75,7 @@ class Quantity(_Number):
         """Read the number; refuse one out of range."""
         in_unit = f" (in {self.name})" if self.name != "ratio" else ""
         try:
-            number = float(value)
+            number = float(str(value).replace("_", "?"))  # 1_0 is a number of Python alone
         except ValueError:
             point = " Write a decimal point, not a comma." if "," in str(value) else ""
             self.fail(f"{value!r} is not a number{in_unit}.{point}", param, ctx)

@@ -53,19 +53,21 @@ _MOST_POINTS = 1_000_000
 _CROWDED = 0.7
 
 
-#: Volts that no sensor's amplifier gives, and that no noise has.
-_LARGEST_READING = 20.0
-_LARGEST_NOISE = 1.0
+#: What no set-up has: volts, amperes or tesla of a reading, volts of noise, metres of a scan.
+_LARGEST = {"readings": 20.0, "noise": 1.0, "positions": 10.0}
 
 
 def warn_of_readings(scan: Scan) -> None:
-    """Warn of voltages and of a noise that no sensor has, and name the units that were meant."""
-    noise = 0.0 if scan.u_zz_errors is None else np.nanmax(scan.u_zz_errors, initial=0.0)
-    largest = np.nanmax(np.abs(scan.u_zz))
-    if scan.unit == "V" and (largest > _LARGEST_READING or noise > _LARGEST_NOISE):
-        noisy = f" with a noise of {noise:.4g} V" if noise else ""
-        text = f"Readings up to {largest:.4g} V{noisy}: were mV meant, or uV? MV are megavolts."
-        warnings.warn(text, UnitWarning, stacklevel=2)
+    """Warn of readings, a noise and positions that no scan has, and ask for the unit meant."""
+    noise = np.zeros(1) if scan.u_zz_errors is None else scan.u_zz_errors
+    sizes = {"positions": np.abs(scan.x).max()}
+    if scan.unit in ("V", "A", "T"):
+        sizes |= {"readings": np.nanmax(np.abs(scan.u_zz)), "noise": np.nanmax(noise)}
+    for name, size in sizes.items():
+        if size > _LARGEST[name]:
+            unit = "m" if name == "positions" else scan.unit
+            text = f"The {name}: up to {size:.4g} {unit}. Was m{unit} meant, or u{unit}? M is mega."
+            warnings.warn(text, UnitWarning, stacklevel=2)
 
 
 def mistaken_unit(factor: float) -> str:

@@ -52,7 +52,7 @@ def are_units(cells: Sequence[str]) -> bool:
 
 def words_of(line: str) -> list[str]:
     """Cut a line at its blanks, but not between a name and its unit in brackets."""
-    return _WORD.findall(line)
+    return _WORD.findall(line) if "(" in line or "[" in line else line.split()
 
 
 def cut_head(name: str) -> tuple[str, ...]:
@@ -98,8 +98,8 @@ def first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
     dense = [row for row, count in zip(rows, counts, strict=True) if count >= most]
     numeric = []
     for i, column in enumerate(itertools.zip_longest(*dense[-_LAST:], fillvalue="")):
-        stated = [is_number(cell) for cell in column if cell.lower() not in missing]
-        if 2 * sum(stated) >= len(stated) > 0:
+        words = sum(not is_number(cell) and cell.lower() not in missing for cell in column)
+        if 2 * words <= len(column):  # an empty column holds no words, either
             numeric.append(i)
     good = []
     some = []
@@ -114,8 +114,7 @@ def first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
     return start
 
 
-def _several_numbers(cell: str) -> bool:
-    words = cell.split()
+def _several_numbers(words: list[str]) -> bool:
     return len(words) > 1 and all(map(is_number, words))
 
 
@@ -125,10 +124,10 @@ def find_delimiter(lines: list[str]) -> str:
     highest = 0.0
     last = lines[-_LAST:]
     by_tabs = [line.split("\t") for line in last[len(last) // 2 :]]
-    # Blanks would close up a column that is empty.
     count = {len(row) for row in by_tabs}
-    tabs = len(count) == 1 < max(count)
-    tabs &= not any(map(_several_numbers, itertools.chain(*by_tabs)))
+    cells = [cell.split() for cell in itertools.chain(*by_tabs)]
+    # Blanks would close up a column that is empty, or cut a text.
+    tabs = len(count) == 1 < max(count) and not any(map(_several_numbers, cells))
     for delimiter in DELIMITERS:
         if delimiter == " " and tabs:
             break
@@ -136,9 +135,9 @@ def find_delimiter(lines: list[str]) -> str:
         widths = [len(row) for row in rows]
         common = max(set(widths), key=widths.count)
         whole = itertools.chain(*(row for row in rows if len(row) == common))
-        cells = [cell.strip(' "') for cell in whole if cell.strip()]
-        tests = (is_number(c) or c.lower() in MISSING or holds_unit(c) for c in cells)
-        score = widths.count(common) * (0.1 + sum(tests) / max(len(cells), 1))
+        stated = [cell.strip(' "') for cell in whole if cell.strip()]
+        tests = (is_number(c) or c.lower() in MISSING or holds_unit(c) for c in stated)
+        score = widths.count(common) * (0.1 + sum(tests) / max(len(stated), 1))
         if common > 1 and score > highest:
             best = delimiter
             highest = score

@@ -473,27 +473,33 @@ def _counted(columns: Columns, others: str) -> list[str]:
         counts = [(columns["branch"] == number).sum() for number in (1, 2, 0)]
         words = "{} readings on approach, {} on retreat, {} of neither branch."
         notes.append(words.format(*counts))
-    passes = (places.index * number + repeat) * 3 + columns.get("branch", 0)
-    several = round(x.size / np.unique(passes).size)
-    if several > 1 and "repeat" in columns:
+    full = number * places.count - x.size
+    if number > 1 and full > 0:
+        notes.append(f"{full} more would make every repeat complete.")
+    passes = repeat * 3 + columns.get("branch", 0) if "repeat" in columns else repeat
+    order = np.lexsort((x, passes))
+    begins = np.diff(passes[order]) > 0
+    gaps = np.diff(x[order])
+    within = np.sort(gaps[~begins])
+    # The gap in which half of the length lies: repeated positions do not change it.
+    length = np.cumsum(within)
+    typical = within[np.searchsorted(length, 0.5 * length[-1])] if within.any() else 0.0
+    group = np.cumsum(np.append(False, begins | (gaps >= _CLOSE * typical)))
+    if "y" in columns:
+        group = places.index * (passes.max() + 1) + passes
+    several = int(np.median(np.unique(group, return_counts=True)[1]))
+    if "repeat" in columns and several > 1:
         notes.append(
             f"{several} readings at each place of each repeat. Other columns that differ: "
             f"{others}. If one of them numbers lines, name it (--repeat; --branch)."
         )
-    full = number * places.count - x.size
-    if number > 1 and full > 0:
-        notes.append(f"{full} more would make every repeat complete.")
-    if "repeat" not in columns and "y" not in columns:
-        gaps = np.sort(np.diff(np.sort(x)))
-        # The gap in which half of the length lies: repeated positions do not change it.
-        typical = gaps[np.searchsorted(np.cumsum(gaps), 0.5 * np.ptp(x))] if np.ptp(x) else 0.0
-        close = np.sum(gaps < _CLOSE * typical)
-        if close > _MANY * x.size:
-            notes.append(
-                f"{close} of {x.size} positions lie closer to another than {_CLOSE:.0%} of the "
-                "typical spacing. If they are repeats, name the column that numbers them "
-                '(repeat="..."; --repeat COLUMN): then each is predicted from the others.'
-            )
+    close = np.sum(within < _CLOSE * typical)
+    if not columns.keys() & {"repeat", "y"} and close > _MANY * x.size:
+        notes.append(
+            f"{close} of {x.size} positions lie closer to another than {_CLOSE:.0%} of the "
+            "typical spacing. If they are repeats, name the column that numbers them "
+            '(repeat="..."; --repeat COLUMN): then each is predicted from the others.'
+        )
     return notes
 
 

@@ -400,7 +400,8 @@ class TextTable(NamedColumns):
                 f"The head in {self._row} {self._header} has {unfit[0]} words, the rows {width} "
                 "cells: a name has a blank, or the first cells are names of rows."
             )
-            if unfit[0] == width - 1 and rows[start][0] in ("1", '"1"'):  # as R writes them
+            counts = [row[0].strip('"') for row in rows[start : start + 2]]
+            if unfit[0] == width - 1 and counts == ["1", "2"]:  # as R writes them
                 cure = f"Name all columns, or leave this line out (--skip-rows {self._header})."
                 raise FormatError(f"{self._name}: {self._unfit}", cure=cure)
             names = []
