@@ -476,31 +476,40 @@ def _counted(columns: Columns, others: str) -> list[str]:
     full = number * places.count - x.size
     if number > 1 and full > 0:
         notes.append(f"{full} more would make every repeat complete.")
-    passes = repeat * 3 + columns.get("branch", 0) if "repeat" in columns else repeat
-    order = np.lexsort((x, passes))
-    begins = np.diff(passes[order]) > 0
-    gaps = np.diff(x[order])
-    within = np.sort(gaps[~begins])
-    # The gap in which half of the length lies: repeated positions do not change it.
-    length = np.cumsum(within)
-    typical = within[np.searchsorted(length, 0.5 * length[-1])] if within.any() else 0.0
-    group = np.cumsum(np.append(False, begins | (gaps >= _CLOSE * typical)))
-    if "y" in columns:
-        group = places.index * (passes.max() + 1) + passes
-    several = int(np.median(np.unique(group, return_counts=True)[1]))
+    notes += _repeated(columns, places.index, others)
+    return notes
+
+
+def _repeated(columns: Columns, place: NDArray[Any], others: str) -> Iterator[str]:
+    """Yield a note on positions that were read several times in one line, if there are many."""
+    x = columns["x"]
+    line = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
+    if "repeat" in columns:
+        line = line * 3 + columns.get("branch", 0)
+    group = place * (line.max() + 1) + line
+    close = 0
+    if "y" not in columns:
+        order = np.lexsort((x, line))
+        begins = np.diff(line[order]) > 0
+        gaps = np.diff(x[order])
+        within = np.sort(gaps[~begins])
+        length = np.cumsum(within)
+        # The gap in which half of the length lies: repeated positions do not change it.
+        typical = within[np.searchsorted(length, 0.5 * length[-1])] if within.any() else 0.0
+        close = np.sum(within < _CLOSE * typical)
+        group = np.cumsum(np.append(False, begins | (gaps >= _CLOSE * typical)))
+    several = np.median(np.unique(group, return_counts=True)[1])
     if "repeat" in columns and several > 1:
-        notes.append(
-            f"{several} readings at each place of each repeat. Other columns that differ: "
+        yield (
+            f"{several:.0f} readings at each place of each repeat. Other columns that differ: "
             f"{others}. If one of them numbers lines, name it (--repeat; --branch)."
         )
-    close = np.sum(within < _CLOSE * typical)
-    if not columns.keys() & {"repeat", "y"} and close > _MANY * x.size:
-        notes.append(
+    elif "repeat" not in columns and close > _MANY * x.size:
+        yield (
             f"{close} of {x.size} positions lie closer to another than {_CLOSE:.0%} of the "
             "typical spacing. If they are repeats, name the column that numbers them "
             '(repeat="..."; --repeat COLUMN): then each is predicted from the others.'
         )
-    return notes
 
 
 def _as_rows(columns: Columns) -> Columns:

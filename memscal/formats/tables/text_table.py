@@ -375,8 +375,7 @@ class TextTable(NamedColumns):
         if start is None:
             sheet = f"sheet {self._sheet.name!r} of " if self._sheet else ""
             cure = self._sheet.cure if self._sheet else "Give a table with rows of numbers."
-            cells = [cell for cell in rows[-1] if holds_unit(cell)]
-            why = f"Units stand in its cells ({cells[0]!r}), not in its head." if cells else ""
+            why = "Units stand in its cells." if any(map(holds_unit, rows[-1])) else ""
             raise FormatError(f"{sheet}{self._name} has no row of numbers.", why=why, cure=cure)
         width = len(rows[start])
         above = [(places[i], rows[i]) for i in range(start) if any(rows[i])]
