@@ -20,9 +20,10 @@ from memscal.calibration import prepare
 from memscal.errors import InputError
 from memscal.estimation import points
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.tables import text_table
+from memscal.formats.tables import columns, text_table
+from memscal.formats.tables.columns import Wanted
 from memscal.formats.tables.scan import import_table
-from memscal.formats.tables.text_table import TextTable, Wanted
+from memscal.formats.tables.text_table import TextTable
 from memscal.friction import compare as compare_module
 from memscal.model.scan import BRANCHES
 from memscal.readings import find_places as places_module
@@ -166,7 +167,7 @@ def test_a_head_is_looked_at_no_further_than_a_block(tmp_path, monkeypatch, line
 def test_what_is_too_large_is_refused_with_size_limit_and_cure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(text_table, "MOST_ROWS", 100)
+    monkeypatch.setattr(columns, "MOST_ROWS", 100)
     with pytest.raises(InputError, match=r"has 120 lines of 2 columns, but at most 100(.|\n)*Aver"):
         import_table(big_table(tmp_path / "t.csv", 120), x="x", u="u")
     Image.new("L", (2049, 9)).save(tmp_path / "field.png")

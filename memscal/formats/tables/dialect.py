@@ -69,7 +69,7 @@ def filled(cells: Sequence[str]) -> int:
     return sum(map(bool, cells))
 
 
-def named_columns(heads: Sequence[str]) -> int:
+def last_name(heads: Sequence[str]) -> int:
     """Return the number of the last column with a name; rows may lack one for remarks."""
     stated = [i for i, head in enumerate(heads, 1) if head and not _REMARK.match(head)]
     return max(stated, default=0)

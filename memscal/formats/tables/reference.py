@@ -8,8 +8,8 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.formats.files import FilePath
+from memscal.formats.tables.columns import Wanted
 from memscal.formats.tables.sheets import open_table
-from memscal.formats.tables.text_table import Wanted
 from memscal.model.arrays import FloatArray, array_record, keyword_array_record
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
+from memscal.formats.tables.columns import NamedColumns, Wanted
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
-from memscal.formats.tables.text_table import NamedColumns, Wanted
 from memscal.formats.units import reading_of, to_si
 from memscal.model.arrays import frozen_array, keyword_array_record, unmasked
 from memscal.model.checks import Message, import_notes, marked_texts
@@ -496,7 +496,7 @@ def _repeated(columns: Columns, place: NDArray[Any], others: str) -> Iterator[st
         length = np.cumsum(within)
         # The gap in which half of the length lies: repeated positions do not change it.
         typical = within[np.searchsorted(length, 0.5 * length[-1])] if within.any() else 0.0
-        close = np.sum(within < _CLOSE * typical)
+        close = np.count_nonzero(within < _CLOSE * typical)
         group = np.cumsum(np.append(False, begins | (gaps >= _CLOSE * typical)))
     several = np.median(np.unique(group, return_counts=True)[1])
     if "repeat" in columns and several > 1:

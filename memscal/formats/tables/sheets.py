@@ -18,14 +18,9 @@ import numpy as np
 
 from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.formats.files import damage_named, read_bytes
+from memscal.formats.tables.columns import Lines, NamedColumns, Wanted
 from memscal.formats.tables.dialect import find_decimal
-from memscal.formats.tables.text_table import (
-    Lines,
-    NamedColumns,
-    Sheet,
-    TextTable,
-    Wanted,
-)
+from memscal.formats.tables.text_table import Sheet, TextTable
 from memscal.model.arrays import FloatArray, unmasked
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile

@@ -1,4 +1,4 @@
-"""Tables of numbers: columns by name or number, and text whose dialect and head are found."""
+"""Tables of numbers as text, whose dialect and head are found."""
 
 import codecs
 import csv
@@ -7,70 +7,40 @@ import itertools
 import os
 import re
 import warnings
-from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence, Set
-from contextlib import suppress
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence, Set
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from memscal.errors import FormatError, InputError, placed
+from memscal.errors import FormatError, placed
 from memscal.formats.files import FilePath, read_pieces
+from memscal.formats.tables.columns import MAX_NAME, Lines, NamedColumns, Wanted
 from memscal.formats.tables.dialect import (
     DELIMITERS,
-    GROUPED,
-    MISSING,
-    UNIT,
     Rows,
     are_units,
-    cut_head,
     filled,
     find_decimal,
     find_delimiter,
     first_of_numbers,
     holds_unit,
     is_number,
-    named_columns,
-    number_of,
+    last_name,
     units_in,
     words_of,
 )
-from memscal.formats.units import is_unit, same_unit, to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Profile
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
-from memscal.model.sizes import (
-    MOST_COLUMNS,
-    MOST_HDF5_BYTES,
-    MOST_ROWS,
-    MOST_TABLE_BYTES,
-    too_large,
-)
-from memscal.progress import Task
+from memscal.model.sizes import MOST_COLUMNS, MOST_TABLE_BYTES, too_large
 
 #: Begins a line of cells, which is no comment: what a spreadsheet writes for an error is a cell.
 _CELLS = re.compile(r"\s*(?:[^\s#%]|#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?))", re.IGNORECASE)
-_MAX_NAME = 80
 #: Share of an indenter's height by which its axis may lie above the lowest point.
 _HOLLOW = 1e-3
 _MAX_COMMENTS = 20
 _MAX_COMMENT = 300
-_NAMED = 5
-#: No quantity is as large: instruments write such numbers, mostly 9.9E37, for an overload.
-_OVERLOAD = 1e30
-#: What cells that are not read may be.
-_CAUSES = (
-    (GROUPED.fullmatch, "Separators of thousands are not read."),
-    (holds_unit, "Units stand in the cells; they are read in the head of the column alone."),
-    (
-        re.compile(r".+E[3-9]\d+").fullmatch,
-        "Instruments write such a number for an overload; --missing 9.9E37 leaves that one out.",
-    ),
-    (UNIT.fullmatch, "Units change from row to row; one is read for the whole column."),
-)
 #: Lines from which delimiter, decimal mark and header are found; bytes that are cut into cells at
 #: once, and those of the longest line.
 _SAMPLE = 250
@@ -78,226 +48,6 @@ _BLOCK = 2**16
 _LONGEST = 2**22
 
 Numbered = list[tuple[int, str]]
-Lines = range | list[int] | NDArray[np.int32]
-
-
-class Wanted(NamedTuple):
-    """A column by its name or number, its unit, and words that stand for numbers in it."""
-
-    column: str | int
-    unit: str | None = None
-    dimension: str = "dimensionless"
-    words: Mapping[str, float] = MappingProxyType({})
-
-
-class NamedColumns:
-    """Columns of numbers whose heads may state units; they are read once, part by part."""
-
-    names: tuple[str, ...] = ()
-    source: SourceFile | None = None
-    notes: tuple[str, ...] = ()
-    others = ""
-    """Names of the columns that were not asked for; of a text those that vary in its first rows."""
-    decimal: str | None = None
-    #: What a row is called in messages.
-    _row = "row"
-
-    def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
-        self._name = name
-        self._unit_row = tuple[str, ...]()
-        # Why a head was not taken, and lines in which a head stands once more.
-        self._unfit = ""
-        self._again = set[int]()
-        # Columns not asked for, in whose cells other words are no readings.
-        self._others: list[Wanted] = []
-        self._last = 0
-        self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
-        self._sentinels = [number_of(w.replace(",", ".")) for w in missing if is_number(w)]
-        # Cells that are no numbers, by column: how many, and the first of them with their lines.
-        self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
-        # First row of each part, and the lines of its rows.
-        self._lines_of: list[tuple[int, Lines]] = []
-
-    def columns(self, wanted: Mapping[str, Wanted]) -> dict[str, FloatArray]:
-        """Read columns in SI units, NaN where a cell is empty; state source and notes."""
-        for item in wanted.values():  # a wrong unit is refused before the work
-            to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        asked = [self._index(item.column) for item in wanted.values()]
-        self.others = ", ".join(n for i, n in enumerate(self.names) if i not in asked)
-        rows = self._expected(len(wanted))
-        count = 0
-        # Lines may have other ends than were counted; room that stays empty is no memory.
-        values = [np.empty(2 * rows + _SAMPLE) for _ in wanted]
-        parts = self._parts([*wanted.values()])
-        for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
-            self._lines_of.append((count, lines))
-            for item, column, numbers in zip(wanted.values(), values, part, strict=True):
-                if self._sentinels:
-                    numbers = np.where(np.isin(numbers, self._sentinels), np.nan, numbers)
-                for i in np.flatnonzero(np.abs(numbers) >= _OVERLOAD):
-                    self._reject(f"{numbers[i]:g}".replace("e+", "E"), lines[i], item.column)
-                column[count : count + len(lines)] = numbers
-            count += len(lines)
-            self._last = lines[-1] if len(lines) else self._last
-        self._refuse_wrong([*wanted.values()])
-        self._describe(count)
-        return {
-            name: to_si(values.pop(0)[:count], item.unit, item.dimension, self.where(item.column))
-            for name, item in wanted.items()
-        }
-
-    def unit_of(
-        self, column: str | int, unit: str | None, option: str, default: str | None = None
-    ) -> str:
-        """Return the unit of a column: of its head, of the row of units, or the one given."""
-        index = self._index(column)
-        below = self._unit_row[index] if index < len(self._unit_row) else ""
-        head = next((u for u in cut_head(self.names[index])[1:] if is_unit(u)), "")
-        if below and head and not same_unit(below, head):
-            problem = f"{self.where(column)} has the unit {head!r} in its head, and {below!r}."
-            raise InputError(problem, why="One of them is wrong.", cure="Correct the table.")
-        stated = below or head
-        if unit and stated and not same_unit(unit, stated):
-            raise InputError(
-                f"{self.where(column)} states the unit {stated!r}, but {option} is {unit!r}.",
-                why="One of them is wrong.",
-                cure="Leave the option out to take the unit of the table, or correct the table.",
-            )
-        chosen = unit or stated or default
-        if not chosen:
-            cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
-            raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
-        return chosen.strip()
-
-    def where(self, column: str | int) -> str:
-        """Return file and column as messages name them."""
-        return f"{self._name}: column {column!r}"
-
-    def lines(self, rows: Sequence[int]) -> str:
-        """Name the lines of the file in which rows stand: the first five, and how many more."""
-        starts = [start for start, _ in self._lines_of]
-        named = []
-        for row in rows[:_NAMED]:
-            start, lines = self._lines_of[bisect_right(starts, row) - 1]
-            named.append(lines[row - start])
-        return self._named(named, len(rows))
-
-    def _named(self, lines: Sequence[int], count: int) -> str:
-        more = f" and {count - _NAMED} more" if count > _NAMED else ""
-        several = "s" if count > 1 else ""
-        return f"{self._row}{several} {', '.join(map(str, lines[:_NAMED]))}{more}"
-
-    def all_lines(self) -> NDArray[Any]:
-        """Return the line of the file of each row, (n,)."""
-        return np.concatenate([np.asarray(lines) for _, lines in self._lines_of])
-
-    def _index(self, column: str | int) -> int:
-        if isinstance(column, str) and self.names.count(column) == 1:
-            return self.names.index(column)
-        heads = [cut_head(name)[0] for name in self.names]
-        sought = str(column)
-        if heads.count(sought) > 1:
-            named = [n for n, head in zip(self.names, heads, strict=True) if head == sought]
-            problem = f"{self._name} has several columns {column!r}: {', '.join(named)}."
-            raise InputError(problem, cure="Give the number of the column, counted from 1.")
-        if sought in heads:
-            return heads.index(sought)
-        counted = [str(i + 1) for i in range(len(heads))]
-        # Where numbers are names, one that is none of them does not count columns.
-        if sought not in counted or any(map(str.isdecimal, {*heads} - {*counted})):
-            raise InputError(
-                f"{self._name} has no column {column!r}.",
-                why=self._unfit or "Its columns are: " + ", ".join(self.names) + ".",
-                cure="Give one of these names, or a number counted from 1 where no name is a "
-                "number. If the columns of the table are others, state what separates its cells "
-                "(--delimiter).",
-            )
-        return int(sought) - 1
-
-    def _expected(self, columns: int) -> int:
-        """Return how many rows to expect; refuse more of some columns than are taken."""
-        # A scan has up to three arrays more than columns, and its file must be read again.
-        most = min(MOST_ROWS, MOST_HDF5_BYTES // (8 * (columns + 3)))
-        rows = self._count()
-        if rows > most:
-            cure = "Average neighbouring readings, or cut the table into several."
-            raise too_large(self._name, rows, most, f"{self._row}s of {columns} columns", cure=cure)
-        return rows
-
-    def _count(self) -> int:
-        """Return how many rows there are, or may be."""
-        raise NotImplementedError
-
-    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
-        """Yield the lines and the columns of one part after another."""
-        raise NotImplementedError
-
-    def _describe(self, count: int) -> None:
-        """State source and notes when all is read."""
-
-    def _numbers(self, cells: Sequence[str], lines: Lines, item: Wanted) -> FloatArray:
-        """Return cells of a column as numbers; those that are none are kept for the message."""
-        written = "".join(cells)
-        texts = [cell.replace(",", ".") for cell in cells] if self.decimal == "," else cells
-        if "_" not in written and not (self._comma_alone and "." in written):
-            with suppress(ValueError):
-                numbers = np.fromiter(map(float, texts), np.float64, len(cells))
-                if not np.isinf(numbers).any():
-                    return numbers
-        pairs = zip(cells, lines, strict=True)
-        return np.array([self._number(cell, line, item) for cell, line in pairs])
-
-    @property
-    def _comma_alone(self) -> bool:
-        """Whether a point in a number would be a separator of thousands."""
-        return False
-
-    def _number(self, cell: str, line: int, item: Wanted) -> float:
-        cell = cell.strip()
-        word = cell.lower()
-        if word in item.words:
-            return item.words[word]
-        if word in self._missing:
-            return np.nan
-        text = cell.replace(",", ".") if self.decimal == "," else cell
-        with suppress(ValueError):
-            if not (self._comma_alone and "." in cell):
-                return number_of(text)
-        self._reject(cell, line, item.column)
-        return np.nan
-
-    def _reject(self, cell: str, line: int, column: str | int) -> None:
-        lines, cells = self._wrong.setdefault(column, ([], []))
-        lines.append(line)
-        if cell in self.names:
-            self._again.add(line)
-        if len(cells) < _NAMED:
-            cells.append(printable(cell, _MAX_NAME))
-
-    def _refuse_wrong(self, wanted: list[Wanted]) -> None:
-        if self._again:
-            again = self._named(sorted(self._again), len(self._again))
-            problem = f"{self._name}: the head of the table stands again in {again}."
-            raise FormatError(
-                problem, why="Another table begins there.", cure="Give each a file of its own."
-            )
-        for item in wanted + self._others:
-            lines, cells = self._wrong.get(item.column, ([], []))
-            # Others count where the table ends in words, as a summary does, or a unit changes.
-            stray = item in self._others and not item.words and lines[-1:] != [self._last]
-            if stray or not lines:
-                continue
-            named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
-            more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
-            why = next((text for test, text in _CAUSES if any(map(test, cells))), "")
-            raise FormatError(
-                f"{self.where(item.column)} holds what is not "
-                f"{' or '.join(['a number', *item.words])} in {self._row} {named}{more}.",
-                why=why,
-                cure="Correct or remove these lines; name a word that means a missing value "
-                "(--missing WORD); state the decimal mark (--decimal); or state how many lines "
-                "stand before the header (--skip-rows N).",
-            )
 
 
 class Sheet(NamedTuple):
@@ -409,11 +159,11 @@ class TextTable(NamedColumns):
         self._headed = bool(names)
         self._width = max(len(names), *map(len, rows[start:]))
         heads = [*names, *[""] * (self._width - len(names))]
-        self.names = tuple(printable(c, _MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
+        self.names = tuple(printable(c, MAX_NAME) or str(i + 1) for i, c in enumerate(heads))
         self._first = rows[start:], places[start:]
         by_rows = not names or self._delimiter == " "
         self._columns = width if by_rows else len(names)
-        self._named_columns = named_columns(names)
+        self._named_columns = last_name(names)
         after = places[start - 1] if start else 0
         self._require_whole(*self._first, [entry for entry in lines if entry[0] > after])
 
