@@ -263,9 +263,11 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
 
 def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: float) -> float:
     """Return the relative change of stiffness and of the base stress under the same load."""
-    film = ElasticFilm(young_modulus=1.0, poisson_ratio=nu, thickness=1.0)
-    r = np.linspace(0.0, ratio + 4.0, 60)
-    new, old = (base_stress(film, rod.traction(ratio, 1.0), r) for rod in (fine, coarse))
+    # Of a usual size, in powers of two: nothing is rounded otherwise than of size one.
+    h = 2.0**-10
+    film = ElasticFilm(young_modulus=2.0**20, poisson_ratio=nu, thickness=h)
+    r = h * np.linspace(0.0, ratio + 4.0, 60)
+    new, old = (base_stress(film, rod.traction(h * ratio, 1.0), r) for rod in (fine, coarse))
     by_stress = np.max(np.abs(new - old)) / np.max(np.abs(new))
     return float(max(by_stress, abs(fine.stiffness_factor / coarse.stiffness_factor - 1)))
 

@@ -1,6 +1,8 @@
 """Films and indenters: their ranges, their moduli, and that they stay as they were made."""
 
 import math
+import re
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -102,6 +104,24 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
 def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
     with pytest.raises(InputError, match=f"(?i){message}"):
         Profile(r=r, z=z)
+
+
+@pytest.mark.parametrize(
+    ("modulus", "thickness", "meant"),
+    [
+        (1.8, 1.5, "1.8 MPa was(.|\n)*1.5 mm was"),
+        (0.9, 0.2, "0.9 MPa(.|\n)*0.2 mm was"),
+        (2.2e6, 2e-3, ""),
+        (2.2e6, 2.0, ""),  # a half-space
+    ],
+)
+def test_a_film_in_millimetres_and_megapascals_is_warned_of(modulus, thickness, meant) -> None:
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        ElasticFilm(young_modulus=modulus, poisson_ratio=0.5, thickness=thickness)
+    words = "\n".join(str(each.message) for each in seen)
+    assert re.search(meant, words)
+    assert bool(words) is bool(meant)
 
 
 @pytest.mark.parametrize("nu", [0.5, 0.497, 0.3, 0.0])
