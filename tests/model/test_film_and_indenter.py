@@ -118,7 +118,7 @@ def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
 def test_a_film_in_millimetres_and_megapascals_is_warned_of(modulus, thickness, meant) -> None:
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
-        ElasticFilm(young_modulus=modulus, poisson_ratio=0.5, thickness=thickness)
+        replace(FILM, young_modulus=modulus, thickness=thickness)
     words = "\n".join(str(each.message) for each in seen)
     assert re.search(meant, words)
     assert bool(words) is bool(meant)
