@@ -119,12 +119,10 @@ def require_range(name: str, value: float, low: float, high: float, unit: str = 
 
 
 def unmasked(values: Any) -> Any:
-    """Return values with None in the place of each that numpy has masked."""
+    """Return values with NaN in the place of each that numpy has masked."""
     parts = values if isinstance(values, list | tuple) else [values]
-    if any(map(np.ma.isMaskedArray, parts)):
-        array = np.ma.array(values)
-        return np.where(np.ma.getmaskarray(array), np.array(None), array.data)
-    return values
+    masked = any(map(np.ma.isMaskedArray, parts))
+    return np.ma.array(values, dtype=object).filled(np.nan) if masked else values
 
 
 def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> NDArray[Any]:

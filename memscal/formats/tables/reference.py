@@ -96,11 +96,10 @@ def profile_of(
     if "load" not in stated:
         force = abs(profile.force) or 1.0
         load = value or force
-        kept = {
-            name: load / force * getattr(profile, name) for name in samples.columns.keys() - "r"
-        }
-        profile = replace(profile, load=load, **kept)
-        left = abs(profile.sigma_zz[-1]) / np.abs(profile.sigma_zz).max()
+        names = samples.columns.keys() - "r"
+        scaled = {name: load / force * getattr(profile, name) for name in names}
+        profile = replace(profile, load=load, **scaled)
+        left = abs(profile.sigma_zz[-1]) / (np.abs(profile.sigma_zz).max() or 1.0)
         text = (
             f"No load is stated: the force up to the last radius is taken for it, where {left:.1%} "
             "of the largest stress is left."

@@ -105,12 +105,12 @@ def _sheet_table(
         "results must be stored: save it in a spreadsheet program."
     )
     content = Sheet(
-        name=chosen.title,
-        text=text.getvalue(),
-        sha256=hashlib.sha256(data).hexdigest(),
-        cure=cure,
-        hidden=[*map(int, _HIDDEN.findall(xml))],
-        merged=[openpyxl.utils.range_boundaries(ref.decode()) for ref in _MERGED.findall(xml)],
+        chosen.title,
+        text.getvalue(),
+        hashlib.sha256(data).hexdigest(),
+        cure,
+        [*map(int, _HIDDEN.findall(xml))],
+        [openpyxl.utils.range_boundaries(ref.decode()) for ref in _MERGED.findall(xml)],
     )
     return TextTable(name, sheet=content, **reading)
 
