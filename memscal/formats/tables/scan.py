@@ -496,7 +496,7 @@ def _repeated(columns: Columns, place: NDArray[Any], others: str) -> Iterator[st
         length = np.cumsum(within)
         # The gap in which half of the length lies: repeated positions do not change it.
         typical = within[np.searchsorted(length, 0.5 * length[-1])] if within.any() else 0.0
-        close = np.count_nonzero(within < _CLOSE * typical)
+        close = int(np.count_nonzero(within < _CLOSE * typical))
         group = np.cumsum(np.append(False, begins | (gaps >= _CLOSE * typical)))
     several = np.median(np.unique(group, return_counts=True)[1])
     if "repeat" in columns and several > 1:
