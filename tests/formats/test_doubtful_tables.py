@@ -123,8 +123,10 @@ def test_of_columns_that_are_named_by_numbers_none_is_counted():
     frame = {0: np.arange(5.0), 1: np.arange(5.0) * 2, 2: np.ones(5)}
     scan = imported(frame, x=1, u="2", **NO_UNITS)
     np.testing.assert_allclose([scan.x[1], scan.u_zz[1]], 2e-3 / np.array([1, 2]))
-    with pytest.raises(InputError, match="no column 3"):
-        imported(frame, x=1, u=3, **NO_UNITS)
+    for columns in (frame, {"t": frame[0], "1": frame[1], "2": frame[2]}):
+        with pytest.raises(InputError, match="no column 3"):
+            imported(columns, x=1, u=3, **NO_UNITS)
+    assert imported({"x": frame[0], "300": frame[1]}, x=1, u=2, **NO_UNITS).u_zz[1] == 2e-3
 
 
 @pytest.mark.parametrize(

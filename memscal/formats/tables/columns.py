@@ -169,8 +169,9 @@ class NamedColumns:
         if sought in heads:
             return heads.index(sought)
         counted = [str(i + 1) for i in range(len(heads))]
-        # Where numbers are names, one that is none of them does not count columns.
-        if sought not in counted or any(map(str.isdecimal, {*heads} - {*counted})):
+        # Where names number columns otherwise, a number that is no name does not count them.
+        other = [head for head, i in zip(heads, counted, strict=True) if head != i]
+        if sought not in counted or {"0", *counted}.intersection(other):
             raise InputError(
                 f"{self._name} has no column {column!r}.",
                 why=self._unfit or "Its columns are: " + ", ".join(self.names) + ".",
