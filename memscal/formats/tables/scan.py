@@ -502,7 +502,7 @@ def _repeated(columns: Columns, place: NDArray[Any], others: str) -> Iterator[st
     if "repeat" in columns and several > 1:
         yield (
             f"{several:.0f} readings at each place of each repeat. Other columns that differ: "
-            f"{others}. If one of them numbers lines, name it (--repeat; --branch)."
+            f"{others or 'none'}. If one of them numbers lines, name it (--repeat; --branch)."
         )
     elif "repeat" not in columns and close > _MANY * x.size:
         yield (

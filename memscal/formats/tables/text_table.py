@@ -433,7 +433,7 @@ def _line_end(text: bytes) -> int:
 
 def read_indenter_table(path: FilePath, *, r_unit: str, z_unit: str) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
-    table = TextTable(path)
+    table = TextTable(path, skip_rows=0)
     units = {1: r_unit, 2: z_unit}
     columns = table.columns({str(i): Wanted(i, unit, "length") for i, unit in units.items()})
     name = os.path.basename(os.fspath(path))
