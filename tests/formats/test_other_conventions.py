@@ -70,13 +70,16 @@ LARGEST = U.max()
     ("stated", "beside", "changed"),
     [
         ({"scale_factor": 1.0, "add_offset": 0, "_FillValue": np.nan}, (), False),
-        ({"missing_value": [-9999.0, 7.0]}, (), False),
+        ({"missing_value": [-9999.0, 7.0], "valid_range": [0.0, 5.0]}, (), False),
+        ({"valid_max": 0.9 * LARGEST}, (), True),
+        ({"valid_range": [0.0, 0.9 * LARGEST]}, (), True),
         ({"scale_factor": 1e-3}, (), True),
         ({"add_offset": [2.0]}, (), True),
         ({"_FillValue": np.float32(LARGEST)}, (), True),
         ({"missing_value": [-1.0, LARGEST]}, (), True),
         ({}, ("u_zz_scaling_factor",), True),
         ({}, ("x_offset",), True),
+        ({}, ("scaling_factor",), True),
         ({}, ("u_zz_mask",), True),
     ],
 )

@@ -370,9 +370,9 @@ def _require_order(mesh: Mesh, frame: Frame, base: Base, shear: Component, zero:
         if np.abs(_at_base(mesh, frame, base, replace(shear, column=column))[1]).max() > zero:
             other = f"{shear.field}:{column + 1}"
             raise InputError(
-                f"In {mesh.source.file_name} {other!r} is not zero, as a shear across it is in a "
-                "section.",
-                why=f"So its components are not in the order {', '.join(_SYMMETRIC)}.",
+                f"In {mesh.source.file_name} the shear {other!r} is not zero.",
+                why="Shears across a section are, so that the components are not in the order "
+                f"{', '.join(_SYMMETRIC)}.",
                 cure=f'Name the shear (shear; --shear "{other}"), and the normal stress likewise '
                 "(sigma; --sigma).",
             )

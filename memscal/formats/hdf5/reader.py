@@ -8,8 +8,9 @@ import contextlib
 import hashlib
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import h5py
@@ -26,9 +27,19 @@ from memscal.model.sizes import MOST_HDF5_BYTES
 _MAX_ATTRIBUTE_BYTES = 2**16
 _MAX_ATTRIBUTE_ITEMS = 64
 _SCALES = b"DIMENSION_LIST"
-#: What changes the numbers of an array: beside it, and among its attributes (unless it is this).
+#: What changes the numbers of an array: beside it, and among its attributes, with which of them it
+#: changes; a fill value may have been stored in fewer digits.
 _BESIDE = ("_scaling_factor", "_offset", "_mask")
-_HARMLESS = {"scale_factor": 1, "add_offset": 0, "_FillValue": None, "missing_value": None}
+_SAME = partial(np.isclose, rtol=1e-6, atol=0)
+_CHANGES: dict[str, Callable[[Any, Any], Any]] = {
+    "scale_factor": lambda _, factor: factor != 1,
+    "add_offset": lambda _, offset: offset != 0,
+    "_FillValue": _SAME,
+    "missing_value": _SAME,
+    "valid_min": np.less,
+    "valid_max": np.greater,
+    "valid_range": lambda values, ends: (values < ends.min()) | (values > ends.max()),
+}
 StoredAttribute = str | int | float | tuple[str, ...] | tuple[float, ...] | None
 """Text, a number, a few of either, or nothing."""
 
@@ -181,13 +192,13 @@ class SafeFile:
 
     def _require_plain(self, path: str, values: np.ndarray[Any, Any]) -> None:
         """Refuse numbers that others scale, shift or leave out before they use them."""
-        changes = [path + name for name in _BESIDE if values.ndim and self._open(path + name)]
-        for name, harmless in _HARMLESS.items():
-            stated = self.attribute(path, name)
-            if stated not in (None, harmless):
-                # A value may have been stored in fewer digits than the numbers.
-                fills = np.isclose(values[..., None], np.array(stated, float), 1e-6, 0)
-                if harmless is not None or fills.any():
+        beside = [path + name for name in _BESIDE]
+        beside.append(f"{path.rpartition('/')[0]}/scaling_factor")  # of older NXdata
+        changes = [other for other in beside if values.ndim and self._open(other)]
+        for name, change in _CHANGES.items():
+            if h5py.h5a.exists(self._opened[path], name.encode()):
+                stated = np.array(self.attribute(path, name), float)
+                if np.any(change(values[..., None], stated)):
                     changes.append(f"{path}@{name}")
         if changes:
             raise FormatError(
