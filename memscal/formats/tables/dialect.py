@@ -114,8 +114,8 @@ def first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
     return start
 
 
-def _several_numbers(words: list[str]) -> bool:
-    return len(words) > 1 and all(map(is_number, words))
+def _several_numbers(cell: str) -> bool:
+    return sum(map(is_number, cell.split())) > 1
 
 
 def find_delimiter(lines: list[str]) -> str:
@@ -125,9 +125,10 @@ def find_delimiter(lines: list[str]) -> str:
     last = lines[-_LAST:]
     by_tabs = [line.split("\t") for line in last[len(last) // 2 :]]
     count = {len(row) for row in by_tabs}
-    cells = [cell.split() for cell in itertools.chain(*by_tabs)]
     # Blanks would close up a column that is empty, or cut a text.
-    tabs = len(count) == 1 < max(count) and not any(map(_several_numbers, cells))
+    tabs = len(count) == 1 < max(count) and not any(
+        map(_several_numbers, itertools.chain(*by_tabs))
+    )
     for delimiter in DELIMITERS:
         if delimiter == " " and tabs:
             break
@@ -137,7 +138,8 @@ def find_delimiter(lines: list[str]) -> str:
         whole = itertools.chain(*(row for row in rows if len(row) == common))
         stated = [cell.strip(' "') for cell in whole if cell.strip()]
         tests = (is_number(c) or c.lower() in MISSING or holds_unit(c) for c in stated)
-        score = widths.count(common) * (0.1 + sum(tests) / max(len(stated), 1))
+        numbers = sum(tests) - sum(map(_several_numbers, stated))
+        score = widths.count(common) * (0.1 + numbers / max(len(stated), 1))
         if common > 1 and score > highest:
             best = delimiter
             highest = score
