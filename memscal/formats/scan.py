@@ -263,7 +263,10 @@ def _stated_axes(file: SafeFile, rank: int) -> Iterator[tuple[int, str]]:
         names = file.attribute(path, "axes") if file.has(path) else None
         if isinstance(names, str):
             names = tuple(re.findall(r"[\w.]+", names))
-        if isinstance(names, tuple) and len(names) == rank:
+        if not isinstance(names, tuple) or len(names) != rank:
+            continue
+        # A signal may have names of its own for its axes.
+        if path == _DATA or not {"x", "y"}.isdisjoint(names):
             yield from enumerate(map(str, names))
     if rank == 2:  # of points all axes are one
         for name in ("x", "y", "repeat"):

@@ -63,6 +63,13 @@ def test_a_square_raster_lies_as_its_axes_are_stated(path: Path, way: str, order
         read_scan(path)
 
 
+def test_names_of_a_signals_own_for_its_axes_state_nothing(path: Path):
+    with h5py.File(path, "r+") as file:
+        WAYS["list"](file["/entry/data"], "yx")
+        file["/entry/data/u_zz"].attrs["axes"] = "row:column"
+    np.testing.assert_array_equal(read_scan(path).u_zz, U)
+
+
 LARGEST = U.max()
 
 
