@@ -1,5 +1,6 @@
 """Calibration: from rod scans to an apparatus function with its covariance and checks."""
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
@@ -22,7 +23,7 @@ from memscal.calibration.prepare import Prepared, Reference, Request, prepare
 from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
-from memscal.errors import MemscalError
+from memscal.errors import FitError, MemscalError
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.set_up import reference_profile
 from memscal.extensions import hook
@@ -40,6 +41,10 @@ from memscal.progress import Listener, done_with, in_steps, reported
 
 if TYPE_CHECKING:
     from memscal import Sweep
+
+#: A must exceed so many standard uncertainties of what a scan leaves open, of these sources.
+_DISTINCT = 3.0
+_OF_THE_SCAN = ("noise", "regularisation", "window")
 
 
 @array_record
@@ -288,6 +293,7 @@ def _propagated(
     """Propagate the uncertainties by the method, and by the other route where it is open."""
     inputs = (effects, prepared.request.correlations, prepared.reading)
     results = uncertainties(solution, solution.deconvolution, *inputs)
+    _require_distinct(results, solution)
     if isinstance(solution.fields, RasterFields):
         from memscal.calibration.field_uncertainty import field_errors
 
@@ -298,6 +304,23 @@ def _propagated(
     if not needed or solution.other is None:
         return results, None
     return results, uncertainties(solution, solution.other, *inputs)
+
+
+def _require_distinct(results: Results, solution: Solution) -> None:
+    """Refuse an A that what the scan leaves open, whatever the inputs, does not tell from zero."""
+    a = results.parameters["conversion_constant"]
+    sources = results.budget["conversion_constant"]
+    uncertainty = math.hypot(*(sources[name] for name in _OF_THE_SCAN))
+    if a > _DISTINCT * uncertainty:
+        return
+    unit = solution.estimate.points.reading
+    raise FitError(
+        f"The conversion constant would be ({a / unit.scale:.2g} ± "
+        f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)} by method "
+        f"{solution.method.name}: it is not distinct from zero.",
+        why=f"It is below {_DISTINCT:g} standard uncertainties, those of the inputs left out.",
+        cure='Look at the scan; take method="bayesian" (--method bayesian), or other options.',
+    )
 
 
 def _effects(

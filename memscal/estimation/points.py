@@ -84,6 +84,11 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
 
 #: Conversion constant, width, centre, baseline, slope; one more to estimate the noise.
 MINIMUM_POSITIONS = 6
+#: Readings this many times farther from the median than all others are wild, if they are so few: a
+#: share of a line's, or of a raster's, whose beam may be small.
+_WILD = 5.0
+_FEW_OF_LINE = 0.1
+_FEW_OF_RASTER = 0.003
 
 
 @array_record
@@ -464,6 +469,23 @@ def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
     return Decorrelation(tuple(blocks))
 
 
+def ordinary_readings(points: ScanPoints) -> BoolArray:
+    """Say which readings (n,) are not among a few that lie far beyond all others of their scan."""
+    # A converter's sentinel would draw amplitude and baseline to itself, above all at an end.
+    ordinary = np.ones(points.u.size, dtype=np.bool_)
+    share = _FEW_OF_RASTER if points.planar else _FEW_OF_LINE
+    for scan in range(points.scans):
+        rows = np.flatnonzero(points.scan == scan)
+        distance = np.abs(points.u[rows] - np.median(points.u[rows]))
+        order = np.argsort(distance)
+        few = max(int(share * rows.size), 1)
+        farthest = distance[order[-few - 1 :]]
+        beyond = farthest[1:] > _WILD * farthest[:-1]
+        if beyond.any():
+            ordinary[rows[order[int(np.argmax(beyond)) - few :]]] = False
+    return ordinary
+
+
 def _require_usable(points: ScanPoints) -> None:
     positions = points.places[0].count
     needed = MINIMUM_POSITIONS + 2 * points.planar
@@ -479,7 +501,8 @@ def _require_usable(points: ScanPoints) -> None:
     if points.order:
         return
     # The median of three points does not follow a single outlier.
-    ordered = np.sort(rise_of(points.x, points.y, points.u / points.load))
+    kept = ordinary_readings(points)
+    ordered = np.sort(rise_of(points.x, points.y, points.u / points.load)[kept])
     rise = np.median(ordered[-3:])
     fall = -np.median(ordered[:3])
     if fall > 1.5 * rise:

@@ -20,7 +20,7 @@ from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -238,12 +238,17 @@ def estimate_profile(
     *references: RadialSpectrum,
     angular: bool = False,
     start: ProfileEstimate | None = None,
+    begin_with: BoolArray | bool = True,
 ) -> ProfileEstimate:
     """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     # With ``angular`` also what of a sensor that was scanned over the plane is not round.
-    # ``start``, of nearly the same voltages at the same points, spares the search.
+    # ``start``, of nearly the same voltages at the same points, spares the search, which is among
+    # the points (n,) to ``begin_with``.
     model = forward_model(points, references)
-    fit = start.gaussian if start else fit_gaussian_to_points(model, stated_weights(points))
+    if start:
+        fit = start.gaussian
+    else:
+        fit = fit_gaussian_to_points(model, stated_weights(points) * begin_with)
     kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.

@@ -35,6 +35,7 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, VoltageMap
 from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.checks import OUTLIER_WEIGHT
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -75,7 +76,8 @@ class SmoothedProfile:
     @cached_property
     def noise(self) -> FloatArray:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
-        floor = _FLOOR_OF_NOISE * np.abs(self.signal).max()
+        ordinary = self.estimate.outlier_weight >= OUTLIER_WEIGHT
+        floor = _FLOOR_OF_NOISE * np.abs(self.signal[ordinary]).max()
         electronic = np.sum(self.estimate.scattered(self.gain) ** 2, axis=1)
         plain = np.diag(self.gain.covariance(np.ones_like(self.signal)))
         variance: FloatArray = electronic + floor**2 * plain
@@ -131,7 +133,9 @@ def _fitted(
     points = estimate.points
     y = signal / points.load[rows]
     noise = (estimate.noise / estimate.outlier_weight**0.5)[rows] / points.load[rows]
-    weight = 1 / (noise**2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
+    # An outlier may be a thousand times the signal.
+    ordinary = estimate.outlier_weight[rows] >= OUTLIER_WEIGHT
+    weight = 1 / (noise**2 + (_FLOOR_OF_NOISE * np.abs(y[ordinary]).max()) ** 2)
     if reference.source:
         # A source ends: what decays is G about it.
         blurred = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)

@@ -13,6 +13,7 @@ import pytest
 from helpers.scans import LINEAR_FILM, RING, TAILS, known_apparatus, simulated
 
 import memscal
+import memscal.calibration.calibrate as calibrate_module
 from memscal import Scan
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.cli import main
@@ -182,3 +183,30 @@ def test_a_clipped_peak_fails_and_names_its_points(kernel, noise):
     check = saturation(replace(clean, u_zz=np.minimum(u + scatter, 0.75 * top)))
     places = "; ".join(f"{x * 1e3:.4g}" for x in clean.x[u + scatter > 0.75 * top])
     assert f"here at {places} mm" in check.meaning
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian", "wiener"])
+def test_an_a_that_its_method_does_not_tell_from_zero_is_refused(method, monkeypatch):
+    told = calibrate_module.propagate
+
+    def wide(*given):
+        results = told(*given)
+        sources = {**results.budget["conversion_constant"], "window": results.parameters.values[0]}
+        return replace(results, budget={**results.budget, "conversion_constant": sources})
+
+    monkeypatch.setattr(calibrate_module, "propagate", wide)
+    assert f"by method {method}: it is not distinct from zero" in refused(SCAN, method=method)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("sentinel", [-40.0, -1.3, 5.0, 40.0, 4e3])
+@pytest.mark.parametrize("places", [[0], [34], [64], [2, 40]])
+def test_a_sentinel_of_any_size_anywhere_moves_neither_route(places, sentinel, noise):
+    scan = simulated(noise=noise)
+    u = scan.u_zz.copy()
+    u[places] = sentinel * u.max()
+    found = memscal.calibrate(replace(scan, u_zz=u)).apparatus
+    assert sum(message.kind == "outlier" for message in found.process.messages) == len(places)
+    for each in (found, found.other):
+        a = each.parameters["conversion_constant"]
+        assert a == pytest.approx(1e-7, rel=max(6 * noise, 1e-4))
