@@ -76,8 +76,9 @@ extra tables: pip install "memscal[tables]".
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
-_COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "repeat", "branch")
-_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds")
+_COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "depth", "repeat", "branch")
+_OF_HOLDS = ("depth", "depth_unit", "baseline")
+_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds", *_OF_HOLDS[1:])
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
 _UNCERTAINTIES = ("noise", "load_uncertainty", "position_errors_by_repeat")
 #: Powers of ten of the units in which what a scan takes for granted is stated.
@@ -140,6 +141,14 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--holds", is_flag=True)(
     "Scan: the table is a log in the order of time. Holds, where the indenter presses at rest, are "
     "found, and each is averaged with its scatter."
+)
+@option("--depth", "COLUMN")(
+    "Holds: column that tells when the indenter presses: it grows as the indenter is lowered, or "
+    "is 1 where it presses and 0 elsewhere. It is not kept."
+)
+@option("--depth-unit", "UNIT")("Holds: unit of the depth.  [default: that of the column's head]")
+@option("--baseline", click.Choice(["before-each"]))(
+    "Holds: the reading before each press is subtracted from it."
 )
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Scan: the log with the holds that were found."
@@ -331,6 +340,9 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
     if options["figures"] is not None and options["holds"] is None:
         raise click.UsageError("--figure belongs to --holds.")
+    of_holds = _stated(options, _OF_HOLDS)
+    if of_holds and options["holds"] is None:
+        raise click.UsageError(f"{common.named(of_holds)} belong to --holds.")
     if not mesh and options["shear_sign"] is not None and options["shear"] is None:
         raise click.UsageError("--shear-sign belongs to --shear.")
     unused = _stated(options, (*_TABLE_ONLY, *_READING) if mesh else _MESH_ONLY)

@@ -24,17 +24,36 @@ _TO_SIGMA = 1.4826 / np.sqrt(2)
 #: Fewer rows do not tell the scatter.
 _FEWEST = 5
 _LOGGED = ("x", "y", "u_zz", "normal_load")
+#: A place is like the others within this share of their rows, or so many of their deviations.
+_ALIKE = 0.05
+_DEVIATIONS = 4.0
 _CURE = (
     "Check the columns of position, load and reading; name the column of the load "
-    "(load_column=...; --load-column COLUMN), which tells best when the indenter presses."
+    "(load_column=...; --load-column COLUMN) or of a depth that grows as the indenter is lowered "
+    "(depth=...; --depth COLUMN), which tell best when it presses."
 )
 
 
-def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: Reading) -> Holds:
-    """Find the holds in the columns of a log, which are in the order of time."""
-    whole = np.logical_and.reduce([np.isfinite(columns[n]) for n in _LOGGED if n in columns])
+def find_holds(
+    columns: Mapping[str, FloatArray],
+    line: NDArray[Any],
+    reading: Reading,
+    *,
+    depth: FloatArray | None = None,
+    baseline: bool = False,
+) -> Holds:
+    """Find the holds in the columns of a log, which are in the order of time.
+
+    A depth in any unit tells when the indenter presses.  Of each hold the reading before its press
+    may be subtracted as its baseline.
+    """
+    logged = [columns[name] for name in _LOGGED if name in columns]
+    if depth is not None:
+        logged.append(depth)
+    whole = np.logical_and.reduce([np.isfinite(values) for values in logged])
     columns = {name: values[whole] for name, values in columns.items()}
     line = line[whole]
+    notes: list[str] = []
     u = columns["u_zz"]
     load = columns.get("normal_load")
     if u.size < _FEWEST:
@@ -43,14 +62,16 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
     way = np.hypot(np.ptp(position.real), np.ptp(position.imag))
     moves = np.abs(np.diff(position)) > _MOVING * way
     dwell = np.append(0, np.cumsum(moves))
-    if load is None:
-        pressed = _timed(u, dwell)
+    if depth is not None:
+        pressed, waiting = _lowered(u, depth[whole], dwell, notes)
+    elif load is None:
+        pressed, waiting = _timed(u, dwell, line, notes)
     else:
         lifted, top = np.quantile(load, [0.01, 0.99])
         pressed = (lifted > _LIFTED * top) | (load > lifted + _PRESSED * (top - lifted))
+        waiting = ~pressed
 
-    starts = np.flatnonzero(np.diff(np.where(pressed, dwell, -1), prepend=-1))
-    runs = [run for run in np.split(np.arange(u.size), starts) if run.size and pressed[run[0]]]
+    runs = _runs(pressed, dwell)
     if load is not None:  # the ramps of a run are below the hold
         runs = _steady_rows(runs, load, pressed, lifted=0.0, share=0.75)
     level = 0.0 if pressed.all() else np.median(u[~pressed])
@@ -59,15 +80,21 @@ def find_holds(columns: Mapping[str, FloatArray], line: NDArray[Any], reading: R
     if not held:
         why = f"A hold is {_FEWEST} rows or more in which position, load and reading are steady."
         raise InputError("The log has no hold.", why=why, cure=_CURE)
-    return _averaged(columns, line, held, len(runs) - len(held), reading)
+    before = None
+    if baseline:
+        before = _before_each(columns, line, held, waiting, dwell)
+        notes.append("The mean of the rows before its press is subtracted from each hold.")
+    return _averaged(columns, line, held, before, len(runs) - len(held), reading, notes)
 
 
 def _averaged(
     columns: Mapping[str, FloatArray],
     line: NDArray[Any],
     held: list[IndexArray],
+    before: FloatArray | None,
     left_out: int,
     reading: Reading,
+    notes: list[str],
 ) -> Holds:
     """Average all columns over the rows of each hold, and say what the readings scatter by."""
     first = np.array([run[0] for run in held])
@@ -89,6 +116,8 @@ def _averaged(
     neighbours = sum(residual[1:] @ residual[:-1] for residual in residuals)
     correlation = np.clip(neighbours / power + 1 / np.median(size), 0.0, 0.95)
     errors = noise * np.sqrt((1 + correlation) / (1 - correlation)) / np.sqrt(size)
+    if before is not None:
+        errors = errors * np.sqrt(1 + size / before)
 
     thirds = [run.size // 3 for run in held]
     change = np.array(
@@ -110,21 +139,98 @@ def _averaged(
         f"{reading.text(np.abs(change).max())})."
     )
     log = {name: columns[name] for name in _LOGGED if name in columns}
-    return Holds(log, line, first, stop, mean, errors, reading, (averaged, scatters, changes))
+    return Holds(
+        log, line, first, stop, mean, errors, reading, (averaged, scatters, changes, *notes)
+    )
 
 
-def _timed(u: FloatArray, dwell: IndexArray) -> BoolArray:
-    """Tell from the readings when the indenter presses, after it came to rest at a place."""
+def _runs(rows: BoolArray, dwell: IndexArray) -> list[IndexArray]:
+    """Return runs of some rows, each within one dwell."""
+    starts = np.flatnonzero(np.diff(np.where(rows, dwell, -1), prepend=-1))
+    return [run for run in np.split(np.arange(rows.size), starts) if run.size and rows[run[0]]]
+
+
+def _lowered(
+    u: FloatArray, depth: FloatArray, dwell: IndexArray, notes: list[str]
+) -> tuple[BoolArray, BoolArray]:
+    """Tell from the depth when the indenter presses, at its lowest at a place, and when not."""
+    places = _runs(np.bincount(dwell)[dwell] >= _FEWEST, dwell)
+    # Each place has its stroke, with the way to the next: one that is lifted far changes no other.
+    ways = np.split(np.arange(u.size), [place[0] for place in places])[1:]
+    ends = [np.sort(depth[way])[[_FEWEST - 1, -_FEWEST]] for way in ways]
+    lifted, top = np.median(ends or np.zeros((1, 2)), axis=0).tolist()
+    noise = _NOISE * _noise(depth)
+    waiting = depth <= (lifted + top) / 2
+    pressed = np.zeros(u.size, dtype=bool)
+    levels = []
+    for place, way in zip(places, ways, strict=True):
+        low = place[~waiting[place]]
+        high = way[waiting[way]]
+        if low.size:  # it may wait above the film, and overshoot
+            least = np.quantile(depth[low], 0.9) - _PRESSED * (top - lifted) - noise
+            pressed[low] = depth[low] > least
+            if high.size:
+                levels.append((np.median(u[low]), np.median(u[high])))
+    below, above = np.ptp(levels or np.zeros((1, 2)), axis=0)
+    changes = top - lifted > 2 * noise and len(levels) > len(places) / _FEWEST
+    if not changes or above > 2 * below + _NOISE * _noise(u):
+        raise InputError(
+            "The depth does not tell when the indenter presses.",
+            why="It grows as the indenter is lowered, and the readings differ where it is large.",
+            cure="Name another column (--depth), or change the sign of a height.",
+        )
+    longest = max((run.size for run in _runs(~pressed, dwell)), default=0)
+    notes.append(
+        f"The depth tells the presses; waits above them, of up to {longest} rows, are left out."
+    )
+    return pressed, waiting
+
+
+def _before_each(
+    columns: Mapping[str, FloatArray],
+    line: NDArray[Any],
+    held: list[IndexArray],
+    waiting: BoolArray,
+    dwell: IndexArray,
+) -> FloatArray:
+    """Subtract from each hold the reading before its press; return of how many rows it is."""
+    u = columns["u_zz"]
+    near = _NOISE * _noise(u[waiting])
+    size = np.zeros(len(held))
+    for i, run in enumerate(held):
+        place = np.arange(np.searchsorted(dwell, dwell[run[0]]), run[0])
+        # The nearest rows, as many as the hold has: what drifted long before counts no more.
+        rows = place[waiting[place]][-run.size :]
+        if rows.size < _FEWEST:
+            raise InputError(
+                f"The hold of lines {line[run[0]]} to {line[run[-1]]} has no baseline.",
+                why=f"Before its press it has {rows.size} rows at its place, of {_FEWEST} or more.",
+                cure="Leave out these lines, or baseline (--baseline).",
+            )
+        rows = rows[np.abs(u[rows] - np.median(u[rows])) <= near]
+        size[i] = rows.size
+        for name in columns.keys() & {"u_zz", "u_xz", "u_yz"}:
+            columns[name][run] -= columns[name][rows].mean()
+    return size
+
+
+def _timed(
+    u: FloatArray, dwell: IndexArray, line: NDArray[Any], notes: list[str]
+) -> tuple[BoolArray, BoolArray]:
+    """Tell from the readings when the indenter presses at a place, and when it waits before."""
     # Far from the sensor no reading tells: the times at the others' places, all alike, do.
     starts = np.flatnonzero(np.diff(dwell, prepend=-1))
     size = np.diff(starts, append=u.size)
     time = (np.arange(u.size) - starts[dwell]) / size[dwell]
+    # Of a row, not of a place: short stops on the way are no places.
+    usual = np.median(size[dwell])
+    spread = _DEVIATIONS * np.median(np.abs(size[dwell] - usual))
+    alike = np.abs(size - usual) <= max(_FEWEST, _ALIKE * usual, min(spread, usual / 2))
     spans = []
-    for start, count in zip(starts, size, strict=True):
+    for start, count in zip(starts[alike], size[alike], strict=True):
         rows = slice(start, start + count)
-        low, high = np.quantile(u[rows], [0.05, 0.95])
-        if count >= _FEWEST and high - low > 2 * _NOISE * _noise(u[rows]):
-            raised = time[rows][u[rows] > (low + high) / 2]
+        raised = time[rows][_raised(u[rows])]
+        if count >= _FEWEST and raised.size:
             spans.append((raised[0], raised[-1]))
     begins, ends = np.array(spans or [(0.0, 1.0)]).T
     begin = np.quantile(begins, 0.9)
@@ -132,7 +238,30 @@ def _timed(u: FloatArray, dwell: IndexArray) -> BoolArray:
     if end - begin < _PRESSED:
         why = "The readings rise at other times at each place."
         raise InputError("The log does not show when the indenter presses.", why=why, cure=_CURE)
-    return np.asarray((time >= begin) & (time <= end) & (size[dwell] >= _FEWEST))
+    pressed = np.asarray((time >= begin) & (time <= end) & (size[dwell] >= _FEWEST))
+    waiting = np.asarray(time < np.quantile(begins, 0.1))
+    press = (end - begin) * usual
+    for i in np.flatnonzero(~alike & ((end - begin) * size >= _FEWEST)):
+        place = np.arange(starts[i], starts[i] + size[i])
+        raised = place[_raised(u[place])]
+        which = f"lines {line[place[0]]} to {line[place[-1]]}"
+        if not press / 2 <= raised.size <= 2 * press or np.ptp(raised) > 1.1 * raised.size:
+            problem = f"The log does not show when the indenter presses in {which}."
+            why = f"It rests for {place.size} rows there, at other places for {usual:.0f} (median)."
+            raise InputError(problem, why=why, cure=f"{_CURE} Or leave these lines out.")
+        pressed[place] = (place >= raised[0]) & (place <= raised[-1])
+        waiting[place] = place < raised[0]
+        notes.append(
+            f"Of {which}, more or less than at other places, the plateau of lines "
+            f"{line[raised[0]]} to {line[raised[-1]]} is taken: its readings are higher."
+        )
+    return pressed, waiting
+
+
+def _raised(u: FloatArray) -> BoolArray:
+    """Return where the readings of a place are on the higher of two levels; nowhere if on one."""
+    low, high = np.quantile(u, [0.05, 0.95])
+    return np.asarray((high - low > 2 * _NOISE * _noise(u)) & (u > (low + high) / 2))
 
 
 def _noise(values: FloatArray) -> float:

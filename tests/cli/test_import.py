@@ -24,3 +24,17 @@ def test_a_log_of_presses_is_averaged_and_drawn(run: Run, folder: Path):
     assert (folder / "log.png").read_bytes().startswith(b"\x89PNG")
     scan = memscal.read_scan("scan.h5")
     np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)
+
+
+def test_a_depth_tells_the_presses_and_is_not_kept(run: Run, folder: Path):
+    x = np.repeat(np.linspace(-8, 8, 17), 20)
+    down = np.tile(np.repeat([0.0, 1.0], 10), 17)
+    noise = np.random.default_rng(1).normal(size=x.size) * 1e-3
+    rows = np.stack([x, 0.3 + down * np.exp(-(x**2)) + noise, down], axis=1)
+    np.savetxt("log.csv", rows, delimiter=",", header="x/mm,u/mV,z", comments="")
+    told = "import log.csv -o s.h5 --x x --u u --depth z --depth-unit mm --baseline before-each"
+    run(*told.split()).exits(2)
+    run(*told.split(), "--holds").exits(0)
+    scan = memscal.read_scan(folder / "s.h5")
+    assert scan.normal_load is None
+    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.exp(-(scan.x**2) * 1e6), atol=2e-6)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from memscal.errors import InputError
+from memscal.model.holds import Holds
 from memscal.model.notation import VOLTS
 from memscal.readings.find_holds import find_holds
 
@@ -69,3 +70,63 @@ def test_what_is_no_log_is_refused_and_a_short_press_is_left_out():
     assert "1 presses of fewer than 5 steady rows are left out" in holds.notes[0]
     with pytest.raises(InputError, match="The log has no hold"):
         find_holds({n: v[::40] for n, v in columns.items()}, np.arange(99)[:48], VOLTS)
+
+
+def presses(sensor: float, waits: dict[int, int], drift: float = 0.0) -> dict[str, Any]:
+    """13 places, presses of 137 rows to 0.1 mm; before some the raised indenter waits longer."""
+    x, depth = [], []
+    for i, place in enumerate(np.linspace(-6e-3, 6e-3, 13)):
+        rows = [np.full(20 + waits.get(i, 0), -50e-3 if i in waits else -1e-3)]
+        rows += [np.full(9, -1e-5), np.full(137, 1e-4), np.full(15, -1e-3)]
+        depth += rows
+        x.append(np.full(sum(map(len, rows)), place))
+    columns = {"x": np.concatenate(x), "depth": np.concatenate(depth)}
+    signal = 15e-3 * np.exp(-(((columns["x"] - sensor) / 1.5e-3) ** 2) / 2)
+    noise = 2e-6 * np.random.default_rng(3).normal(size=signal.size)
+    steps = drift * np.floor((columns["x"] + 6e-3) / 1e-3)
+    columns["u_zz"] = signal * (columns["depth"] > 0) + noise + steps
+    return columns
+
+
+def found(columns: dict[str, Any], depth: Any = None, **options: Any) -> Holds:
+    columns = {"x": columns["x"], "u_zz": columns["u_zz"]}
+    return find_holds(columns, np.arange(columns["x"].size), VOLTS, depth=depth, **options)
+
+
+WAITS = [{}, {0: 500}, {6: 500}, {0: 60, 9: 90}]
+
+
+@pytest.mark.parametrize("waits", WAITS)
+@pytest.mark.parametrize("kind", ["depth", "flag", "none", "before each"])
+def test_a_wait_above_the_film_is_no_reading(waits, kind):
+    """By the depth, by a flag and by two levels of the readings; with a drift of 9 mV, too."""
+    columns = presses(3e-3, waits, drift=9e-3 / 12 if kind == "before each" else 0.0)
+    depth = {"none": None, "flag": columns["depth"] > 0}.get(kind, columns["depth"])
+    depth = depth if depth is None else depth.astype(float)
+    if kind == "none" and 0 in waits:  # no reading shows the press
+        with pytest.raises(InputError, match=r"when the indenter presses in lines \d+ to \d+"):
+            found(columns)
+        return
+    holds = found(columns, depth, baseline=kind == "before each")
+    truth = 15e-3 * np.exp(-(((holds.mean["x"] - 3e-3) / 1.5e-3) ** 2) / 2)
+    assert holds.first.size == 13
+    assert np.all(holds.stop - holds.first >= 130)
+    z = (holds.mean["u_zz"] - truth) / holds.u_errors
+    assert np.sqrt(np.mean(z**2)) < 2
+    assert bool(waits or depth is not None) == (len(holds.notes) > 3)
+
+
+@pytest.mark.parametrize("column", ["height", "still", "time"])
+def test_a_column_that_does_not_tell_the_presses_is_refused(column):
+    columns = presses(0.0, {0: 500})
+    rows = np.arange(columns["x"].size) * 1.0
+    depth = {"height": -columns["depth"], "still": 0 * rows, "time": rows}[column]
+    with pytest.raises(InputError, match="does not tell when"):
+        found(columns, depth)
+
+
+def test_a_press_without_rows_before_it_has_no_baseline():
+    columns = presses(0.0, {})
+    later = {name: values[29:] for name, values in columns.items()}
+    with pytest.raises(InputError, match="hold of lines 0 to 136 has no baseline"):
+        found(later, later["depth"], baseline=True)

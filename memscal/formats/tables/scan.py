@@ -45,7 +45,9 @@ _RECORDS = {
 }
 _U_UNIT = "u_unit (--u-unit)"
 #: Options that name columns, besides x and u.
-_ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "u_xz", "u_yz")
+_ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz")
+#: Words of a column that tells when the indenter presses.
+_PRESSING = {"false": 0.0, "true": 1.0}
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
 #: so large a share of them was probably repeated.
 _CLOSE = 0.1
@@ -78,6 +80,7 @@ def import_table(
     u_xz: Column | None = None,
     u_yz: Column | None = None,
     load_column: Column | None = None,
+    depth: Column | None = None,
     repeat: Column | Sequence[Column] | None = None,
     branch: Column | None = None,
     layout: TableLayout | None = None,
@@ -105,6 +108,9 @@ def import_table(
     u_xz, u_yz, load_column, branch : str or int, optional
         Columns of the tangential channels, of the load at each point, and of the branch (approach,
         retreat).
+    depth : str or int, optional
+        Of a log with holds: column that grows as the indenter is lowered, or is 1 where it presses
+        and 0 elsewhere.  It tells the presses, and is not kept.
     repeat : str or int, or several
         Columns that number the passes; each combination of several is one.
     layout : TableLayout, optional
@@ -161,6 +167,7 @@ def import_table(
         "u_yz": u_yz,
         "u_zz_errors": u_errors,
         "normal_load": load_column,
+        "depth": depth,
         "x": x,
         "y": y,
         "branch": branch,
@@ -177,8 +184,15 @@ def import_table(
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
-    holds = find_holds(columns, table.all_lines(), reading) if layout.holds else None
-    if holds is not None:
+    holds = None
+    if layout.holds:
+        holds = find_holds(
+            columns,
+            table.all_lines(),
+            reading,
+            depth=columns.pop("depth", None),
+            baseline=layout.baseline is not None,
+        )
         notes += holds.notes
         columns = dict(holds.mean)
         if holds.u_errors.all():  # readings of few digits may not scatter
@@ -241,6 +255,12 @@ def _require_use(
             "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or of holds."
         )
         raise InputError(problem, cure="Give one of them.")
+    if not layout.holds and (named["depth"] is not None or layout.baseline):
+        problem = "depth (--depth) and baseline (--baseline) belong to a log with holds."
+        raise InputError(problem, cure="State holds (--holds), too.")
+    if layout.depth_unit and named["depth"] is None:
+        problem = "depth_unit (--depth-unit) belongs to a column of depths."
+        raise InputError(problem, cure="Name the column (--depth COLUMN).")
     if named["x"] is None and named["y"] is None:
         raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
 
@@ -261,6 +281,7 @@ def _wanted(
         "u_yz": reading,
         "u_zz_errors": (dimension_of_u, None, "", u_unit),
         "normal_load": ("force", layout.load_unit, "load_unit (--load-unit)", "N"),
+        "depth": ("", layout.depth_unit, "depth_unit (--depth-unit)", "1"),
         "x": length,
         "y": length,
     }
@@ -272,7 +293,8 @@ def _wanted(
         if name in forms:
             dimension, unit, option, default = forms[name]
             unit = table.unit_of(column, unit, option, default)
-            wanted[name] = Wanted(column, unit, dimension)
+            dimension = dimension or dimension_in("voltage", reading_of(unit, table.where(column)))
+            wanted[name] = Wanted(column, unit, dimension, _PRESSING if name == "depth" else {})
     return wanted
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from typing import Literal
 
 from memscal.model.arrays import FloatArray, keyword_value_record
 from memscal.model.film import ElasticFilm
@@ -23,6 +24,10 @@ class TableLayout:
         -1 where the voltage falls when the indenter presses.
     holds : bool
         The table is a log in the order of time: holds are found, and each is averaged.
+    depth_unit : str, optional
+        Unit of the depth that tells the presses, where the table states none.
+    baseline : "before-each", optional
+        The reading before each press is subtracted from its hold.
     sheet : str, optional
         Sheet of a workbook, by default the first.
     skip_rows : int, optional
@@ -46,6 +51,8 @@ class TableLayout:
     load_unit: str | None = None
     u_sign: int = 1
     holds: bool = False
+    depth_unit: str | None = None
+    baseline: Literal["before-each"] | None = None
     sheet: str | None = None
     skip_rows: int | None = None
     missing: Sequence[str] = ()
