@@ -78,7 +78,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 
 _COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "depth", "repeat", "branch")
 _OF_HOLDS = ("depth", "depth_unit", "baseline")
-_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds", *_OF_HOLDS[1:])
+_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds", "scan", *_OF_HOLDS[1:])
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
 _UNCERTAINTIES = ("noise", "load_uncertainty", "position_errors_by_repeat")
 #: Powers of ten of the units in which what a scan takes for granted is stated.
@@ -260,6 +260,9 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @common.film_options()
 @common.rod_friction_option(common.FREE_OR_STUCK)
 @option("--sheet", "NAME")("Sheet of a workbook.  [default: the first that is visible]")
+@option("--scan", click.IntRange(1), metavar="N")(
+    "Scan: which one of a file of SPEC or Bluesky: the number after #S, or counted from 1."
+)
 @option("--skip-rows", click.IntRange(0), metavar="N")(
     "Lines before the header, or the first reading.  [default: found from the table]"
 )

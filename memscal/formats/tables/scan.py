@@ -176,7 +176,7 @@ def import_table(
     named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
     require_sign("sign of the voltage", layout.u_sign)
     _require_use(named, layout, conditions, uncertainties)
-    reading_options = ("sheet", "skip_rows", "missing", "delimiter", "decimal")
+    reading_options = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
     table = open_table(source, **{name: getattr(layout, name) for name in reading_options})
     u_unit = table.unit_of(u, layout.u_unit, _U_UNIT)
     reading = reading_of(u_unit, table.where(u))

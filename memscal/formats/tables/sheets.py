@@ -30,7 +30,12 @@ from memscal.progress import Task
 _KINDS = {".xlsx": "workbook", ".xlsm": "workbook", ".parquet": "Parquet", ".pq": "Parquet"}
 _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 #: Options of reading by the kinds of tables that have a use for them.
-_USES = {"delimiter": ("text",), "skip_rows": ("text", "workbook"), "sheet": ("workbook",)}
+_USES = {
+    "delimiter": ("text",),
+    "scan": ("text",),
+    "skip_rows": ("text", "workbook"),
+    "sheet": ("workbook",),
+}
 _PIECE = 2**16
 #: What a sheet holds besides its values: hidden rows, merged cells, and formulas without results
 #: (of an empty text the result is empty), in whose place openpyxl would give nothing.

@@ -30,6 +30,8 @@ class TableLayout:
         The reading before each press is subtracted from its hold.
     sheet : str, optional
         Sheet of a workbook, by default the first.
+    scan : int, optional
+        Of a file of SPEC or Bluesky with several scans: the number after #S, or counted from 1.
     skip_rows : int, optional
         Lines before the header, or before the first reading where there is no header.
     missing : sequence of str
@@ -54,6 +56,7 @@ class TableLayout:
     depth_unit: str | None = None
     baseline: Literal["before-each"] | None = None
     sheet: str | None = None
+    scan: int | None = None
     skip_rows: int | None = None
     missing: Sequence[str] = ()
     delimiter: str | None = None
