@@ -168,7 +168,8 @@ def _lowered(
         high = way[waiting[way]]
         if low.size:  # it may wait above the film, and overshoot
             least = np.quantile(depth[low], 0.9) - _PRESSED * (top - lifted) - noise
-            pressed[low] = depth[low] > least
+            lowest = np.flatnonzero(depth[low] > least)
+            pressed[low[lowest[0] : lowest[-1] + 1]] = True
             if high.size:
                 levels.append((np.median(u[low]), np.median(u[high])))
     below, above = np.ptp(levels or np.zeros((1, 2)), axis=0)
