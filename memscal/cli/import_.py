@@ -78,7 +78,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 
 _COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "depth", "repeat", "branch")
 _OF_HOLDS = ("depth", "depth_unit", "baseline")
-_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds", "scan", *_OF_HOLDS[1:])
+_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds", "ceiling", "scan", *_OF_HOLDS[1:])
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
 _UNCERTAINTIES = ("noise", "load_uncertainty", "position_errors_by_repeat")
 #: Powers of ten of the units in which what a scan takes for granted is stated.
@@ -214,6 +214,10 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 @option("--lubricant", "TEXT")("Scan: name of the lubricant.")
 @option("--u-sign", _SIGN)(
     "Scan: -1 where the voltage falls when the indenter presses.  [default: 1]"
+)
+@option("--ceiling", Quantity("unit of u", low=-float("inf")))(
+    "Scan: end of amplifier or converter, in the unit of u, after --u-sign: readings at or above "
+    "it are left out."
 )
 @option("--sensor-name", "TEXT")("Scan: name of the sensor.")
 @option("--sensor-model", "TEXT")("Scan: model of the sensor.")

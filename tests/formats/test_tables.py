@@ -540,3 +540,28 @@ def test_one_scan_of_a_file_is_read_and_several_are_refused(begun, scan, place, 
     for number, why in wrong.items():
         with pytest.raises(FormatError, match=why):
             import_table(path, **names, layout=TableLayout(**units, scan=number))
+
+
+@pytest.mark.parametrize(
+    ("unit", "ceiling", "sign", "left"),
+    [("mV", 2.0, 1, 3), ("mV", 3.0, 1, 1), ("mV", 3.5, 1, 0), ("V", 2.0, 1, 3), ("mV", 2.0, -1, 3)],
+)
+def test_readings_at_the_ceiling_are_left_out_and_counted(unit, ceiling, sign, left):
+    u = np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.9999, 0.0])
+    layout = TableLayout(x_unit="mm", u_unit=unit, ceiling=ceiling, u_sign=sign)
+    table = {"x": np.arange(7.0), "U": sign * u}
+    scan = import_table(table, x="x", u="U", layout=layout)
+    np.testing.assert_array_equal(np.isnan(scan.u_zz), u >= ceiling)
+    are = "reading at the ceiling is" if left == 1 else "readings at the ceiling are"
+    assert f"{left} {are} left out." in scan.notes
+
+
+def test_a_hold_of_which_a_row_is_at_the_ceiling_is_left_out():
+    place = np.repeat(np.arange(5.0), 60)
+    pressed = np.arange(300) % 60 >= 30
+    noise = np.random.default_rng(1).normal(0, 1e-3, 300)
+    u = pressed * np.array([1.0, 2.0, 4.0, 2.0, 1.0]).repeat(60) + noise
+    layout = TableLayout(x_unit="mm", u_unit="mV", holds=True, ceiling=4.0)
+    table = {"x": place, "U": np.minimum(u, 4.0), "F": 1.0 * pressed}
+    scan = import_table(table, x="x", u="U", load_column="F", layout=layout)
+    np.testing.assert_array_equal(np.isnan(scan.u_zz), np.arange(5) == 2)

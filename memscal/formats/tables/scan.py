@@ -197,6 +197,10 @@ def import_table(
         columns = dict(holds.mean)
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
+    if layout.ceiling is not None:
+        of = wanted["u_zz"]
+        ceiling = to_si(layout.ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
+        _leave_out_clipped(columns, holds, float(ceiling), notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
     scan = _scan_of(columns, notes, reading, conditions, uncertainties, table, holds)
@@ -318,6 +322,21 @@ def _read_columns(
     if "x" not in columns:
         columns["x"] = np.zeros(columns["y"].size)
     return columns, notes
+
+
+def _leave_out_clipped(
+    columns: Columns, holds: Holds | None, ceiling: float, notes: list[str]
+) -> None:
+    """Mark readings at a ceiling as missing, and holds of which any row is there."""
+    highest = columns["u_zz"]
+    if holds is not None:
+        rows = zip(holds.first, holds.stop, strict=True)
+        highest = np.array([holds.log["u_zz"][first:stop].max() for first, stop in rows])
+    clipped = highest >= ceiling
+    columns["u_zz"] = np.where(clipped, np.nan, columns["u_zz"])
+    number = np.count_nonzero(clipped)
+    are = "reading at the ceiling is" if number == 1 else "readings at the ceiling are"
+    notes.append(f"{number} {are} left out.")
 
 
 def _scan_of(

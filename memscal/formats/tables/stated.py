@@ -28,6 +28,9 @@ class TableLayout:
         Unit of the depth that tells the presses, where the table states none.
     baseline : "before-each", optional
         The reading before each press is subtracted from its hold.
+    ceiling : float, optional
+        In the unit of ``u``, after ``u_sign``: readings at or above it, where amplifier or
+        converter is at its end, are left out.
     sheet : str, optional
         Sheet of a workbook, by default the first.
     scan : int, optional
@@ -55,6 +58,7 @@ class TableLayout:
     holds: bool = False
     depth_unit: str | None = None
     baseline: Literal["before-each"] | None = None
+    ceiling: float | None = None
     sheet: str | None = None
     scan: int | None = None
     skip_rows: int | None = None
