@@ -68,6 +68,9 @@ def calibration_messages(
             "across it: their positions are taken as those of one stage."
         )
         messages.append(Message("line_offset", text))
+    clipped = round(sum(scan.at_ceiling for scan in prepared.as_stated))
+    if clipped:
+        messages.append(Message("at_ceiling", quality.at_ceiling_text(clipped)))
     messages += point_messages(estimate)
     if estimate.points.u_errors is None:
         messages.append(_noise(estimate, results))

@@ -206,7 +206,7 @@ def _data_group(scan: Scan) -> Group:
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, positions, axes if points else (along,))
     stated = dict(vars(scan))
-    for name in ("line_offset", "position_errors_by_repeat"):
+    for name in ("line_offset", "position_errors_by_repeat", "at_ceiling"):
         stated[name] = stated[name] or None
     data |= write_record(records.TAKEN_FOR_GRANTED, stated).children
     data |= _nodes(scan, {"u_zz": scan.u_zz}, axes)

@@ -252,6 +252,12 @@ def override_messages(differences: Iterable[str]) -> list[Message]:
     return [Message(OVERRIDE, f"Overridden: {text}.", "warning") for text in differences]
 
 
+def at_ceiling_text(number: int) -> str:
+    """Say how many readings at a ceiling are left out."""
+    are = "reading at the ceiling is" if number == 1 else "readings at the ceiling are"
+    return f"{number} {are} left out."
+
+
 def import_notes(texts: Iterable[str]) -> list[Message]:
     """Return what an import did, as notes."""
     return [Message("import", text) for text in texts]

@@ -143,6 +143,7 @@ TAKEN_FOR_GRANTED = record(
         for name in STATED_ERRORS
     ),
     Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
+    Quantity("at_ceiling", _ONE, "number of readings left out at a ceiling"),
 )
 """What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(

@@ -195,6 +195,8 @@ class Scan:
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
         Correlation of the noise between the points of one repeat (of kind points: between all);
         none where absent.  With shape (n, w) that of each point with itself and the next w - 1.
+    at_ceiling : int
+        How many readings at a ceiling an import left out, which are missing.
     direction : str
         ``"x"`` or ``"y"``: which way a line scan ran across the sensor; its positions are in ``x``.
     position_scale_uncertainty : float, optional
@@ -258,6 +260,7 @@ class Scan:
     x_errors: FloatArray | None = None
     position_errors_by_repeat: bool = False
     u_zz_correlation: FloatArray | None = None
+    at_ceiling: int = 0
     direction: str = "x"
     position_scale_uncertainty: float | None = None
     line_offset: float = 0.0

@@ -554,6 +554,7 @@ def test_readings_at_the_ceiling_are_left_out_and_counted(unit, ceiling, sign, l
     np.testing.assert_array_equal(np.isnan(scan.u_zz), u >= ceiling)
     are = "reading at the ceiling is" if left == 1 else "readings at the ceiling are"
     assert f"{left} {are} left out." in scan.notes
+    assert scan.at_ceiling == left
 
 
 def test_a_hold_of_which_a_row_is_at_the_ceiling_is_left_out():

@@ -1,7 +1,7 @@
 """Scans from tables with one row per reading."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +15,7 @@ from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
 from memscal.formats.units import reading_of, to_si
 from memscal.model.arrays import frozen_array, keyword_array_record, unmasked
-from memscal.model.checks import Message, import_notes, marked_texts
+from memscal.model.checks import Message, at_ceiling_text, import_notes, marked_texts
 from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
@@ -197,13 +197,15 @@ def import_table(
         columns = dict(holds.mean)
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
+    at_ceiling = 0
     if layout.ceiling is not None:
         of = wanted["u_zz"]
         ceiling = to_si(layout.ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
-        _leave_out_clipped(columns, holds, float(ceiling), notes)
+        at_ceiling = _leave_out_clipped(columns, holds, float(ceiling), notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
     scan = _scan_of(columns, notes, reading, conditions, uncertainties, table, holds)
+    scan = replace(scan, at_ceiling=at_ceiling)
     del columns  # the scan has copies, and ten million rows are many
     warn_of_readings(scan)
     if scan.film is not None:
@@ -326,17 +328,17 @@ def _read_columns(
 
 def _leave_out_clipped(
     columns: Columns, holds: Holds | None, ceiling: float, notes: list[str]
-) -> None:
-    """Mark readings at a ceiling as missing, and holds of which any row is there."""
+) -> int:
+    """Mark readings at a ceiling, and holds with a row there, as missing; return how many."""
     highest = columns["u_zz"]
     if holds is not None:
         rows = zip(holds.first, holds.stop, strict=True)
         highest = np.array([holds.log["u_zz"][first:stop].max() for first, stop in rows])
     clipped = highest >= ceiling
     columns["u_zz"] = np.where(clipped, np.nan, columns["u_zz"])
-    number = np.count_nonzero(clipped)
-    are = "reading at the ceiling is" if number == 1 else "readings at the ceiling are"
-    notes.append(f"{number} {are} left out.")
+    number = int(clipped.sum())
+    notes.append(at_ceiling_text(number))
+    return number
 
 
 def _scan_of(
