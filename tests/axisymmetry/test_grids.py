@@ -94,18 +94,6 @@ def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed:
     assert grid.from_image(field) is field
 
 
-@pytest.mark.parametrize("axis", [(0.0, 0.0), (0.07, -0.11), (1.31, 0.9)])
-def test_the_quotient_of_two_displaced_fields_is_centred(axis: tuple[float, float]) -> None:
-    grid = Lattice(centred_axis(81, 0.25, -axis[0]), centred_axis(61, 0.35, -axis[1]))
-    middle = Lattice(centred_axis(81, 0.25), centred_axis(61, 0.35))
-    narrow = grid.forward(unit_gaussian(grid.radius, 0.45))
-    wide = grid.forward(unit_gaussian(grid.radius, 1.0))
-    open_ = np.exp(-(grid.wavenumber**2) * 0.45**2 / 2) > 1e-7
-    quotient = np.divide(wide, narrow, out=np.zeros_like(wide), where=open_)
-    exact = unit_gaussian(middle.radius, np.sqrt(1 - 0.45**2))
-    np.testing.assert_allclose(grid.inverse(quotient), exact, atol=1e-7)
-
-
 @given(seed=SEEDS)
 def test_convolution_on_a_lattice_is_linear_convolution_of_what_does_not_wrap(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -245,24 +245,6 @@ def test_each_scan_has_a_gain_of_its_own(made, apparatus, families) -> None:
     assert column["load"].shape[-1] == 3
 
 
-def test_a_gain_of_one_scan_is_counted(made, apparatus, families) -> None:
-    wrong = [made.dry, scaled(made.lubricated, 1.02)]
-    measured = memscal.measure_stress(wrong, apparatus)
-    right = memscal.measure_stress([made.dry, made.lubricated], apparatus)
-
-    def moved(gain: float) -> float:
-        pair = [
-            compare_measured(
-                one, apparatus, families, between_scan_gain=gain, lubricated_friction=0.0
-            )
-            for one in (measured, right)
-        ]
-        values = [each.joint["dry"]["incremental"].best for each in pair]
-        return abs(values[0] - values[1])
-
-    assert moved(0.05) < moved(0.0)
-
-
 def test_a_noise_that_was_estimated_has_no_chi_square(made, apparatus, families) -> None:
     scans = [replace(scan, u_zz_errors=None) for scan in (made.dry, made.lubricated)]
     found = compare_measured(memscal.measure_stress(scans, apparatus), apparatus, families)
