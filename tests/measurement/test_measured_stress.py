@@ -212,12 +212,6 @@ def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
     assert found.process.configuration["override"] == list(found.overridden)
 
 
-def test_films_that_agree_within_their_uncertainties_are_one() -> None:
-    film = replace(made.EXACT_FILM, thickness=2.08e-3, thickness_uncertainty=0.05e-3)
-    found = memscal.measure_stress(replace(made.contact_scan(load=(1.37,)), film=film), SENSOR)
-    assert found.overridden == ()
-
-
 def spoilt(row: int, columns: slice) -> Scan:
     scan = made.contact_scan()
     u = scan.u_zz.copy()

@@ -202,11 +202,6 @@ BESIDE = replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None)
 BAD = {
     "several loads": (replace(SCAN, normal_load=np.linspace(0.5, 1.5, 33)), EXACT, "grows"),
     "another sensor": (replace(SCAN, sensor=OTHER), EXACT, 'name of the sensor "other" in'),
-    "another film": (
-        replace(SCAN, film=replace(SCAN.film, thickness=2.2e-3)),
-        EXACT,
-        "film thickness 2.2 mm",
-    ),
     "no covariance": (SCAN, replace(EXACT, radial_profile=BARE), "does not state the covariance"),
     "zero noise": (replace(SCAN, u_zz_errors=np.zeros(33)), EXACT, "uncertainty of zero"),
     "wrong sign": (replace(SCAN, u_zz=-SCAN.u_zz), EXACT, "Change the sign"),
