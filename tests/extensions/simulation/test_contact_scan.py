@@ -59,13 +59,6 @@ def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads():
         assert scan.u_zz[i] == pytest.approx(1e-7 * float(np.sum(weight * stress)), rel=1e-4)
 
 
-def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads():
-    heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
-    np.testing.assert_allclose(heavy.u_zz, simulate_contacts(load=[1.1], **EXACT).u_zz, rtol=1e-12)
-    assert (heavy.load, truth(heavy)["load_1"]) == pytest.approx((1.0, 1.1))
-    np.testing.assert_array_equal(heavy.normal_load, np.ones(33))
-
-
 @pytest.mark.parametrize(
     ("options", "error", "problem"),
     [
