@@ -64,11 +64,7 @@ _RIVALS = {
     "film_law": ("a film {} of the way from linear to neo-Hookean", 0.3, ""),
     "stage_scale": ("a stage scale of {}", 0.02, ""),
     "line_offset": ("a line {} beside the centre", 0.3e-3, "mm"),
-    "baseline_curvature": (
-        "a baseline that bends by {} of the largest signal beyond what is fitted",
-        0.02,
-        "",
-    ),
+    "baseline_curvature": ("a baseline that bends by {} of the largest signal", 0.02, ""),
     "gain_curvature": ("an amplifier of curvature {}", 0.05, ""),
     "lag": ("a lag of {} along the scan", 0.2e-3, "mm"),
 }

@@ -227,6 +227,13 @@ def compare(
     if lubricated not in (None, FRICTIONLESS, APART):
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
+    if lubricated and lubricated_friction not in (0.0, LUBRICATED_FRICTION):
+        problem = (
+            f"Lubricated loads are to be fitted {lubricated!r}, and with a friction of their own."
+        )
+        raise InputError(
+            problem, cure="Leave out lubricated (--lubricated), or lubricated_friction."
+        )
     require_non_negative("friction of lubricated loads", lubricated_friction)
     require_non_negative("gain between scans", between_scan_gain)
     beside = {None: lubricated_friction, FRICTIONLESS: 0.0, APART: None}[lubricated]

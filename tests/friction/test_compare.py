@@ -218,6 +218,8 @@ def test_a_failed_check_leaves_the_fit_as_it_is(made, apparatus, families) -> No
     assert chosen.joint["dry"]["incremental"].beside == 2
     with pytest.raises(InputError, match="frictionless"):
         memscal.compare(refused, apparatus, lubricated="wet")
+    with pytest.raises(InputError, match="a friction of their own"):
+        memscal.compare(refused, apparatus, lubricated="apart", lubricated_friction=0.03)
 
 
 def test_a_budget_adds_up_to_its_total(made, apparatus) -> None:
