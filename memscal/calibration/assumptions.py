@@ -9,6 +9,7 @@ import numpy as np
 
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import Results
+from memscal.errors import InputError
 from memscal.estimation.influences import Influence, influences, measured_by
 from memscal.estimation.points import measured_mask
 from memscal.estimation.residuals import residuals_of
@@ -39,9 +40,12 @@ def statement(owner: object, name: str) -> Any:
     return None if isinstance(stated, str) and not stated else stated
 
 
-def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ...]:
+def assumptions_of(solution: Solution, results: Results, *, loads: bool) -> tuple[Assumption, ...]:
     """Return what a calibration takes for granted, each with its sizes for one uncertainty."""
     effects = influences(solution.scans, solution.estimate)
+    if not loads:
+        # A is relative, or per unit of a reference that no load makes.
+        del effects["load_scale"]
     sizes: dict[str, Mapping[str, float]] = {}
     for name, effect in effects.items():
         sizes[name] = _sizes(effect, results)
@@ -81,6 +85,14 @@ def less_mean_offset(solution: Solution) -> Solution:
     u = np.array([scan.line_offset_uncertainty or 0.0 for scan in solution.scans])
     if points.order or not u.any() or "line_offset" in measured_by(points):
         return solution
+    sigma = solution.estimate.gaussian.sigma
+    if u.max() > _FARTHEST * sigma:
+        raise InputError(
+            f"The line offset uncertainty of the scan is {u.max() * 1e3:.4g} mm, but the sensor's "
+            f"Gaussian width is {sigma * 1e3:.3g} mm.",
+            why=f"Beyond {_FARTHEST:g} widths a line says nothing of the sensor's centre.",
+            cure="Check its unit: m in Python and lab.toml, mm on the command line.",
+        )
     offset = influences(solution.scans, solution.estimate)["line_offset"]
     mean = offset.squared * u[points.scan] ** 2
     scans = []

@@ -249,7 +249,7 @@ def calibrate(
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
-    assumptions = assumptions_of(solution, results)
+    assumptions = assumptions_of(solution, results, loads=prepared.reading.per == "Pa")
     checks = quality_checks(solution, results, by_other_route, assumptions)
     checks, explanations = explained(solution, checks)
     done_with("checks")
