@@ -135,6 +135,7 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
         assert getattr(found.dry.film, name) == getattr(PAPER_FILM, name)
     assert (found.dry.indenter, found.rod.indenter) == (PAPER_SPHERE, PAPER_ROD)
     assert (found.dry.load, found.rod.load) == (0.69, 1.0)
+    np.testing.assert_array_equal(found.dry.normal_load, np.full(9, 0.69))
     assert found.rod.load_uncertainty == pytest.approx(0.01)
     assert told["load_1"] == pytest.approx(0.69 * told["load_scale"])
     film = replace(PAPER_FILM, **{name: told[name] for name in names})
