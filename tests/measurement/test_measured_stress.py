@@ -237,6 +237,12 @@ def test_a_few_missing_points_are_no_gap() -> None:
     assert any("2 points of the scan are missing" in message.text for message in found.messages)
 
 
+def test_what_only_a_calibration_counts_is_named() -> None:
+    scan = replace(made.contact_scan(load=(1.37,)), roundness_uncertainty=0.1, gain_uncertainty=0.1)
+    found = memscal.measure_stress(scan, SENSOR)
+    assert any(m.text.endswith("in a calibration only: roundness.") for m in found.messages)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_scan_that_never_comes_down_to_its_baseline_is_refused(friction: float) -> None:
     short = made.contact_scan(spacing=0.22e-3, friction=friction, load=(0.69, 2.75))
