@@ -159,8 +159,8 @@ def _agreement(
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
     meaning = (
         f"Difference of the width of G {route} from the one fitted to the scan, in its standard "
-        "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
-        "it is read off. Look at both reconvolutions."
+        "uncertainty. A failure means that G is not Gaussian, or something not as stated, "
+        "so that its width depends on how it is read off. Look at both reconvolutions."
     )
     parameters = results.parameters
     i, j = (parameters.names.index(name) for name in _WIDTHS)
@@ -385,7 +385,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
         return check("axisymmetry", uneven.fall, math.inf, meaning)
     extra = model_tests.symmetry_test(estimate)
     parity = "odd"
-    failure = ": a tilted rod, an uneven film, or a drifting load"
+    failure = ": a tilted rod, an uneven film, a drifting load, or a lag along the scan"
     if estimate.points.order:
         parity = "even"
         failure = " by more than their sign: cross-talk of the normal stress, "

@@ -45,6 +45,7 @@ def test_first_lines_checks_and_report_say_so(wrong) -> None:
     assert second.endswith("or by a cause that is not listed.")
     failed = [check for check in wrong.apparatus.checks if check.name == "gaussian_evidence"]
     assert words in failed[0].meaning
+    assert not any("G is not Gaussian, so" in check.meaning for check in wrong.apparatus.checks)
     assert "ln of the Bayes factor" in wrong.report()
 
 
