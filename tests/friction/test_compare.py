@@ -88,20 +88,6 @@ def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found) 
         assert along[where] - along.min() == pytest.approx(one.deviance)
 
 
-def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionComparison) -> None:
-    loads = [load for by_loading in found.loads.values() for load in by_loading]
-    readings = [reading for load in loads for reading in (load.by_maximum, load.by_profile)]
-    readings += [reading for by in found.joint.values() for reading in by.values()]
-    sources = {"noise", "apparatus", "young_modulus", "thickness", "load"}
-    for reading in readings:
-        if reading.value is None:
-            assert reading.reason
-            assert not reading.budget
-        else:
-            assert reading.interval.holds(reading.value)
-            assert sources <= set(reading.budget)
-
-
 def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> None:
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]

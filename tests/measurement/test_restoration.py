@@ -76,14 +76,6 @@ def test_the_restored_stress_blurred_again_is_what_was_measured() -> None:
         np.testing.assert_allclose(apart, f.residual[order] / made.CONVERSION, atol=20.0)
 
 
-def test_the_blur_is_that_of_the_apparatus_function() -> None:
-    found = restored(1.0, 0.0, 0)
-    r = np.linspace(0.0, 20e-3, 801)
-    np.testing.assert_allclose(
-        found.blurred_stress(r), EXACT.convolve(r, found.stress(r)), atol=2e-3 * found.sigma_zz[0]
-    )
-
-
 def test_a_calculated_contact_is_told_from_another() -> None:
     found = restored(1.0, np.inf, 3)
     same = found.compare(made.pressed(1.0, np.inf))
