@@ -121,7 +121,11 @@ def with_slow_noise(solution: Solution) -> Solution:
 def _state(solution: Solution, name: str) -> str:
     """Say whether something is assumed, stated by every scan, or measured by them."""
     points = solution.estimate.points
-    if name in measured_by(points) or (name == "noise_correlation" and solution.estimate.slow):
+    measured = name in measured_by(points)
+    if name == "line_offset" and not points.planar:
+        # Not by lines that are too far apart for one stage.
+        measured = measured and any(scan.line_offset for scan in solution.scans)
+    if measured or (name == "noise_correlation" and solution.estimate.slow):
         return MEASURED
     for scan in solution.scans:
         if statement(scan.film if name in OF_FILM else scan, name) is None:

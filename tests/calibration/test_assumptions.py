@@ -221,6 +221,13 @@ def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world: World) 
     assert "at 0.30" in texts[0]
 
 
+def test_lines_of_unlike_zeros_measure_no_offset() -> None:
+    along, across = crossed(ROUND)
+    apparatus = memscal.calibrate([along, replace(across, x=across.x + 5e-3)]).apparatus
+    states = {assumption.name: assumption.state for assumption in apparatus.assumptions}
+    assert (states["roundness"], states["line_offset"]) == ("measured", "assumed")
+
+
 def test_points_on_two_lines_are_two_lines() -> None:
     lines = crossed(ROUND)
     x = np.concatenate([lines[0].x, np.zeros(lines[1].x.size)]) + 3e-3
