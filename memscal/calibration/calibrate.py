@@ -306,7 +306,7 @@ def _effects(
     """Return what the inputs change, to first order; two laws of the film, by calibrating twice."""
     scans = solution.scans
     estimate = solution.estimate
-    stresses: list[BaseStress] = []
+    stresses = []
     spectra = None
     if alternatives is not None:
         pairs = zip(solution.owners, solution.stresses, strict=True)

@@ -220,7 +220,7 @@ class _Search:
 
     def _coarse(self, length: _Length) -> list[_Trial]:
         """Try the factors of a length until the misfit has risen twice."""
-        trials: list[_Trial] = []
+        trials = []
         for factor in length.factors:
             trials.append(self._trial(length, float(factor)))
             losses = [trial.loss(1.0) for trial in trials]

@@ -112,7 +112,7 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     stated = {(film.law, film.mooney_rivlin_ratio) if film else ("", None) for film in films}
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
     channel = solution.estimate.points.channel
-    solutions: dict[str, Solution] = {}
+    solutions = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
         known = ratio if law == reference else None
         scans = []

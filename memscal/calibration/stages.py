@@ -239,7 +239,7 @@ class Solution:
     @cached_property
     def other(self) -> Deconvolution | None:
         """A and G by the other route, if it is open: Bayesian beside a division, or back."""
-        other: Method = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
+        other = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
         steps = self.estimate, self.band, self.fields, other
         return deconvolve(*steps) if self.comparable else None
 

@@ -22,7 +22,6 @@ from memscal.formats.files import together
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
     from memscal.deconvolution.division import Method
-    from memscal.model.result import Result
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
@@ -280,7 +279,7 @@ def command(
 
     with out.working(f"Calibrating by {settings['method'].name}"):
         calibration = calibrate(data, **settings)
-    further: dict[str, Result] = {}
+    further = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
             further["sweep"] = calibration.sweep(seed=settings["seed"])

@@ -85,7 +85,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
 
     k = np.frombuffer(nodes)
     count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
-    radii: FloatArray = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
+    radii = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
     values = _wave(wave, radii, k, across)
     return WaveTable(radii, values, make_interp_spline(radii, values, k=_DEGREE))
 

@@ -37,8 +37,8 @@ def gauss_newton(
     # Parameters are scaled to numbers near one.  Steps d of (J'WJ) d = -J'W r, with
     # W = (1 + r^2/c^2)^(-1/2), minimise the soft L1 loss sum 2 c^2 (sqrt(1 + r^2/c^2) - 1), linear
     # from the residual c, ``knee``, on.
-    place: FloatArray = start
-    step: FloatArray = np.zeros_like(start)
+    place = start
+    step = np.zeros_like(start)
     cost = np.inf
     halvings = 0
     for _ in range(_MOST_STEPS):
@@ -145,7 +145,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     drift = root[:, None] * model.straight_columns
     best = np.zeros(0)
     best_cost = np.inf
-    odd: list[FloatArray] = []
+    odd = []
     for sigma, table in zip(widths, tables, strict=True):
         shapes = np.interp(distances, radii, table) * (points.load * root)
         if points.order:

@@ -129,7 +129,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
     common, apart, links = _without_repeats(estimate, model, own, shifted)
-    size: FloatArray = np.linalg.norm(model.design, axis=0)
+    size = np.linalg.norm(model.design, axis=0)
     stack = np.vstack(apart)
     without, rank = _left_over(np.vstack(common), size)
     left, _ = _left_over(stack, size)

@@ -325,8 +325,8 @@ def measured_mask(scan: Scan, channel: str = "zz") -> BoolArray:
 
 def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], tuple[int, ...]]:
     """Return each repeat as a scan of its own, and the number of the scan that it belongs to."""
-    separate: list[Scan] = []
-    owners: list[int] = []
+    separate = []
+    owners = []
     for i, scan in enumerate(scans):
         passes = scan.passes
         measured, readings = np.unique(passes[measured_mask(scan, channel)], return_counts=True)
@@ -359,8 +359,8 @@ _SAME_LOAD = 0.02
 
 def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
     """Split scans whose repeats have loads of their own; return each one's number, too."""
-    split: list[Scan] = []
-    owners: list[int] = []
+    split = []
+    owners = []
     for i, scan in enumerate(scans):
         groups: list[list[tuple[float, int]]] = []
         loads = scan.normal_load
@@ -451,7 +451,7 @@ def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
     """Cholesky factors of the correlation of all kept points, repeat by repeat."""
     blocks = []
     first = 0
-    roots: dict[bytes, FloatArray] = {}
+    roots = {}
     for measured in keep.reshape(-1, len(correlation)):
         kept = np.flatnonzero(measured)
         if not kept.size:

@@ -516,7 +516,7 @@ _MOST_LISTED = 10
 def point_messages(estimate: ProfileEstimate) -> list[Message]:
     """Return what was left out of a scan, and which points are outliers, the farthest first."""
     points = estimate.points
-    messages: list[Message] = []
+    messages = []
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
         messages.append(Message("missing_points", text))

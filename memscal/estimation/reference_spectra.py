@@ -193,7 +193,7 @@ def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str,
     # elsewhere.
     set_up = set_up.expected
     film = set_up.film
-    changes: dict[str, FloatArray] = {}
+    changes = {}
     if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
     # At a given load the modulus does not change the stress in a linear film.
@@ -266,7 +266,7 @@ def spectrum_difference(reference: RadialSpectrum, first: Contact, second: Conta
     """Difference of the base stress of two contacts, per newton, at the nodes of a reference."""
     k = reference.wavenumbers.k.tobytes()
     upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
-    return np.asarray(upper - lower)
+    return upper - lower
 
 
 #: Whose error each is: scans of one film share that of the film.

@@ -126,7 +126,7 @@ def require_same_set_up(
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
     given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
-    differences: list[str] = []
+    differences = []
     for scan, stress in zip(scans, given, strict=True):
         if stress is not None and stress.form is None:
             differences += _other_set_up(scan, stress, "reference")

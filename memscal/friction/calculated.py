@@ -86,7 +86,7 @@ def external_family(
         transforms = [hankel_transform(cell.r, cell.sigma_zz, k) for cell in row]
         scales = [load / cell.load for load, cell in zip(nominal, row, strict=True)]
         spectra.append(np.multiply(transforms, np.reshape(scales, (-1, 1))))
-    numbers: dict[str, Any] = {}
+    numbers = {}
     for name in ("depth", "contact_radius", "convergence"):
         rows = [[getattr(cell, name) for cell in row] for row in grid]
         numbers[name] = np.array(rows, dtype=np.float64)

@@ -26,7 +26,7 @@ def comparison_checks(
 ) -> tuple[QualityCheck, ...]:
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     # A noise that was estimated from the scatter about a contact is as large as the misfit.
-    checks: list[QualityCheck] = []
+    checks = []
     for i, by_loading in enumerate(zip(*loads.values(), strict=True), start=1):
         profile = by_loading[0].profile
         outside = 1 - max(load.bracketed for load in by_loading)

@@ -134,7 +134,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     apparatus = apparatus_of(result)
     parameters = apparatus.parameters
     configuration = apparatus.process.configuration
-    values: dict[str, Any] = {
+    values = {
         "schema_version": "1",
         "method": _method(apparatus) or None,
         **parameters_json(parameters),

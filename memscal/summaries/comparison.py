@@ -215,7 +215,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
 def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
     """Return an estimate with its fit and its profile likelihood."""
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
-    fit: dict[str, Any] = {} if tested else {"least": None, "p_value": None}
+    fit = {} if tested else {"least": None, "p_value": None}
     return {
         **bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate, **fit),
