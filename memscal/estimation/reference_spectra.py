@@ -280,12 +280,8 @@ _SENSITIVITIES = {
 def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     law = law_at_once(set_up)
-    k = reference.wavenumbers.k.tobytes()
-    spectra = []
-    for rod in (more, less, set_up):
-        spectrum = _base_spectrum(press_rod(*rod.under(law)), k, reference.order)
-        spectra.append(spectrum * set_up.load / rod.load)
-    upper, lower, own = spectra
+    rods = (more, less, set_up)
+    upper, lower, own = (rod_spectrum(r, reference, law) * set_up.load / r.load for r in rods)
     # Zero where the scan's own ends.
     share = np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
     return reference.values * share

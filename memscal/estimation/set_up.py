@@ -32,8 +32,7 @@ def film_of(stress: BaseStress) -> ElasticFilm | None:
 
 def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     """Choose the reference: the argument, the scan's own, or the rod on the expected film."""
-    known = reference or scan.reference
-    return known or press_rod(*scan.set_up.expected)
+    return reference or scan.reference or press_rod(*scan.set_up.expected)
 
 
 def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
