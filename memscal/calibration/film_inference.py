@@ -151,13 +151,12 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
         if name != "load" and name.rstrip("0123456789") != without:
             columns.append(effect.voltage)
     # A balance's error may differ from load to load; repeats at one load share it.
-    signal = estimate.predicted - estimate.background
     pairs = zip(solution.owners, solution.scans, strict=True)
     balances = [(owner, scan.stated_load, scan.load_uncertainty) for owner, scan in pairs]
     for balance in dict.fromkeys(balances):
         _, load, u = balance
         weighed = np.array([other == balance for other in balances])[estimate.points.scan]
-        columns.append(np.where(weighed, signal * (u or 0.0) / load, 0.0))
+        columns.append(np.where(weighed, estimate.signal * (u or 0.0) / load, 0.0))
     return np.stack(columns, axis=1)
 
 

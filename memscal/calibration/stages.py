@@ -143,7 +143,7 @@ def deconvolve(
     # Eq. 1: the voltage that A and G predict, of each scan through its own reference.
     model = estimate.model
     if posterior is not None:
-        signal = model.signal(model.geometry(estimate.centres), posterior.kernel) + estimate.oval
+        signal = model.signal(estimate.geometry, posterior.kernel) + estimate.oval
     elif estimate.points.scans == 1 and model.reference.order != ACROSS:
         signal = fields.convolved(quotient) * estimate.points.load
     else:

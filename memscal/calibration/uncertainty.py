@@ -137,7 +137,6 @@ def _load_effects(
     scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
 ) -> dict[str, InputEffect]:
     """Effects of factors: loads, forces of references, and their discretisation."""
-    signal = estimate.predicted - estimate.background
     pairs = zip(stresses, estimate.model.references, strict=True)
     loads: list[float | None] = []
     for scan in scans:
@@ -155,7 +154,7 @@ def _load_effects(
             continue
         by_scan = np.array([share or 0.0 for share in stated])
         apart = (by_scan - by_scan.mean())[estimate.points.scan]
-        effects[source] = InputEffect(-apart * signal, -float(by_scan.mean()))
+        effects[source] = InputEffect(-apart * estimate.signal, -float(by_scan.mean()))
     return effects
 
 
@@ -167,9 +166,8 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     repeats = np.unique(points.repeat)
     if repeats.size == 1 or points.owner.any():
         return 0.0
-    signal = estimate.predicted - estimate.background
     lines = estimate.model.straight_columns
-    columns = np.column_stack([signal, estimate.weighed.residual, lines])
+    columns = np.column_stack([estimate.signal, estimate.weighed.residual, lines])
     columns = points.standardised(columns, estimate.weights / estimate.noise_scale**2)
     products = []
     for repeat in repeats:
@@ -619,7 +617,7 @@ def _division_map(
     normalised = np.vstack([rings, by_radius, transfer])
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
-    geometry = model.geometry(estimate.centres)
+    geometry = estimate.geometry
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS

@@ -234,8 +234,7 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     mean = load.mean()
     if np.ptp(load) < _SAME_LOAD * mean:
         return None
-    signal = estimate.predicted - estimate.background
-    return _add(estimate, (signal * (load - mean) / mean)[:, None])
+    return _add(estimate, (estimate.signal * (load - mean) / mean)[:, None])
 
 
 def hysteresis_test(
@@ -246,7 +245,6 @@ def hysteresis_test(
     # the baseline, in V, whose step would else count as a difference of A.  It is A alone where
     # repeats have centres and baselines of their own.  ``owner`` (n,): the scan, repeats included.
     points = estimate.points
-    model = estimate.model
     owner = points.scan if owner is None else owner
     sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
     for scan in np.unique(owner):
@@ -255,9 +253,9 @@ def hysteresis_test(
             sign[inside] = 0
     if not sign.any():
         return None
-    columns = [estimate.predicted - estimate.background]
+    columns = [estimate.signal]
     if np.array_equal(owner, points.scan):
-        shift = model.shift_derivative(model.geometry(estimate.centres), estimate.kernel)
+        shift = estimate.model.shift_derivative(estimate.geometry, estimate.kernel)
         along = np.argmax(points.free[points.scan], axis=1), range(sign.size)
         columns += [shift[along], np.ones_like(sign)]
     return _add(estimate, sign[:, None] * np.stack(columns, axis=1))

@@ -15,7 +15,7 @@ from memscal.estimation.bayesian import WeighedFit
 from memscal.estimation.decorrelation import Decorrelation, SlowNoise
 from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.ellipse import elliptic_departure
-from memscal.estimation.forward import ForwardModel, forward_model
+from memscal.estimation.forward import ForwardModel, Geometry, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
@@ -130,6 +130,11 @@ class ProfileEstimate:
         return gaussian + self.basis.radial(r) @ self.weighed.mean
 
     @property
+    def geometry(self) -> Geometry:
+        """Distances of the points from the centres."""
+        return self.model.geometry(self.centres)
+
+    @property
     def spectrum(self) -> RadialSpectrum:
         """Transform of the voltage's radial profile per newton, in V m^2 / N."""
         return replace(self.model.reference, values=self.kernel * self.model.reference.values)
@@ -194,8 +199,7 @@ class ProfileEstimate:
         """What a sensor that is not round adds to the radial profile's voltages, (n,), in V."""
         if not self.points.ellipse:
             return np.zeros_like(self.points.u)
-        radial = self.model.signal(self.model.geometry(self.centres), self.kernel)
-        return self.predicted - self.background - radial
+        return self.signal - self.model.signal(self.geometry, self.kernel)
 
     @property
     def uneven(self) -> FloatArray:
@@ -203,7 +207,7 @@ class ProfileEstimate:
         if type(self.model) is ForwardModel:
             return np.zeros_like(self.points.u)
         even = ForwardModel(self.points, self.model.references)
-        whole = self.model.signal(self.model.geometry(self.centres), self.kernel)
+        whole = self.model.signal(self.geometry, self.kernel)
         return whole - even.signal(even.geometry(self.centres), self.kernel)
 
     @property
@@ -228,9 +232,14 @@ class ProfileEstimate:
         return self.points.u - self.weighed.residual
 
     @property
+    def signal(self) -> FloatArray:
+        """Voltage above the background at each point, shape (n,), in V."""
+        return self.predicted - self.background
+
+    @property
     def largest_signal(self) -> float:
         """Largest voltage above the background, in V."""
-        return float(np.abs(self.predicted - self.background).max())
+        return float(np.abs(self.signal).max())
 
 
 def estimate_profile(
@@ -318,7 +327,7 @@ def _weighed(
 
 
 def log_marginal_likelihood(
-    estimate: ProfileEstimate, inputs: FloatArray | None = None, noise: float = 1.0
+    estimate: ProfileEstimate, inputs: FloatArray, noise: float
 ) -> FloatArray:
     """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,)."""
     # The first is by the hypotheses' priors of the estimate, the second by those of the
@@ -327,9 +336,7 @@ def log_marginal_likelihood(
     # Gaussian of unit variance that is integrated, beside ``noise``, that of a point of weight one.
     points = estimate.points
     weights = estimate.weights
-    volume = 0.0
-    if inputs is not None and inputs.size:
-        points, volume = points.sharing(points.standardised(inputs, weights) / noise)
+    points, volume = points.sharing(points.standardised(inputs, weights) / noise)
     model = forward_model(points, estimate.model.references)
     fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     if not fit.has_width(weights, noise):
@@ -429,7 +436,7 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
-    signal = np.abs(estimate.predicted - estimate.background)
+    signal = np.abs(estimate.signal)
     farthest = int(np.argmax(estimate.distance))
     left = signal[farthest] / signal.max()
     if left > _LEFT:
