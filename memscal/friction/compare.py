@@ -469,15 +469,16 @@ def _loads(
     measured: MeasuredStress, fits: Mapping[str, FrictionFit]
 ) -> dict[str, tuple[LoadComparison, ...]]:
     """Compare each load by each loading; its coefficients are the middle of both."""
-    loads: dict[str, list[LoadComparison]] = {loading: [] for loading in fits}
+    loads = []
     for i, profile in enumerate(measured.profiles):
         by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
         maxima = with_loading({loading: load.by_maximum for loading, load in by_loading.items()})
         profiles = with_loading({loading: load.by_profile for loading, load in by_loading.items()})
         for loading, load in by_loading.items():
-            counted = replace(load, by_maximum=maxima[loading], by_profile=profiles[loading])
-            loads[loading].append(counted)
-    return {loading: tuple(compared) for loading, compared in loads.items()}
+            by_maximum = maxima[loading]
+            by_loading[loading] = replace(load, by_maximum=by_maximum, by_profile=profiles[loading])
+        loads.append(by_loading)
+    return {loading: tuple(load[loading] for load in loads) for loading in fits}
 
 
 def fit_together(
@@ -517,16 +518,15 @@ def _compared_by_shear(
     channels = channels_of(measured, apparatus, families)
     fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     overridden = override_messages(measured.overridden)
-    by_shear: dict[str, list[BoundedEstimate]] = {loading: [] for loading in fits}
+    loads = []
     for i in range(len(measured.profiles)):
-        counted = with_loading({loading: fit.coefficient([i]) for loading, fit in fits.items()})
-        for loading, estimate in counted.items():
-            by_shear[loading].append(estimate)
+        by_loading = {loading: fit.coefficient([i]) for loading, fit in fits.items()}
+        loads.append(with_loading(by_loading))
     return FrictionComparison(
         measured=measured,
         friction=next(iter(families.values())).values,
         loads={},
-        by_shear={loading: tuple(each) for loading, each in by_shear.items()},
+        by_shear={loading: tuple(load[loading] for load in loads) for loading in fits},
         joint=fit_together(measured, fits),
         messages=(*overridden, *notes, *synthetic_messages(measured)),
         shear=apparatus,
