@@ -250,9 +250,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     last = 1 + int(estimate.points.free[0].sum())
     change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     checks.append(check("baseline_drift", change, 0.05, meaning))
-    own = estimate.points.curvatures(estimate.gaussian.jacobian.shape[1])
-    curvatures = estimate.drifts[estimate.drifts.size - (own.stop - own.start) :]
-    if curvatures.size:
+    count = estimate.points.curved.size
+    if count:
         meaning = (
             "Fitted curvature of the baseline, edge to centre, over what its prior and the noise "
             "make of it. A failure means that the baseline bends by more than was allowed for, or "
@@ -261,8 +260,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         )
         prior = estimate.points.curvature[estimate.points.curved] ** 2
         # What a mean has of the prior's variance the posterior has not.
-        found = prior - np.diag(estimate.weighed.covariance)[own]
-        share = np.abs(curvatures) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
+        found = prior - np.diag(estimate.weighed.covariance)[estimate.points.curvatures]
+        share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
         checks.append(check("baseline_curvature", share.max(), _CURVED, meaning))
     if not source:
         meaning = (

@@ -276,12 +276,12 @@ class Solution:
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     """Compare a prediction with the scan, outliers at their reduced weight."""
-    residual = estimate.points.u - predicted
+    data = estimate.points
+    residual = data.u - predicted
     weight = estimate.outlier_weight
-    curvatures = estimate.points.curved.size
-    degrees = float(weight.sum()) + curvatures - estimate.gaussian.jacobian.shape[1]
+    degrees = float(weight.sum()) + data.curved.size - data.parameters
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.
-    noise = estimate.noise_scale if estimate.points.u_errors is None else 1.0
-    square = float(np.sum(estimate.points.standardised(residual, estimate.weights) ** 2))
+    noise = estimate.noise_scale if data.u_errors is None else 1.0
+    square = float(np.sum(data.standardised(residual, estimate.weights) ** 2))
     return Misfit(rms, square / noise**2 / degrees, degrees)

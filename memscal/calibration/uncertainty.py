@@ -274,11 +274,12 @@ def propagate(
     names, values, parameters = _parameters(estimate, deconvolution, kernel, division)
     derivatives = _Derivatives.stacked([parameters, kernel[1:]])
     by_voltage = derivatives.by_voltage
+    curvatures = [names.index(CURVATURE + _suffix(i)) for i in estimate.points.curved]
     columns = {
         "noise": estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.hidden_root,
         "window": derivatives.hidden,
-        CURVATURE: _curvature_columns(estimate, names, by_voltage),
+        CURVATURE: estimate.curved(by_voltage, curvatures),
     }
     rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -320,18 +321,6 @@ def propagate(
         kernel_changes=kernel_changes,
         division=division,
     )
-
-
-def _curvature_columns(
-    estimate: ProfileEstimate, names: Sequence[str], by_voltage: VoltageMap
-) -> FloatArray:
-    """Errors (m, c) where the baseline of a scan is curved by its standard deviation."""
-    points = estimate.points
-    deviations = points.curvature[points.curved]
-    errors = by_voltage @ (estimate.model.curvature_columns * deviations)
-    for i, deviation in enumerate(deviations.tolist()):
-        errors[names.index(CURVATURE + _suffix(points.curved[i])), i] -= deviation
-    return errors
 
 
 def _effective_degrees(

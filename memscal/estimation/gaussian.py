@@ -241,7 +241,7 @@ class GaussianFit:
     @property
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
-        rows = self.points.prior_rows(self.jacobian.shape[1])
+        rows = self.points.prior_rows
         curvature = self.drift[self.drift.size - len(rows) :]
         return rows, -rows.sum(axis=1) * curvature
 
@@ -312,7 +312,7 @@ def _solve(
     noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + np.finfo(float).tiny)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
-    prior = points.prior_rows(start.size)
+    prior = points.prior_rows
     # Of many points there is room for one.
     del fit
 

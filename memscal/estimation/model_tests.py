@@ -277,7 +277,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
-    count = jacobian.shape[1] - points.ellipse
+    count = points.parameters - points.ellipse
     gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.

@@ -142,15 +142,23 @@ class ScanPoints:
         """Numbers of the scans whose baselines may be curved."""
         return np.flatnonzero(self.curvature)
 
-    def curvatures(self, parameters: int) -> slice:
+    @property
+    def parameters(self) -> int:
+        """How many parameters a Gaussian fit has."""
+        # A, the width, centres and drifts, baselines and their curvatures, an ellipse.
+        return 2 + 2 * int(self.free.sum()) + self.scans + self.curved.size + self.ellipse
+
+    @property
+    def curvatures(self) -> slice:
         """Places of the curvatures among the parameters of a Gaussian fit."""
-        last = parameters - self.ellipse
+        last = self.parameters - self.ellipse
         return slice(last - self.curved.size, last)
 
-    def prior_rows(self, parameters: int) -> FloatArray:
+    @property
+    def prior_rows(self) -> FloatArray:
         """Further rows (c, p): readings of the curvatures, zero, with noise as that of a point."""
-        rows = np.zeros((self.curved.size, parameters))
-        rows[:, self.curvatures(parameters)] = np.diag(self.unit / self.curvature[self.curved])
+        rows = np.zeros((self.curved.size, self.parameters))
+        rows[:, self.curvatures] = np.diag(self.unit / self.curvature[self.curved])
         return rows
 
     @cached_property

@@ -91,9 +91,12 @@ class ProfileEstimate:
     @cached_property
     def curving(self) -> FloatArray:
         """Errors (p, c) of the posterior's mean where a baseline is curved by its deviation."""
+        return self.curved(self.weighed.gain, self.points.curvatures)
+
+    def curved(self, numbers: VoltageMap, own: slice | list[int]) -> FloatArray:
+        """Errors (m, c) of numbers, the curvatures ``own`` among them, by curved baselines."""
         deviation = self.points.curvature[self.points.curved]
-        errors = self.weighed.gain @ (self.model.curvature_columns * deviation)
-        own = self.points.curvatures(self.gaussian.jacobian.shape[1])
+        errors = numbers @ (self.model.curvature_columns * deviation)
         errors[own] -= np.diag(deviation)
         return errors
 
@@ -161,8 +164,7 @@ class ProfileEstimate:
     def drifts(self) -> FloatArray:
         """Each scan's baseline and change over half the range along x (and y); curvatures (V)."""
         first = 2 + int(self.points.free.sum())
-        last = self.gaussian.jacobian.shape[1] - self.points.ellipse
-        return self.gaussian.drift + self.weighed.mean[first:last]
+        return self.gaussian.drift + self.weighed.mean[first : self.points.curvatures.stop]
 
     def oval_kernel(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
@@ -180,7 +182,7 @@ class ProfileEstimate:
             ellipse = np.append(fit.sigma, fit.ellipticity)
             oval = elliptic_departure(x, y, fit.sigma, fit.ellipticity).ravel()
             changes += np.outer(oval, coefficients[0])
-            end = fit.jacobian.shape[1]
+            end = self.points.parameters
             for i, row in enumerate((1, end - 2, end - 1)):
                 step = _STEP * (fit.sigma if row == 1 else 1.0)
                 moved = ellipse.copy()
@@ -213,8 +215,7 @@ class ProfileEstimate:
     @property
     def offset(self) -> FloatArray:
         """Position of each point from its scan's centre, shape (2, n), in m."""
-        positions = np.stack([self.points.x, self.points.y])
-        return positions - self.centres[self.points.scan].T
+        return self.model.offset(self.centres)
 
     @cached_property
     def distance(self) -> FloatArray:
@@ -281,7 +282,7 @@ def estimate_profile(
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
         # The noise of the voltages alone: a curvature beyond its prior is none.
         left = points.standardised(residual, weights)
-        freedom = max(count - fit.jacobian.shape[1], 1.0)
+        freedom = max(count - points.parameters, 1.0)
         unit = max(float(np.sqrt(left @ left / freedom)), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
@@ -318,7 +319,7 @@ def _weighed(
     departures = None
     if rings:
         kernels = departure_basis(model, fit, reduced).kernels(model.k)
-        radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
+        radial = reduced.signal(kernels[:, model.points.parameters :])
         columns = (reduced.data, reduced.flat, radial, reduced.rings)
         departures = angular_departures(rings, fit, columns, noise)
     basis = departure_basis(model, fit, reduced, departures)
@@ -362,7 +363,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
     left = np.append(points.standardised(points.u - fit.predicted, weights), prior)
-    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
+    freedom = float(estimate.outlier_weight.sum()) + prior.size - points.parameters
     variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).

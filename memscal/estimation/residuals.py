@@ -76,7 +76,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         flat = columns[:, 1:last]
         rings = columns[:, last:] @ (mix @ kernels)
     # Angular departures are no parameters: what of them stands above the noise counts.
-    count = fit.jacobian.shape[1]
+    count = points.parameters
     rings = np.hstack([flat[:, count:], rings])
     flat = flat[:, :count]
     base = np.linalg.qr(flat)[0]

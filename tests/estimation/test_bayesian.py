@@ -37,7 +37,7 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
     voltages = root * model.signal(fit.geometry, kernels)
     voltages[:, 2 : basis.flat] = root * fit.jacobian[:, 2:]
     blocks = dict(zip([*SHAPES, *(f.family for f in basis.families)], basis.blocks, strict=True))
-    curvature = estimate.points.curvatures(fit.jacobian.shape[1])
+    curvature = estimate.points.curvatures
     curved = voltages[:, curvature]
     straight = np.delete(voltages[:, 2 : basis.flat], np.arange(basis.flat - 2)[-1], axis=1)
     deviation = estimate.points.curvature
