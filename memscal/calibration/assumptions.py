@@ -1,7 +1,7 @@
 """Sizes at which what a calibration takes for granted moves its result by one uncertainty."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -46,9 +46,7 @@ def assumptions_of(solution: Solution, results: Results, *, loads: bool) -> tupl
     if not loads:
         # A is relative, or per unit of a reference that no load makes.
         del effects["load_scale"]
-    sizes: dict[str, Mapping[str, float]] = {}
-    for name, effect in effects.items():
-        sizes[name] = _sizes(effect, results)
+    sizes = {name: _sizes(effect, results) for name, effect in effects.items()}
     if solution.estimate.points.u.size <= DENSE:
         sizes["noise_correlation"] = _correlations(solution, results)
     assumptions = []
@@ -112,7 +110,7 @@ def with_slow_noise(solution: Solution) -> Solution:
     """Count what correlation the noise may have, where a scan states no noise."""
     estimate = solution.estimate
     rounding = estimate.noise_scale > estimate.weighed.noise
-    if rounding or estimate.points.u_errors is not None:
+    if rounding or estimate.points.noise_stated:
         return solution
     slow = slow_noise(estimate, residuals_of(estimate))
     return replace(solution, estimate=replace(estimate, slow=slow))
@@ -151,7 +149,7 @@ def _sizes(effect: Influence, results: Results) -> dict[str, float]:
     return sizes
 
 
-def _correlations(solution: Solution, results: Results) -> Mapping[str, float]:
+def _correlations(solution: Solution, results: Results) -> dict[str, float]:
     """Correlations of neighbours that add a squared uncertainty to the variance by noise."""
     # Of noise whose correlation falls off exponentially along each pass.
     estimate = solution.estimate

@@ -333,8 +333,7 @@ def uncertainties(
     reading: Reading = VOLTS,
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
-    wavenumbers = solution.fields.grid.wavenumber_axis
     # The derivatives of the other route, which is linear, are complete.
     drawn = drawn_scatter(solution) if deconvolution is solution.deconvolution else None
-    results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    results = propagate(solution, deconvolution, effects, correlations, drawn)
     return replace(results, parameters=replace(results.parameters, reading=reading))

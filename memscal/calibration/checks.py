@@ -70,7 +70,7 @@ def quality_checks(
         *_set_up(solution),
         _indentation(solution, results, assumed),
     ]
-    if estimate.points.u_errors is not None:
+    if estimate.points.noise_stated:
         checks.append(quality.noise_check(estimate.weighed.noise, estimate.points.channel))
     checks += [
         *_unexplained(estimate, results),
@@ -100,7 +100,7 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     )
     fitted = solution.gaussian_misfit
     p_value = None
-    if solution.estimate.points.u_errors is not None:
+    if solution.estimate.points.noise_stated:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
     # Both are of the same points.
     limit = _misfit_limit(solution.estimate, fitted.degrees)
@@ -473,8 +473,11 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Qual
         "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
         "itself and compare",
     }
-    stated = estimate.points.u_errors is not None
-    scale = "" if stated else ", over the others' own scatter as no noise is stated"
+    scale = (
+        ""
+        if estimate.points.noise_stated
+        else ", over the others' own scatter as no noise is stated"
+    )
     joined = "" if worst.alone else f", {what}s taken several at a time"
     meaning = (
         f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "

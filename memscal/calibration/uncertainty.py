@@ -263,13 +263,13 @@ class _Derivatives:
 def propagate(
     solution: Solution,
     deconvolution: Deconvolution,
-    wavenumbers: FloatArray,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
-    drawn: DrawnScatter | None = None,
+    drawn: DrawnScatter | None,
 ) -> Results:
-    """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
+    """Propagate all stated uncertainties to a deconvolution."""
     estimate = solution.estimate
+    wavenumbers = solution.fields.grid.wavenumber_axis
     kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
     names, values, parameters = _parameters(estimate, deconvolution, kernel, division)
     derivatives = _Derivatives.stacked([parameters, kernel[1:]])
@@ -288,17 +288,19 @@ def propagate(
     if drawn is not None:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
-    changes = changes_by(effects, by_voltage, names, values)
-    for (source, effect), column in zip(effects.items(), changes, strict=True):
-        if effect.exact is not None:
-            _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
-        columns[source] = column[:, None]
+    count = len(names)
     if effects:
-        together = np.hstack([columns[name] for name in effects])
-        independent.append(together @ square_root(correlation_matrix(list(effects), correlations)))
+        changes = by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)
+        # No factor changes G and its transfer, beyond the named numbers.
+        scaled = [name.startswith("conversion_constant") for name in names]
+        for (source, effect), column in zip(effects.items(), changes.T, strict=True):
+            column[:count] += np.where(scaled, values, 0.0) * effect.scaling
+            if effect.exact is not None:
+                _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
+            columns[source] = column[:, None]
+        independent.append(changes @ square_root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
     g = deconvolution.g.radial
-    count = len(names)
     stop = count + g.size
     stored = everything[:stop] @ everything[:stop].T
     drawn_again = [columns["noise"], columns[CURVATURE], *(independent[-1:] if effects else [])]
@@ -328,7 +330,7 @@ def _effective_degrees(
 ) -> dict[str, float]:
     """Degrees of freedom of each uncertainty, of which an estimated noise alone has few."""
     # Welch and Satterthwaite: GUM (JCGM 100:2008), G.4.1.
-    if estimate.points.u_errors is not None:
+    if estimate.points.noise_stated:
         return {}
     readings = float(estimate.outlier_weight.sum()) + estimate.points.curved.size
     degrees = max(readings - estimate.basis.flat, 1.0)
@@ -353,23 +355,6 @@ def slow_noise_text(estimate: ProfileEstimate, slow: SlowNoise, results: Results
         f"{slow.share:.0%} of its variance would then fall off over {slow.length:.2g} steps. This "
         f"{verb} the uncertainty of A {a:.2f} and that of sigma {sigma:.2f} times as large."
     )
-
-
-def changes_by(
-    effects: Mapping[str, InputEffect],
-    by_voltage: VoltageMap,
-    names: Sequence[str],
-    values: FloatArray,
-) -> FloatArray:
-    """Changes by one standard uncertainty of each input, (inputs, m): of numbers of ``values``."""
-    # Beyond the named ones, of G and its transfer, which no factor changes.
-    if not effects:
-        return np.zeros((0, len(by_voltage)))
-    changes = (by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)).T
-    scaled = [name.startswith("conversion_constant") for name in names]
-    for column, effect in zip(changes, effects.values(), strict=True):
-        column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
-    return changes
 
 
 def _replace_exactly(

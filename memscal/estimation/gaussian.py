@@ -239,9 +239,14 @@ class GaussianFit:
     predicted: FloatArray  # (n,): voltages of the fit, in V
 
     @property
+    def parameters(self) -> int:
+        """How many there are; a fit of another shape than an ellipse has none of that."""
+        return int(self.jacobian.shape[1])
+
+    @property
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
-        rows = self.points.prior_rows
+        rows = self.points.prior_rows[:, : self.parameters]
         curvature = self.drift[self.drift.size - len(rows) :]
         return rows, -rows.sum(axis=1) * curvature
 

@@ -277,7 +277,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
-    count = points.parameters - points.ellipse
+    count = estimate.gaussian.parameters - points.ellipse
     gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.
@@ -288,7 +288,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     coefficients = information @ (free.T @ residual)
     fall = float(residual @ free @ coefficients)
     # The adopted noise counts what the columns explain, but it is no less than the stated one.
-    least = 0.0 if points.u_errors is None else estimate.noise_scale**-2
+    least = estimate.noise_scale**-2 if points.noise_stated else 0.0
     share = max(1 - fall / max(float(residual @ residual), np.finfo(float).tiny), least)
     errors = np.sqrt(share * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
@@ -351,9 +351,9 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) 
         return none
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
-    basis = departure_basis(model, fit, reduced, angular)
+    basis = departure_basis(fit, reduced, angular)
     count = (estimate.outlier_weight * ~plateau)[chosen].sum()
-    least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
+    least = 1.0 if points.noise_stated else NUMERICAL_FLOOR * estimate.largest_signal
     weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()

@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
@@ -114,6 +114,11 @@ class ScanPoints:
     def order(self) -> int:
         """Order of the channel's transforms: one where it measures a vector's component."""
         return channel_order(self.channel)
+
+    @property
+    def noise_stated(self) -> bool:
+        """Whether the noise is stated."""
+        return self.u_errors is not None
 
     @property
     def scans(self) -> int:
@@ -241,7 +246,7 @@ class ScanPoints:
         place = grouped(self.owner, self.anew * self.repeat, self.y, self.x)
         share = moved * np.sqrt(stated)
         share[np.bincount(place)[place] == 1] = 0.0
-        if self.u_errors is None or not share.any():
+        if not (self.noise_stated and share.any()):
             return self
         # The variance counts all errors: what is a reading's own is left of it.
         own = np.sqrt(1 - share**2)
@@ -370,32 +375,28 @@ def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
     split = []
     owners = []
     for i, scan in enumerate(scans):
-        groups: list[list[tuple[float, int]]] = []
+        parts = []
         loads = scan.normal_load
-        means = []
         if loads is not None:
             stated = np.isfinite(loads)
-            for number in np.unique(scan.passes[stated]):
-                mean = float(loads[stated & (scan.passes == number)].mean())
-                means.append((mean, int(number)))
-        for load, number in sorted(means):
-            if not groups or load > (1 + _SAME_LOAD) * groups[-1][0][0]:
-                groups.append([])
-            groups[-1].append((load, number))
-        parts = []
-        for group in groups if len(groups) > 1 else []:
-            load = float(np.mean([load for load, _ in group]))
-            u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
-            part = scan.only_passes(sorted(number for _, number in group))
-            parts.append(replace(part, load=load, load_uncertainty=u))
+            numbers = np.unique(scan.passes[stated])
+            means = np.array([loads[stated & (scan.passes == n)].mean() for n in numbers])
+            left = np.argsort(means, kind="stable")
+            while left.size and loads_differ(means):
+                group = left[means[left] <= (1 + _SAME_LOAD) * means[left[0]]]
+                left = left[group.size :]
+                load = float(means[group].mean())
+                u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
+                part = scan.only_passes(np.sort(numbers[group]))
+                parts.append(replace(part, load=load, load_uncertainty=u))
         split += parts or [scan]
         owners += [i] * max(len(parts), 1)
     return split, tuple(owners)
 
 
-def loads_differ(loads: Sequence[float]) -> bool:
+def loads_differ(loads: ArrayLike) -> bool:
     """Whether loads (N) differ by more than repeats of one load do."""
-    return max(loads) > (1 + _SAME_LOAD) * min(loads)
+    return bool(np.max(loads) > (1 + _SAME_LOAD) * np.min(loads))
 
 
 def grouped(*keys: NDArray[Any]) -> IndexArray:

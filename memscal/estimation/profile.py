@@ -118,7 +118,7 @@ class ProfileEstimate:
         if self.raster_noise is not None:
             scatter = self.raster_noise.deviation
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
-        return scatter if self.points.u_errors is None else max(scatter, 1.0)
+        return max(scatter, 1.0) if self.points.noise_stated else scatter
 
     @cached_property
     def kernel(self) -> FloatArray:
@@ -182,7 +182,7 @@ class ProfileEstimate:
             ellipse = np.append(fit.sigma, fit.ellipticity)
             oval = elliptic_departure(x, y, fit.sigma, fit.ellipticity).ravel()
             changes += np.outer(oval, coefficients[0])
-            end = self.points.parameters
+            end = fit.parameters
             for i, row in enumerate((1, end - 2, end - 1)):
                 step = _STEP * (fit.sigma if row == 1 else 1.0)
                 moved = ellipse.copy()
@@ -206,7 +206,7 @@ class ProfileEstimate:
     @property
     def uneven(self) -> FloatArray:
         """What references that are not round add to the voltages, shape (n,), in V."""
-        if type(self.model) is ForwardModel:
+        if self.model.sums_waves:
             return np.zeros_like(self.points.u)
         even = ForwardModel(self.points, self.model.references)
         whole = self.model.signal(self.geometry, self.kernel)
@@ -282,7 +282,7 @@ def estimate_profile(
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
         # The noise of the voltages alone: a curvature beyond its prior is none.
         left = points.standardised(residual, weights)
-        freedom = max(count - points.parameters, 1.0)
+        freedom = max(count - fit.parameters, 1.0)
         unit = max(float(np.sqrt(left @ left / freedom)), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
@@ -318,11 +318,11 @@ def _weighed(
     reduced = ReducedScan.of(model, fit, weights, rings)
     departures = None
     if rings:
-        kernels = departure_basis(model, fit, reduced).kernels(model.k)
-        radial = reduced.signal(kernels[:, model.points.parameters :])
+        kernels = departure_basis(fit, reduced).kernels(model.k)
+        radial = reduced.signal(kernels[:, fit.parameters :])
         columns = (reduced.data, reduced.flat, radial, reduced.rings)
         departures = angular_departures(rings, fit, columns, noise)
-    basis = departure_basis(model, fit, reduced, departures)
+    basis = departure_basis(fit, reduced, departures)
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
     return basis, weighing.average()
 
@@ -345,7 +345,7 @@ def log_marginal_likelihood(
         return np.full(2, -np.inf)
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
-    basis = departure_basis(model, fit, reduced, angular)
+    basis = departure_basis(fit, reduced, angular)
     least = _least_noise(fit)
     if estimate.raster_noise is not None:
         least = max(least, estimate.raster_noise.deviation)
@@ -363,7 +363,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
     left = np.append(points.standardised(points.u - fit.predicted, weights), prior)
-    freedom = float(estimate.outlier_weight.sum()) + prior.size - points.parameters
+    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.parameters
     variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).
@@ -373,7 +373,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
 
 def _least_noise(fit: GaussianFit) -> float:
     """Least noise of a point of weight one: as stated, or beyond rounding (V)."""
-    if fit.points.u_errors is not None:
+    if fit.points.noise_stated:
         return 1.0
     return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
 
@@ -489,12 +489,7 @@ def constrained_profile(
         profile = np.append(profile[:-1] - profile[1:], profile[-1])
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
     scale = np.abs(profile).max()
-    # A square root of the covariance, from its correlation matrix: amplitudes differ in size.
-    deviation = np.sqrt(np.maximum(np.diag(estimate.weighed.covariance), 0.0))
-    deviation = np.where(deviation > 0, deviation, 1.0)
-    values, vectors = np.linalg.eigh(estimate.weighed.covariance / np.outer(deviation, deviation))
-    positive = values > 1e-12 * values[-1]
-    root = deviation[:, None] * vectors[:, positive] * np.sqrt(values[positive])
+    root = square_root(estimate.weighed.covariance)
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
     weighed = replace(estimate.weighed, mean=estimate.weighed.mean + root @ z)
     return replace(estimate, weighed=weighed)

@@ -37,7 +37,7 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
 
 def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
     """Return a scan with film and rod if the reference depends on them, else without."""
-    stress = scan.reference if reference is None else reference
+    stress = reference or scan.reference
     if stress is None:
         return scan
     film = film_of(stress)
@@ -124,7 +124,7 @@ def require_same_set_up(
     """Refuse a reference of another film, rod or load than its scan; or return the differences."""
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
-    given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
+    given = [r or scan.reference for scan, r in zip(scans, references, strict=True)]
     differences = []
     for scan, stress in zip(scans, given, strict=True):
         if stress is not None and stress.form is None:

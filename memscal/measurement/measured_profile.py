@@ -201,7 +201,7 @@ def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Fou
     signal = estimate.signal
     rest = estimate.weighed.residual
     weight = estimate.outlier_weight
-    count = estimate.gaussian.jacobian.shape[1]
+    count = estimate.gaussian.parameters
     return _Found(estimate.centre, estimate.distance, signal, rest, weight, count, estimate)
 
 
@@ -214,7 +214,7 @@ def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints)
     signal = fit.conversion_constant * fit.jacobian[:, 0]
     rest = points.u - fit.predicted
     weight = np.ones_like(rest)
-    count = fit.jacobian.shape[1]
+    count = fit.parameters
     return _Found(fit.centre[0], distance, signal, rest, weight, count)
 
 
