@@ -72,7 +72,7 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
 
 def frictionless_check(
     by_loading: Mapping[str, BoundedEstimate],
-    beside: Sequence[Mapping[str, BoundedEstimate]] = (),
+    beside: Sequence[Mapping[str, BoundedEstimate]],
 ) -> QualityCheck:
     """Return the check that the lubricated loads have no friction that moves others ``beside``."""
     # The first of the values is no friction.
