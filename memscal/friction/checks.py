@@ -125,19 +125,18 @@ def comparison_messages(
             text = f"contacts{words} have converged to {worst:.1%} of their stress only."
             messages.append(Message("convergence", f"The calculated {text}"))
         messages += [Message("calculated", text) for text in family.notes]
-    unstated: dict[str, float | None] = {}
-    for profile in measured.profiles:
-        film = profile.scan.film
-        indenter = profile.scan.indenter
-        stated = {
-            "Young's modulus": film.young_modulus_uncertainty,
-            "Poisson's ratio": film.poisson_ratio_uncertainty,
-            "film thickness": film.thickness_uncertainty,
-            f"{indenter.shape} radius": indenter.radius_uncertainty,
-            "load": profile.load_uncertainty,
-        }
-        unstated |= {name: value for name, value in stated.items() if value is None}
-    messages += quality.uncertainty_unstated_messages(unstated)
+    # All scans are of one film and one sphere.
+    film = measured.scans[0].film
+    indenter = measured.scans[0].indenter
+    loads = [profile.load_uncertainty for profile in measured.profiles]
+    stated = {
+        "Young's modulus": film.young_modulus_uncertainty,
+        "Poisson's ratio": film.poisson_ratio_uncertainty,
+        "film thickness": film.thickness_uncertainty,
+        f"{indenter.shape} radius": indenter.radius_uncertainty,
+        "load": None if None in loads else loads[0],
+    }
+    messages += quality.uncertainty_unstated_messages(stated)
     return tuple(dict.fromkeys([*messages, *measured.messages]))
 
 

@@ -347,15 +347,14 @@ def stacked(
         return arrays
 
     correlations = []
-    contacts: dict[tuple[float, int], int] = {}
-    numbers = []
+    contacts = []
     for channel in points:
         own = np.eye(channel.u.size) if channel.correlation is None else channel.correlation
         correlations.append(own)
         # A contact is known by its place, and by which of those there it is.
         count: Counter[float] = Counter()
         for place in np.round(channel.offset, 12).tolist():
-            numbers.append(contacts.setdefault((place, count[place]), len(contacts)))
+            contacts.append((place, count[place]))
             count[place] += 1
     names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
     together = replace(
@@ -363,7 +362,7 @@ def stacked(
         **joined(points, names, axis=0),
         flat=block_diag(normal[0].flat, shear[0].flat),
         correlation=block_diag(*correlations),
-        contacts=np.eye(len(contacts))[numbers],
+        contacts=_own(contacts),
     )
     if points[0].places is not None:
         together = replace(together, places=_own(np.round(together.offset, 12).tolist()))
