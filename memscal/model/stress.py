@@ -168,7 +168,7 @@ class StressField:
         values = arrays.finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
         border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
-        left = np.abs(border).mean() / max(np.abs(values).max(), np.finfo(float).tiny)
+        left = np.abs(border).mean() / max(np.abs(values).max(), arrays.TINY)
         if left > _BORDER or not values.sum() > _LEAST * np.abs(values).sum():
             raise InputError(
                 f"The field adds up to {values.sum():.3g}, with {left:.1%} of its largest value "
