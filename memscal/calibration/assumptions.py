@@ -18,7 +18,6 @@ from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
 from memscal.model.scan import Scan
 
-_ASKED_FOR = ("poisson_ratio", "thickness", "load_scale")
 #: Lines that pass farther away, in widths of the Gaussian, are hardly those of one stage.
 _FARTHEST = 2.0
 #: Correlations of neighbours that are tried.
@@ -52,8 +51,8 @@ def assumptions_of(solution: Solution, results: Results, *, loads: bool) -> tupl
     assumptions = []
     for name in NAMES:
         state = _state(solution, name)
-        # What every calibration asks for is listed where it is missing.
-        if name in sizes and (state != STATED or name not in _ASKED_FOR):
+        # What every calibration asks for, film and load, is listed where it is missing.
+        if name in sizes and (state, name) != (STATED, "load_scale"):
             assumptions.append(Assumption(name, state, sizes[name]))
     return tuple(assumptions)
 

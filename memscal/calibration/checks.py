@@ -495,7 +495,7 @@ def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
     clipped = np.flatnonzero(model_tests.clipped_points(estimate))
     where = ""
     if clipped.size:
-        axes = np.stack([points.x, points.y], axis=1)[:, points.free.any(axis=0)] * 1e3
+        axes = points.positions[points.free.any(axis=0)].T * 1e3
         places = [", ".join(f"{p:.4g}" for p in place) for place in axes[clipped[:_MOST_NAMED]]]
         where = f", here at {'; '.join(places)} mm"
         if clipped.size > _MOST_NAMED:

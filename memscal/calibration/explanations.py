@@ -141,7 +141,7 @@ def _applicable(solution: Solution) -> list[str]:
     if points.order or points.planar:
         return []
     left_out = list(measured_by(points))
-    if solution.stress.form or any(scan.film is None for scan in solution.scans):
+    if solution.stress.form or not solution.on_films:
         left_out += OF_FILM
     elif not all(is_tabulated(*scan.set_up.under(NEO_HOOKEAN)) for scan in solution.scans):
         left_out.append("film_law")
@@ -196,7 +196,7 @@ def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> Fo
     estimate = solution.estimate
     model = estimate.model
     points = model.points
-    place = np.stack([points.x, points.y])
+    place = points.positions
     signal = fit.predicted - model.drift_columns @ fit.drift
     added: FloatArray | float = 0.0
     if name in OF_FILM:

@@ -106,7 +106,7 @@ class FilmLawComparison:
 def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     """Weigh the film's laws by scans at several loads; ``None`` where one load or law is left."""
     loads = tuple(scan.stated_load for scan in solution.scans)
-    if not loads_differ(loads) or any(scan.film is None for scan in solution.scans):
+    if not (loads_differ(loads) and solution.on_films):
         return None
     films = [film_of(stress) for stress in solution.stresses]
     stated = {(film.law, film.mooney_rivlin_ratio) if film else ("", None) for film in films}

@@ -134,7 +134,7 @@ def _method(solution: Solution) -> list[Message]:
 
 def _law(solution: Solution, results: Results) -> list[Message]:
     """Return which law the reference has, and what is not known of it."""
-    if any(scan.film is None for scan in solution.scans):
+    if not solution.on_films:
         return []
     film = solution.scan.set_up.film
     law = film.law

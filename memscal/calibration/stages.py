@@ -243,6 +243,11 @@ class Solution:
         return deconvolve(*steps) if self.comparable else None
 
     @property
+    def on_films(self) -> bool:
+        """Whether every scan has a film that counts."""
+        return all(scan.film is not None for scan in self.scans)
+
+    @property
     def per_repeat(self) -> bool:
         """Whether the scans are repeats, each with a centre of its own."""
         return len(set(self.owners)) < len(self.owners)

@@ -43,7 +43,7 @@ from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record
 from memscal.model.assumptions import MOVED
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
@@ -138,13 +138,9 @@ def _load_effects(
 ) -> dict[str, InputEffect]:
     """Effects of factors: loads, forces of references, and their discretisation."""
     pairs = zip(stresses, estimate.model.references, strict=True)
-    loads: list[float | None] = []
-    for scan in scans:
-        u = scan.load_uncertainty
-        loads.append(u and u / scan.stated_load)
     shares: dict[str, Sequence[float | None]] = {
         "reference_force": [abs(carried_force(*pair) - 1.0) for pair in pairs],
-        "load": loads,
+        "load": [s.load_uncertainty and s.load_uncertainty / s.stated_load for s in scans],
         "gain": [scan.gain_uncertainty for scan in scans],
         "reference_convergence": [stress.convergence for stress in stresses],
     }
@@ -630,7 +626,7 @@ def _drawn_columns(
     """Scatter of repeated draws in place of the first-order noise of what the division decides."""
     columns = by_voltage @ drawn.voltages
     # What no division decides keeps its size to first order, and is correlated as the draws are.
-    size = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
+    size = np.maximum(np.linalg.norm(columns, axis=1), TINY)
     columns *= (np.linalg.norm(noise, axis=1) / size)[:, None]
     for name, column in drawn.parameters.items():
         columns[names.index(name)] = column

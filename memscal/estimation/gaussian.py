@@ -18,7 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -186,7 +186,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
     points = model.points
     along = [np.zeros(1), np.zeros(1)]
     for axis in np.flatnonzero(points.free[0]):
-        unique = np.unique((points.x, points.y)[axis])
+        unique = np.unique(points.positions[axis])
         margin = unique.size // 10
         central = unique[margin : unique.size - margin]
         along[axis] = central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
@@ -314,7 +314,7 @@ def _solve(
     begin = start / scale
     fit = linearise(model, begin * scale)
     left = points.standardised(points.u - fit.predicted, weights)
-    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + np.finfo(float).tiny)
+    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + TINY)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
     prior = points.prior_rows

@@ -19,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
 
 #: More groups than this are held out several at a time.
@@ -101,7 +101,7 @@ def _predict(
     value = max(left - others, 0.0) / degrees
     if stated:
         return float(chdtrc(degrees, degrees * value)), value, degrees, None
-    value /= max(others / others_degrees, np.finfo(float).tiny)
+    value /= max(others / others_degrees, TINY)
     return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
 
 
@@ -120,15 +120,13 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     if points.planar or repeats.size == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
     model = residuals.free_model(estimate, clip_outliers=True)
-    axis = np.argmax(points.free[points.scan], axis=1)
-    along = np.where(axis == 0, points.x, points.y)
+    along = points.positions[points.along]
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
     # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
-    moved = shift[axis, np.arange(axis.size)]
-    own = np.stack([np.ones_like(along), along / np.abs(along).max(), moved], axis=1)
+    own = [np.ones_like(along), along / np.abs(along).max(), shift[points.along]]
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
-    common, apart, links = _without_repeats(estimate, model, own, shifted)
+    common, apart, links = _without_repeats(estimate, model, np.stack(own, axis=1), shifted)
     size = np.linalg.norm(model.design, axis=0)
     stack = np.vstack(apart)
     without, rank = _left_over(np.vstack(common), size)
@@ -214,9 +212,7 @@ class ExtraColumns:
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
-    points = estimate.points
-    dx, dy = estimate.offset
-    side = np.where(points.free[points.scan, 0], dx, dy)
+    side = estimate.offset[estimate.points.along]
     return _add(estimate, side[:, None] * _widened(estimate, (0.5, 1.0, 1.5)))
 
 
@@ -256,8 +252,7 @@ def hysteresis_test(
     columns = [estimate.signal]
     if np.array_equal(owner, points.scan):
         shift = estimate.model.shift_derivative(estimate.geometry, estimate.kernel)
-        along = np.argmax(points.free[points.scan], axis=1), range(sign.size)
-        columns += [shift[along], np.ones_like(sign)]
+        columns += [shift[points.along], np.ones_like(sign)]
     return _add(estimate, sign[:, None] * np.stack(columns, axis=1))
 
 
@@ -289,7 +284,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     fall = float(residual @ free @ coefficients)
     # The adopted noise counts what the columns explain, but it is no less than the stated one.
     least = estimate.noise_scale**-2 if points.noise_stated else 0.0
-    share = max(1 - fall / max(float(residual @ residual), np.finfo(float).tiny), least)
+    share = max(1 - fall / max(float(residual @ residual), TINY), least)
     errors = np.sqrt(share * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)

@@ -116,6 +116,16 @@ class ScanPoints:
         return channel_order(self.channel)
 
     @property
+    def positions(self) -> FloatArray:
+        """Positions of the indenter along x and y, shape (2, n), in m."""
+        return np.stack([self.x, self.y])
+
+    @property
+    def along(self) -> tuple[IndexArray, IndexArray]:
+        """Index that takes of (2, n), along x and y, that along which each point's scan runs."""
+        return np.argmax(self.free[self.scan], axis=1), np.arange(self.u.size)
+
+    @property
     def noise_stated(self) -> bool:
         """Whether the noise is stated."""
         return self.u_errors is not None
@@ -291,6 +301,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     x_errors = 0.0 if scan.x_errors is None else scan.x_errors
     branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     correlation = None if channel_order(channel) else scan.u_zz_correlation
+    count = int(keep.sum())
+    first = np.zeros(count, dtype=np.intp)
     points = ScanPoints(
         x=x[keep],
         y=y[keep],
@@ -299,12 +311,12 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         u_errors=None if errors is None else errors[keep],
         x_errors=np.broadcast_to(x_errors, u.shape)[keep],
         repeat=scan.passes[keep],
-        owner=np.zeros(int(keep.sum()), dtype=np.intp),
-        anew=np.full(int(keep.sum()), scan.position_errors_by_repeat),
+        owner=first,
+        anew=np.full(count, scan.position_errors_by_repeat),
         branch=branch[keep],
-        scan=np.zeros(int(keep.sum()), dtype=np.intp),
+        scan=first,
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
-        missing=int(u.size - keep.sum()),
+        missing=u.size - count,
         decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
         reading=scan.reading,

@@ -20,7 +20,7 @@ from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -257,10 +257,10 @@ def estimate_profile(
     kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
-    along = np.argmax(points.free[points.scan], axis=1), range(points.u.size)
     # Uncertain positions make noise where U is steep.
-    stated = stated_weights(points, slope[along] * points.x_errors)
-    points = points.sharing_positions(slope[along] * points.x_errors, stated)
+    moved = slope[points.along] * points.x_errors
+    stated = stated_weights(points, moved)
+    points = points.sharing_positions(moved, stated)
     model = replace(model, points=points)
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
@@ -391,7 +391,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     for scan, axis in np.argwhere(points.free):
         name = "xy"[axis]
         centre = estimate.centres[scan, axis]
-        positions = (points.x, points.y)[axis][points.scan == scan]
+        positions = points.positions[axis, points.scan == scan]
         if not positions.min() - points.step <= centre <= positions.max() + points.step:
             raise CentreError(
                 f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "
@@ -462,7 +462,7 @@ def _share(estimate: ProfileEstimate, block: IndexArray) -> float:
     """Share of the variance of A that would go if the parameters of a block were known."""
     covariance = estimate.weighed.covariance
     integrals = estimate.basis.integrals
-    deviation = np.sqrt(np.maximum(np.diag(covariance)[block], np.finfo(float).tiny))
+    deviation = np.sqrt(np.maximum(np.diag(covariance)[block], TINY))
     with_a = (integrals @ covariance)[block] / deviation
     correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
     return float(with_a @ np.linalg.pinv(correlation, hermitian=True) @ with_a)
