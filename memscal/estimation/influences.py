@@ -130,10 +130,10 @@ def _film_changes(
     tried = {"poisson_ratio": (-2 * _STEP_OF_RATIO, -_STEP_OF_RATIO), "thickness": (-step, step)}
     for name, steps in tried.items():
         if getattr(scan.film, f"{name}_uncertainty") is None:
-            value = getattr(film, name)
-            varied = [set_up._replace(film=replace(film, **{name: value + d})) for d in steps]
-            pairs = zip(varied, steps, strict=True)
-            by_step = [difference(set_up, reference, more, set_up) / d for more, d in pairs]
+            by_step = []
+            for d in steps:
+                varied = set_up._replace(film=replace(film, **{name: getattr(film, name) + d}))
+                by_step.append(difference(set_up, reference, varied, set_up) / d)
             square = (by_step[1] - by_step[0]) / (steps[1] - steps[0])
             changes[name] = (by_step[0] - square * steps[0], square)
     linear = film.law == LINEAR

@@ -133,7 +133,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     left, _ = _left_over(stack, size)
     count = int(shifted.sum())
     degrees = model.data.size - 2 * repeats.size - rank - count
-    if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
+    if degrees < FEWEST_RESIDUALS or left == 0.0:
         return None
     coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
     shifts = []

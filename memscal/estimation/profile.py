@@ -68,11 +68,6 @@ class ProfileEstimate:
         """Correlation of the noise: as stated, or as found where none is."""
         return self.slow.covariance if self.slow else self.points.decorrelation
 
-    def drawn_noise(self, standard: FloatArray) -> FloatArray:
-        """Noise of the voltages, in V, of independent standard normal draws, (n,) or (n, m)."""
-        correlated = self.correlation.correlate(standard)
-        return (self.noise / self.outlier_weight**0.5 * correlated.T).T
-
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
         noise = self.noise / self.outlier_weight**0.5

@@ -48,10 +48,7 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
     """Return the scans, and those of which a stress was measured."""
     scans: list[Scan | MeasuredScan] = []
     for item in contacts:
-        if isinstance(item, Scan):
-            scans.append(item)
-        else:
-            scans += item.scans
+        scans += [item] if isinstance(item, Scan) else item.scans
     return scans
 
 

@@ -89,8 +89,7 @@ def answer(result: Calibrated) -> str:
 
 
 def _explanations(apparatus: ApparatusData) -> Sequence[Mapping[str, Any]]:
-    rows: Sequence[Mapping[str, Any]] = apparatus.process.configuration.get("explanations", ())
-    return rows
+    return list(apparatus.process.configuration.get("explanations", ()))
 
 
 def _dominating_law(apparatus: ApparatusData) -> str:
