@@ -204,9 +204,7 @@ def calibration_settings(
 
 @click.command("calibrate", epilog=EXAMPLES)
 @common.scans_argument()
-@option("-o --output", FILE, metavar="OUT")(
-    "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
-)
+@common.out_option("Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.")
 @calibration_options
 @option("--free", click.Choice(("thickness",)), multiple=True)(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
