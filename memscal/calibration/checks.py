@@ -215,6 +215,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
 def _set_up(solution: Solution) -> list[QualityCheck]:
     """Film, band, reach, baseline, force and outliers."""
     estimate = solution.estimate
+    points = estimate.points
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
@@ -240,17 +241,17 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "means that A rests on the extrapolation: scan farther."
     )
     # A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
-    most = 0.10 if estimate.points.order else 0.05
+    most = 0.10 if points.order else 0.05
     checks.append(check("tail_share", solution.tail_share, most, meaning))
     meaning = (
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
         "as a line that is straight or a little curved; a failure means that what is left of it "
         "may bias A."
     )
-    last = 1 + int(estimate.points.free[0].sum())
+    last = 1 + int(points.free[0].sum())
     change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     checks.append(check("baseline_drift", change, 0.05, meaning))
-    count = estimate.points.curved.size
+    count = points.curved.size
     if count:
         meaning = (
             "Fitted curvature of the baseline, edge to centre, over what its prior and the noise "
@@ -258,9 +259,9 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
             "that something else looks like it: a tail of G, the amplifier. State "
             "baseline_curvature_uncertainty, or let amplifier and film settle."
         )
-        prior = estimate.points.curvature[estimate.points.curved] ** 2
+        prior = points.curvature[points.curved] ** 2
         # What a mean has of the prior's variance the posterior has not.
-        found = prior - np.diag(estimate.weighed.covariance)[estimate.points.curvatures]
+        found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
         share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
         checks.append(check("baseline_curvature", share.max(), _CURVED, meaning))
     if not source:

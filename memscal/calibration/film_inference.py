@@ -199,7 +199,7 @@ class FreeThickness:
 
 
 def _thickness(film: ElasticFilm) -> dict[str, Any]:
-    u = None if film.thickness_uncertainty is None else film.thickness_uncertainty / MM
+    u = (film.thickness_uncertainty or 0.0) / MM
     return {"value": film.thickness / MM, "standard_uncertainty": u, "unit": "mm"}
 
 
