@@ -17,14 +17,10 @@ class Decorrelation:
     r"""Makes noise of covariance :math:`(1 + S S^T) C` or :math:`C`, block by block, white."""
 
     # Points of each block, and the lower Cholesky factor of their correlation C, or its diagonals.
-    blocks: tuple[tuple[IndexArray, FloatArray], ...] = ()
+    blocks: tuple[tuple[IndexArray, FloatArray], ...]
     # One after the other, orthonormal columns (n, q) of what points have in common, after that,
     # and its growth (q,).
     common: tuple[tuple[Any, FloatArray], ...] = ()
-
-    def __bool__(self) -> bool:
-        """Whether there is any correlation."""
-        return bool(self.blocks or self.common)
 
     def apply(self, values: FloatArray) -> FloatArray:
         """Make columns (n,) or (n, m) white."""
@@ -47,8 +43,6 @@ class Decorrelation:
         self, change: Callable[..., FloatArray], values: FloatArray, *, transposed: bool = False
     ) -> FloatArray:
         """Change columns by the roots of the blocks."""
-        if not self.blocks:
-            return values
         changed = values.copy()
         for rows, root in self.blocks:
             changed[rows] = change(root, values[rows], transposed=transposed)

@@ -209,10 +209,11 @@ class ReducedScan:
         """Factors (r,) whose products with reduced columns are sums of shares (n,) of columns."""
         root = np.sqrt(self.weights)
         factor = self.model.points.decorrelation
-        shares = factor.correlate_adjoint(share / root)
+        shares = share / root if factor is None else factor.correlate_adjoint(share / root)
         if self.right is None:
             return shares
-        return self.right.T @ (factor.correlate(shares) / root)
+        shares = shares if factor is None else factor.correlate(shares)
+        return self.right.T @ (shares / root)
 
     def by_voltages(self, gain: FloatArray) -> VoltageMap:
         """Derivatives by the voltages (m, n) of numbers with these by the reduced data, (m, r)."""

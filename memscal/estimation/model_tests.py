@@ -166,7 +166,7 @@ def _without_repeats(
     points = estimate.points
     weights = estimate.weights / estimate.outlier_weight
     repeats = np.unique(points.repeat)
-    independent = not points.decorrelation
+    independent = points.decorrelation is None
     numbers = range(repeats.size)
     common = []
     apart = []
@@ -332,7 +332,7 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) 
     points = estimate.points
     weights = np.where(plateau, _LITTLE, 1.0) * estimate.weights
     chosen = np.arange(plateau.size)
-    if plateau.size > 2 * _ENOUGH and not points.decorrelation:
+    if plateau.size > 2 * _ENOUGH and points.decorrelation is None:
         # Some of the plateau, and of the others.
         some = evenly(np.flatnonzero(plateau), _ENOUGH)
         others = evenly(np.flatnonzero(~plateau), _ENOUGH)

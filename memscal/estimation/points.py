@@ -103,9 +103,7 @@ class ScanPoints:
     anew: BoolArray  # (n,): whether each repeat has an error of its position of its own
     free: BoolArray  # (scans, 2): along x and y, whether the centre is a free parameter
     missing: int  # how many points were missing
-    decorrelation: Decorrelation = field(
-        default_factory=Decorrelation
-    )  # makes noise of the stated correlation white
+    decorrelation: Decorrelation | None = None  # makes noise of the stated correlation white
     channel: str = "zz"
     reading: Reading = VOLTS  # the unit in which voltages are shown
     # (scans,): standard deviation of each baseline's curvature, edge to centre, in V; 0: straight
@@ -227,7 +225,7 @@ class ScanPoints:
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray) and name not in ("free", "curvature"):
                 columns[name] = value[chosen]
-        return replace(self, **columns, decorrelation=Decorrelation())
+        return replace(self, **columns, decorrelation=None)
 
     def standardised(
         self, values: FloatArray, weights: FloatArray, out: FloatArray | None = None
@@ -235,7 +233,7 @@ class ScanPoints:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         place = None if out is None else out.T
         scaled: FloatArray = np.multiply(values.T, np.sqrt(weights), out=place).T
-        return self.decorrelation.apply(scaled)
+        return scaled if self.decorrelation is None else self.decorrelation.apply(scaled)
 
     def sharing(self, changes: FloatArray) -> tuple[ScanPoints, float]:
         """Return the points with further errors in common, and what these add to ln det.
@@ -244,7 +242,7 @@ class ScanPoints:
         standardised by the root of :math:`1 + S S^T`, too.
         """
         left, singular, _ = np.linalg.svd(changes, full_matrices=False)
-        factor = self.decorrelation
+        factor = self.decorrelation or Decorrelation(())
         factor = replace(factor, common=(*factor.common, (left, np.hypot(1, singular))))
         return replace(self, decorrelation=factor), float(np.log1p(singular**2).sum())
 
@@ -264,10 +262,11 @@ class ScanPoints:
         own = np.sqrt(1 - share**2)
         every = np.arange(place.size)
         known = self.decorrelation
-        root = own[:, None] * known.correlate(np.eye(every.size)) if known else own[None]
+        root = own[None] if known is None else own[:, None] * known.correlate(np.eye(every.size))
         points = replace(self, decorrelation=Decorrelation(((every, root),)))
         columns = csr_array((share, (every, place)))
-        if known:
+        if known is not None:
+            assert points.decorrelation is not None
             return points.sharing(points.decorrelation.apply(columns.toarray()))[0]
         # No reading has two positions: the columns are orthogonal.
         square = np.bincount(place, (share / own) ** 2)
@@ -278,7 +277,8 @@ class ScanPoints:
 
     def unstandardise(self, columns: FloatArray, weights: FloatArray) -> FloatArray:
         """Apply the transposed standardisation to columns (n, m), which are overwritten."""
-        columns = self.decorrelation.adjoint(columns)
+        if self.decorrelation is not None:
+            columns = self.decorrelation.adjoint(columns)
         columns *= np.sqrt(weights)[:, None]
         return columns
 
@@ -317,7 +317,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         scan=first,
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
         missing=u.size - count,
-        decorrelation=Decorrelation() if correlation is None else _decorrelation(correlation, keep),
+        decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
         reading=scan.reading,
     )
@@ -456,11 +456,14 @@ def joined_points(scans: Sequence[ScanPoints], owners: Sequence[int] | None = No
     )
 
 
-def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation:
+def _joined_decorrelation(scans: Sequence[ScanPoints]) -> Decorrelation | None:
+    if all(points.decorrelation is None for points in scans):
+        return None
     blocks = []
     first = 0
     for points in scans:
-        blocks += [(rows + first, root) for rows, root in points.decorrelation.blocks]
+        known = points.decorrelation.blocks if points.decorrelation else ()
+        blocks += [(rows + first, root) for rows, root in known]
         first += points.u.size
     return Decorrelation(tuple(blocks))
 

@@ -64,16 +64,18 @@ class ProfileEstimate:
         return self.noise_scale / np.sqrt(self.weights / self.outlier_weight)
 
     @property
-    def correlation(self) -> Decorrelation:
+    def correlation(self) -> Decorrelation | None:
         """Correlation of the noise: as stated, or as found where none is."""
         return self.slow.covariance if self.slow else self.points.decorrelation
 
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
+        factor = self.correlation
         noise = self.noise / self.outlier_weight**0.5
         if noise.size > DENSE:
-            return square_root(numbers.covariance(noise, self.correlation))
-        return self.correlation.correlate_adjoint((noise * numbers.dense()).T).T
+            return square_root(numbers.covariance(noise, factor))
+        scaled = noise * numbers.dense()
+        return scaled if factor is None else factor.correlate_adjoint(scaled.T).T
 
     @cached_property
     def fixed_root(self) -> FloatArray:

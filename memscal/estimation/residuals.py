@@ -163,7 +163,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     points = estimate.points
     keys = (points.scan, points.place_numbers("index"), points.load)
     group = grouped(*(key[model.point] for key in keys))
-    if points.decorrelation or group.max() + 1 == group.size:
+    if points.decorrelation is not None or group.max() + 1 == group.size:
         return None
     weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.point]
     square = np.bincount(group, weight**2)

@@ -115,11 +115,11 @@ class VoltageMap:
         parts = []
         for left, right in self.parts:
             columns: Any = np.eye(left.shape[1]) if right is None else right
-            if factor:
+            if factor is not None:
                 dense = columns if isinstance(columns, np.ndarray) else columns.toarray()
                 columns = factor.correlate_adjoint(noise[:, None] * dense)
             parts.append((left, columns))
-        weight = np.ones_like(noise) if factor else noise**2
+        weight = noise**2 if factor is None else np.ones_like(noise)
         total: FloatArray = np.zeros((len(self), len(self)))
         for i, (left, right) in enumerate(parts):
             total += left @ _gram(right, right, weight) @ left.T

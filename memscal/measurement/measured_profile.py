@@ -355,7 +355,7 @@ def measured_profile(
     s_zz = averaged[order] / a
     average = average[order]
     decorrelation = restored.points.decorrelation
-    if not decorrelation:
+    if decorrelation is None:
         noise_root = np.sqrt(average.power(2) @ noise**2)
     else:
         # Of repeats there are more columns than positions.
@@ -414,7 +414,7 @@ def _channel_points(
     if scan.normal_load_errors is not None:
         load_errors = np.nan_to_num(scan.normal_load_errors[measured_mask(scan, points.channel)])
     correlation = None
-    if points.decorrelation:
+    if points.decorrelation is not None:
         root = points.decorrelation.correlate(np.eye(points.u.size))
         correlation = root @ root.T
     return MeasuredPoints(

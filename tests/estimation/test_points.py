@@ -82,6 +82,6 @@ def test_repeats_share_the_error_of_their_position(anew: bool, correlation: floa
         white = shared.standardised(root, stated)
         np.testing.assert_allclose(white @ white.T, np.eye(27), atol=1e-9)
     if not anew:
-        assert shared.decorrelation
+        assert shared.decorrelation is not None
         again = shared.decorrelation.correlate(shared.decorrelation.apply(root))
         np.testing.assert_allclose(again, root, atol=1e-12)
