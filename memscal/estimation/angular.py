@@ -56,7 +56,7 @@ class AngularRings:
     @classmethod
     def about(cls, fit: GaussianFit) -> AngularRings:
         """Rings about a Gaussian fit."""
-        width = fit.resolved_width
+        width = max(fit.sigma, 0.5 * fit.points.step)
         return cls(width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING), _BLUR * width)
 
     def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:

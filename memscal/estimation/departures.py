@@ -33,6 +33,8 @@ from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.voltage_map import SINGLE, Tall, VoltageMap, orthonormalised
 from memscal.model.arrays import FloatArray, array_record, value_record
 
+#: Rings are never narrower than this many steps: a width below the sampling is not resolved.
+_SMALLEST_WIDTH_IN_STEPS = 0.5
 #: Neighbouring rings overlap: this share of their blur apart.
 _SPACING = 0.7
 _FEWEST_RINGS = 6
@@ -320,7 +322,7 @@ def departure_basis(
 ) -> DepartureBasis:
     """Return the kernels of the fit's own parameters and of every shape about it."""
     # With the scan as reduced about the fit, of the families' best fits, too.
-    width = fit.resolved_width
+    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * fit.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if reduced is None else tuple(_fitted_families(reduced, width))
     flat = fit.parameters + (angular.count if angular else 0)

@@ -239,11 +239,6 @@ class GaussianFit:
     predicted: FloatArray  # (n,): voltages of the fit, in V
 
     @property
-    def resolved_width(self) -> float:
-        """Width, or half a step: below the sampling none is resolved (m)."""
-        return max(self.sigma, 0.5 * self.points.step)
-
-    @property
     def parameters(self) -> int:
         """How many there are; a fit of another shape than an ellipse has none of that."""
         return int(self.jacobian.shape[1])

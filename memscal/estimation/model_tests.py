@@ -260,7 +260,8 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
     model = estimate.model
     fit = estimate.gaussian
-    kernels = [gaussian_transfer(model.k, factor * fit.resolved_width) for factor in factors]
+    width = max(fit.sigma, 0.5 * estimate.points.step)
+    kernels = [gaussian_transfer(model.k, factor * width) for factor in factors]
     return model.signal(fit.geometry, np.stack(kernels, axis=1))
 
 

@@ -474,7 +474,8 @@ def constrained_profile(
     """Return the MAP estimate of A G under constraints; without any, the posterior mean."""
     if not (nonnegative or monotone):
         return estimate
-    r = np.linspace(0.0, _REACH_IN_WIDTHS * estimate.gaussian.resolved_width, _RADII)
+    width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
+    r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
     profile = estimate.radial(r)
     columns = estimate.basis.radial(r)
     if monotone:
