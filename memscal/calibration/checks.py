@@ -70,7 +70,7 @@ def quality_checks(
         *_set_up(solution),
         _indentation(solution, results, assumed),
     ]
-    if estimate.points.noise_stated:
+    if estimate.points.u_errors is not None:
         checks.append(quality.noise_check(estimate.weighed.noise, estimate.points.channel))
     checks += [
         *_unexplained(estimate, results),
@@ -100,7 +100,7 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     )
     fitted = solution.gaussian_misfit
     p_value = None
-    if solution.estimate.points.noise_stated:
+    if solution.estimate.points.u_errors is not None:
         p_value = float(chdtrc(fitted.degrees, fitted.chi2_reduced * fitted.degrees))
     # Both are of the same points.
     limit = _misfit_limit(solution.estimate, fitted.degrees)
@@ -476,7 +476,7 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Qual
     }
     scale = (
         ""
-        if estimate.points.noise_stated
+        if estimate.points.u_errors is not None
         else ", over the others' own scatter as no noise is stated"
     )
     joined = "" if worst.alone else f", {what}s taken several at a time"

@@ -188,7 +188,7 @@ class _Search:
             return None
         # Where no noise is stated, it is that of the best fit.
         noise = 1.0
-        if not self.points[0].noise_stated:
+        if self.points[0].u_errors is None:
             noise = min(robust_scale(trial.residual, TINY) for trial in fitted)
         best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
         least = min(trial.loss(noise) for trial in best.values())

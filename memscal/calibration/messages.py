@@ -67,7 +67,7 @@ def calibration_messages(
         )
         messages.append(Message("line_offset", text))
     messages += point_messages(estimate)
-    if not estimate.points.noise_stated:
+    if estimate.points.u_errors is None:
         messages.append(_noise(estimate, results))
     messages += _method(solution)
     form = stress.form

@@ -142,7 +142,7 @@ def deconvolve(
     # Eq. 1: the voltage that A and G predict, of each scan through its own reference.
     model = estimate.model
     if posterior is not None:
-        signal = model.signal(estimate.geometry, posterior.kernel) + estimate.oval
+        signal = model.signal(model.geometry(estimate.centres), posterior.kernel) + estimate.oval
     elif estimate.points.scans == 1 and model.reference.order != ACROSS:
         signal = fields.convolved(quotient) * estimate.points.load
     else:
@@ -283,9 +283,9 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     data = estimate.points
     residual = data.u - predicted
     weight = estimate.outlier_weight
-    degrees = float(weight.sum()) + data.curved.size - estimate.gaussian.parameters
+    degrees = float(weight.sum()) + data.curved.size - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.
-    noise = 1.0 if data.noise_stated else estimate.noise_scale
+    noise = 1.0 if data.u_errors is not None else estimate.noise_scale
     square = float(np.sum(data.standardised(residual, estimate.weights) ** 2))
     return Misfit(rms, square / noise**2 / degrees, degrees)

@@ -181,7 +181,7 @@ class ReducedScan:
     ) -> ReducedScan:
         """Reduce a scan with weights (n,), with angular rings or without."""
         points = model.points
-        count = fit.parameters
+        count = fit.jacobian.shape[1]
         first = [(points.u - fit.predicted)[:, None], fit.jacobian]
         if rings:
             first.append(rings.signal(model, fit.centre))
@@ -266,7 +266,7 @@ class DepartureBasis:
     ) -> FloatArray:
         """Voltages at the points of combinations of all columns, (p,) or (p, m): (n,) or (n, m)."""
         # Coefficients are few: of a million points there is no room for all columns.
-        count = fit.parameters
+        count = fit.jacobian.shape[1]
         volts = fit.jacobian @ coefficients[:count]
         if self.angular:
             angular = coefficients[count : self.flat].reshape(self.flat - count, -1)
@@ -325,7 +325,7 @@ def departure_basis(
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * fit.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if reduced is None else tuple(_fitted_families(reduced, width))
-    flat = fit.parameters + (angular.count if angular else 0)
+    flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 
 

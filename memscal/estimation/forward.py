@@ -176,7 +176,7 @@ class ForwardModel:
         column = np.zeros_like(self.points.u)
         for scan in range(self.points.scans):
             inside = self.points.scan == scan
-            for position in self.points.positions[:, inside]:
+            for position in (self.points.x[inside], self.points.y[inside]):
                 half = np.ptp(position) / 2
                 if half > 0:
                     column[inside] += ((position - position.min() - half) / half) ** 2
@@ -190,7 +190,7 @@ class ForwardModel:
             inside = self.points.scan == scan
             columns.append(inside.astype(np.float64))
             for axis in np.flatnonzero(free):
-                position = self.points.positions[axis]
+                position = (self.points.x, self.points.y)[axis]
                 measured = position[inside]
                 middle = (measured.max() + measured.min()) / 2
                 drift = (position - middle) / (np.ptp(measured) / 2)
@@ -210,7 +210,7 @@ class ForwardModel:
 
     def offset(self, centres: FloatArray) -> FloatArray:
         """Positions of the points from centres, shape (scans, 2), in m: (2, n)."""
-        return self.points.positions - np.atleast_2d(centres)[self.points.scan].T
+        return np.stack([self.points.x, self.points.y]) - np.atleast_2d(centres)[self.points.scan].T
 
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""

@@ -186,7 +186,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
     points = model.points
     along = [np.zeros(1), np.zeros(1)]
     for axis in np.flatnonzero(points.free[0]):
-        unique = np.unique(points.positions[axis])
+        unique = np.unique((points.x, points.y)[axis])
         margin = unique.size // 10
         central = unique[margin : unique.size - margin]
         along[axis] = central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
@@ -239,14 +239,9 @@ class GaussianFit:
     predicted: FloatArray  # (n,): voltages of the fit, in V
 
     @property
-    def parameters(self) -> int:
-        """How many there are; a fit of another shape than an ellipse has none of that."""
-        return int(self.jacobian.shape[1])
-
-    @property
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
-        rows = self.points.prior_rows[:, : self.parameters]
+        rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
         curvature = self.drift[self.drift.size - len(rows) :]
         return rows, -rows.sum(axis=1) * curvature
 

@@ -120,10 +120,14 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     if points.planar or repeats.size == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
     model = residuals.free_model(estimate, clip_outliers=True)
-    along = points.positions[points.along]
+    along = points.positions[np.argmax(points.free[points.scan], axis=1), range(points.u.size)]
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
     # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
-    own = [np.ones_like(along), along / np.abs(along).max(), shift[points.along]]
+    own = [
+        np.ones_like(along),
+        along / np.abs(along).max(),
+        shift[np.argmax(points.free[points.scan], axis=1), range(points.u.size)],
+    ]
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
     common, apart, links = _without_repeats(estimate, model, np.stack(own, axis=1), shifted)
@@ -212,7 +216,9 @@ class ExtraColumns:
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
-    side = estimate.offset[estimate.points.along]
+    side = estimate.offset[
+        np.argmax(estimate.points.free[estimate.points.scan], axis=1), range(estimate.points.u.size)
+    ]
     return _add(estimate, side[:, None] * _widened(estimate, (0.5, 1.0, 1.5)))
 
 
@@ -230,7 +236,9 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     mean = load.mean()
     if np.ptp(load) < _SAME_LOAD * mean:
         return None
-    return _add(estimate, (estimate.signal * (load - mean) / mean)[:, None])
+    return _add(
+        estimate, ((estimate.predicted - estimate.background) * (load - mean) / mean)[:, None]
+    )
 
 
 def hysteresis_test(
@@ -249,10 +257,15 @@ def hysteresis_test(
             sign[inside] = 0
     if not sign.any():
         return None
-    columns = [estimate.signal]
+    columns = [estimate.predicted - estimate.background]
     if np.array_equal(owner, points.scan):
-        shift = estimate.model.shift_derivative(estimate.geometry, estimate.kernel)
-        columns += [shift[points.along], np.ones_like(sign)]
+        shift = estimate.model.shift_derivative(
+            estimate.model.geometry(estimate.centres), estimate.kernel
+        )
+        columns += [
+            shift[np.argmax(points.free[points.scan], axis=1), range(points.u.size)],
+            np.ones_like(sign),
+        ]
     return _add(estimate, sign[:, None] * np.stack(columns, axis=1))
 
 
@@ -272,7 +285,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
-    count = estimate.gaussian.parameters - points.ellipse
+    count = estimate.gaussian.jacobian.shape[1] - points.ellipse
     gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.
@@ -283,7 +296,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     coefficients = information @ (free.T @ residual)
     fall = float(residual @ free @ coefficients)
     # The adopted noise counts what the columns explain, but it is no less than the stated one.
-    least = estimate.noise_scale**-2 if points.noise_stated else 0.0
+    least = estimate.noise_scale**-2 if points.u_errors is not None else 0.0
     share = max(1 - fall / max(float(residual @ residual), TINY), least)
     errors = np.sqrt(share * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
@@ -348,7 +361,7 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) 
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(fit, reduced, angular)
     count = (estimate.outlier_weight * ~plateau)[chosen].sum()
-    least = 1.0 if points.noise_stated else NUMERICAL_FLOOR * estimate.largest_signal
+    least = 1.0 if points.u_errors is not None else NUMERICAL_FLOOR * estimate.largest_signal
     weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()

@@ -121,16 +121,6 @@ class ScanPoints:
         return np.stack([self.x, self.y])
 
     @property
-    def along(self) -> tuple[IndexArray, IndexArray]:
-        """Index that takes of (2, n), along x and y, that along which each point's scan runs."""
-        return np.argmax(self.free[self.scan], axis=1), np.arange(self.u.size)
-
-    @property
-    def noise_stated(self) -> bool:
-        """Whether the noise is stated."""
-        return self.u_errors is not None
-
-    @property
     def scans(self) -> int:
         """How many scans there are."""
         return len(self.free)
@@ -158,21 +148,16 @@ class ScanPoints:
         return np.flatnonzero(self.curvature)
 
     @property
-    def parameters(self) -> int:
-        """How many parameters a Gaussian fit has."""
-        # A, the width, centres and drifts, baselines and their curvatures, an ellipse.
-        return 2 + 2 * int(self.free.sum()) + self.scans + self.curved.size + self.ellipse
-
-    @property
     def curvatures(self) -> slice:
         """Places of the curvatures among the parameters of a Gaussian fit."""
-        last = self.parameters - self.ellipse
+        # After A, the width, centres and drifts, and baselines; before an ellipse.
+        last = 2 + 2 * int(self.free.sum()) + self.scans + self.curved.size
         return slice(last - self.curved.size, last)
 
     @property
     def prior_rows(self) -> FloatArray:
         """Further rows (c, p): readings of the curvatures, zero, with noise as that of a point."""
-        rows = np.zeros((self.curved.size, self.parameters))
+        rows = np.zeros((self.curved.size, self.curvatures.stop + self.ellipse))
         rows[:, self.curvatures] = np.diag(self.unit / self.curvature[self.curved])
         return rows
 
@@ -256,7 +241,7 @@ class ScanPoints:
         place = grouped(self.owner, self.anew * self.repeat, self.y, self.x)
         share = moved * np.sqrt(stated)
         share[np.bincount(place)[place] == 1] = 0.0
-        if not (self.noise_stated and share.any()):
+        if self.u_errors is None or not share.any():
             return self
         # The variance counts all errors: what is a reading's own is left of it.
         own = np.sqrt(1 - share**2)

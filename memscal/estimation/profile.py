@@ -15,7 +15,7 @@ from memscal.estimation.bayesian import WeighedFit
 from memscal.estimation.decorrelation import Decorrelation, SlowNoise
 from memscal.estimation.departures import DepartureBasis, ReducedScan, departure_basis
 from memscal.estimation.ellipse import elliptic_departure
-from memscal.estimation.forward import ForwardModel, Geometry, forward_model
+from memscal.estimation.forward import ForwardModel, forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
@@ -112,7 +112,7 @@ class ProfileEstimate:
         if self.raster_noise is not None:
             scatter = self.raster_noise.deviation
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
-        return max(scatter, 1.0) if self.points.noise_stated else scatter
+        return max(scatter, 1.0) if self.points.u_errors is not None else scatter
 
     @cached_property
     def kernel(self) -> FloatArray:
@@ -125,11 +125,6 @@ class ProfileEstimate:
         """A G at radii ``r`` (m), in V/Pa/m^2."""
         gaussian = self.gaussian.conversion_constant * unit_gaussian(r, self.gaussian.sigma)
         return gaussian + self.basis.radial(r) @ self.weighed.mean
-
-    @property
-    def geometry(self) -> Geometry:
-        """Distances of the points from the centres."""
-        return self.model.geometry(self.centres)
 
     @property
     def spectrum(self) -> RadialSpectrum:
@@ -176,7 +171,7 @@ class ProfileEstimate:
             ellipse = np.append(fit.sigma, fit.ellipticity)
             oval = elliptic_departure(x, y, fit.sigma, fit.ellipticity).ravel()
             changes += np.outer(oval, coefficients[0])
-            end = fit.parameters
+            end = fit.jacobian.shape[1]
             for i, row in enumerate((1, end - 2, end - 1)):
                 step = _STEP * (fit.sigma if row == 1 else 1.0)
                 moved = ellipse.copy()
@@ -195,7 +190,11 @@ class ProfileEstimate:
         """What a sensor that is not round adds to the radial profile's voltages, (n,), in V."""
         if not self.points.ellipse:
             return np.zeros_like(self.points.u)
-        return self.signal - self.model.signal(self.geometry, self.kernel)
+        return (
+            self.predicted
+            - self.background
+            - self.model.signal(self.model.geometry(self.centres), self.kernel)
+        )
 
     @property
     def uneven(self) -> FloatArray:
@@ -203,7 +202,7 @@ class ProfileEstimate:
         if self.model.sums_waves:
             return np.zeros_like(self.points.u)
         even = ForwardModel(self.points, self.model.references)
-        whole = self.model.signal(self.geometry, self.kernel)
+        whole = self.model.signal(self.model.geometry(self.centres), self.kernel)
         return whole - even.signal(even.geometry(self.centres), self.kernel)
 
     @property
@@ -227,14 +226,9 @@ class ProfileEstimate:
         return self.points.u - self.weighed.residual
 
     @property
-    def signal(self) -> FloatArray:
-        """Voltage above the background at each point, shape (n,), in V."""
-        return self.predicted - self.background
-
-    @property
     def largest_signal(self) -> float:
         """Largest voltage above the background, in V."""
-        return float(np.abs(self.signal).max())
+        return float(np.abs(self.predicted - self.background).max())
 
 
 def estimate_profile(
@@ -252,7 +246,9 @@ def estimate_profile(
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
     # Uncertain positions make noise where U is steep.
-    moved = slope[points.along] * points.x_errors
+    moved = (
+        slope[np.argmax(points.free[points.scan], axis=1), range(points.u.size)] * points.x_errors
+    )
     stated = stated_weights(points, moved)
     points = points.sharing_positions(moved, stated)
     model = replace(model, points=points)
@@ -276,7 +272,7 @@ def estimate_profile(
         updated = point_weights(points, residual, stated, OUTLIER_THRESHOLD)
         # The noise of the voltages alone: a curvature beyond its prior is none.
         left = points.standardised(residual, weights)
-        freedom = max(count - fit.parameters, 1.0)
+        freedom = max(count - fit.jacobian.shape[1], 1.0)
         unit = max(float(np.sqrt(left @ left / freedom)), noise)
         # A residual counts by the root of its weight.
         weighed_alike = np.allclose(updated**0.5, outlier**0.5, atol=0.02)
@@ -313,7 +309,7 @@ def _weighed(
     departures = None
     if rings:
         kernels = departure_basis(fit, reduced).kernels(model.k)
-        radial = reduced.signal(kernels[:, fit.parameters :])
+        radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
         columns = (reduced.data, reduced.flat, radial, reduced.rings)
         departures = angular_departures(rings, fit, columns, noise)
     basis = departure_basis(fit, reduced, departures)
@@ -357,7 +353,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
     # The prior of a curvature is a further reading.
     _, prior = fit.prior
     left = np.append(points.standardised(points.u - fit.predicted, weights), prior)
-    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.parameters
+    freedom = float(estimate.outlier_weight.sum()) + prior.size - fit.jacobian.shape[1]
     variance = max(float(left @ left) / freedom, _least_noise(fit) ** 2)
     loss = freedom * math.log(variance) + left @ left / variance
     # The flat priors are of ln A and ln(width).
@@ -367,7 +363,7 @@ def gaussian_log_marginal(estimate: ProfileEstimate, fit: GaussianFit) -> float:
 
 def _least_noise(fit: GaussianFit) -> float:
     """Least noise of a point of weight one: as stated, or beyond rounding (V)."""
-    if fit.points.noise_stated:
+    if fit.points.u_errors is not None:
         return 1.0
     return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
 
@@ -385,7 +381,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     for scan, axis in np.argwhere(points.free):
         name = "xy"[axis]
         centre = estimate.centres[scan, axis]
-        positions = points.positions[axis, points.scan == scan]
+        positions = (points.x, points.y)[axis][points.scan == scan]
         if not positions.min() - points.step <= centre <= positions.max() + points.step:
             raise CentreError(
                 f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "
@@ -431,7 +427,7 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
     varies = f"Beside a line the voltage varies by {varied}, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
-    signal = np.abs(estimate.signal)
+    signal = np.abs(estimate.predicted - estimate.background)
     farthest = int(np.argmax(estimate.distance))
     left = signal[farthest] / signal.max()
     if left > _LEFT:

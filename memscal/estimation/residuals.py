@@ -76,12 +76,12 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         flat = columns[:, 1:last]
         rings = columns[:, last:] @ (mix @ kernels)
     # Angular departures are no parameters: what of them stands above the noise counts.
-    count = fit.parameters
+    count = fit.jacobian.shape[1]
     rings = np.hstack([flat[:, count:], rings])
     flat = flat[:, :count]
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
-    stated = points.noise_stated
+    stated = points.u_errors is not None
     resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
     design = np.hstack([flat, left[:, resolved] * singular[resolved]])
     if q is not None:

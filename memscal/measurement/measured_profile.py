@@ -198,10 +198,10 @@ class _Found:
 
 def _found(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints) -> _Found:
     estimate, _ = gaussian_pressure(scan, apparatus, points)
-    signal = estimate.signal
+    signal = estimate.predicted - estimate.background
     rest = estimate.weighed.residual
     weight = estimate.outlier_weight
-    count = estimate.gaussian.parameters
+    count = estimate.gaussian.jacobian.shape[1]
     return _Found(estimate.centre, estimate.distance, signal, rest, weight, count, estimate)
 
 
@@ -214,7 +214,7 @@ def _found_quickly(scan: Scan, apparatus: ApparatusFunction, points: ScanPoints)
     signal = fit.conversion_constant * fit.jacobian[:, 0]
     rest = points.u - fit.predicted
     weight = np.ones_like(rest)
-    count = fit.parameters
+    count = fit.jacobian.shape[1]
     return _Found(fit.centre[0], distance, signal, rest, weight, count)
 
 
