@@ -73,8 +73,8 @@ _FARTHEST = 6.0
 _STEP = 0.03
 #: The loss of a size by which nothing fits the scan.
 _IMPOSSIBLE = 1e6
-#: What a size adds to the voltages of the sensor is calculated again with the sensor found.
-_ROUNDS = 3
+#: What a size adds to the voltages is calculated again with the sensor found, where it is of them.
+_ROUNDS = {"gain_curvature": 3, "lag": 3}
 #: A mean over exponentially distributed delays is summed over so many.
 _DELAYS = 10
 
@@ -160,7 +160,7 @@ def _fitted(solution: Solution, name: str) -> tuple[float, float, float, float]:
 
     def fitted(size: float) -> GaussianFit:
         fit = estimate.gaussian
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS.get(name, 1)):
             model = _changed(solution, name, size, fit)
             fit = fit_gaussian_to_points(model, estimate.weights, start=fit)
         return fit
