@@ -113,12 +113,6 @@ def test_a_field_that_cannot_be_convolved_is_refused(apparatus, x, y, shape, pro
         apparatus.predict(x, np.ones(shape), y=y)
 
 
-def test_the_force_is_kept_up_to_the_integral_of_the_apparatus_function() -> None:
-    apparatus = with_kernel(lambda r: 0.9 * unit_gaussian(r, SIGMA))
-    blurred = apparatus.convolve(RADII, 3.0 * unit_gaussian(RADII, 0.8e-3))
-    assert 2 * np.pi * np.trapezoid(blurred * RADII, RADII) == pytest.approx(0.9 * 3.0, rel=1e-4)
-
-
 @settings(max_examples=8)
 @given(a=st.floats(-1e3, 1e3, width=16), b=st.floats(-1e3, 1e3, width=16))
 def test_the_convolution_is_linear(a: float, b: float) -> None:
@@ -246,18 +240,6 @@ def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
         u_a * np.abs(apparatus.stress(predicted[-1]))
     )
     assert np.all(np.array(blurred) > 0)
-
-
-@given(st.lists(st.floats(1e-12, 1e12), min_size=1, max_size=6))
-def test_an_uncertainty_is_the_root_of_its_variance(deviations: list[float]) -> None:
-    names = tuple(f"p{i}" for i in range(len(deviations)))
-    values = np.arange(len(deviations), dtype=float)
-    parameters = ParameterSet(names, values, np.diag(np.square(deviations)))
-    for name, value, deviation in zip(names, values, deviations, strict=True):
-        assert parameters[name] == value
-        assert parameters.uncertainty(name) == pytest.approx(deviation)
-        assert name in parameters
-    assert "another" not in parameters
 
 
 @pytest.mark.parametrize(

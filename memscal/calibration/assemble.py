@@ -183,7 +183,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     }
     if points.planar:
         columns["offset_x"], columns["offset_y"] = estimate.offset
-    if points.planar or points.scans > 1 or loads_differ(list(points.load)):
+    if points.planar or points.scans > 1 or loads_differ(points.load):
         columns["load"] = points.load
         columns["background"] = estimate.background
     order = np.argsort(place, kind="stable")

@@ -1,7 +1,7 @@
 """Sizes at which what a calibration takes for granted moves its result by one uncertainty."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import Results
+from memscal.errors import InputError
 from memscal.estimation.influences import Influence, influences, measured_by
 from memscal.estimation.points import measured_mask
 from memscal.estimation.residuals import residuals_of
@@ -17,7 +18,6 @@ from memscal.estimation.voltage_map import DENSE
 from memscal.model.assumptions import ASSUMED, MEASURED, MOVED, NAMES, STATED, Assumption
 from memscal.model.scan import Scan
 
-_ASKED_FOR = ("poisson_ratio", "thickness", "load_scale")
 #: Lines that pass farther away, in widths of the Gaussian, are hardly those of one stage.
 _FARTHEST = 2.0
 #: Correlations of neighbours that are tried.
@@ -39,19 +39,20 @@ def statement(owner: object, name: str) -> Any:
     return None if isinstance(stated, str) and not stated else stated
 
 
-def assumptions_of(solution: Solution, results: Results) -> tuple[Assumption, ...]:
+def assumptions_of(solution: Solution, results: Results, *, loads: bool) -> tuple[Assumption, ...]:
     """Return what a calibration takes for granted, each with its sizes for one uncertainty."""
     effects = influences(solution.scans, solution.estimate)
-    sizes: dict[str, Mapping[str, float]] = {}
-    for name, effect in effects.items():
-        sizes[name] = _sizes(effect, results)
+    if not loads:
+        # A is relative, or per unit of a reference that no load makes.
+        del effects["load_scale"]
+    sizes = {name: _sizes(effect, results) for name, effect in effects.items()}
     if solution.estimate.points.u.size <= DENSE:
         sizes["noise_correlation"] = _correlations(solution, results)
     assumptions = []
     for name in NAMES:
         state = _state(solution, name)
-        # What every calibration asks for is listed where it is missing.
-        if name in sizes and (state != STATED or name not in _ASKED_FOR):
+        # What every calibration asks for, film and load, is listed where it is missing.
+        if name in sizes and (state, name) != (STATED, "load_scale"):
             assumptions.append(Assumption(name, state, sizes[name]))
     return tuple(assumptions)
 
@@ -81,6 +82,14 @@ def less_mean_offset(solution: Solution) -> Solution:
     u = np.array([scan.line_offset_uncertainty or 0.0 for scan in solution.scans])
     if points.order or not u.any() or "line_offset" in measured_by(points):
         return solution
+    sigma = solution.estimate.gaussian.sigma
+    if u.max() > _FARTHEST * sigma:
+        raise InputError(
+            f"The line offset uncertainty of the scan is {u.max() * 1e3:.4g} mm, but the sensor's "
+            f"Gaussian width is {sigma * 1e3:.3g} mm.",
+            why=f"Beyond {_FARTHEST:g} widths a line says nothing of the sensor's centre.",
+            cure="Check its unit: m in Python and lab.toml, mm on the command line.",
+        )
     offset = influences(solution.scans, solution.estimate)["line_offset"]
     mean = offset.squared * u[points.scan] ** 2
     scans = []
@@ -109,7 +118,11 @@ def with_slow_noise(solution: Solution) -> Solution:
 def _state(solution: Solution, name: str) -> str:
     """Say whether something is assumed, stated by every scan, or measured by them."""
     points = solution.estimate.points
-    if name in measured_by(points) or (name == "noise_correlation" and solution.estimate.slow):
+    measured = name in measured_by(points)
+    if name == "line_offset" and not points.planar:
+        # Not by lines that are too far apart for one stage.
+        measured = measured and any(scan.line_offset for scan in solution.scans)
+    if measured or (name == "noise_correlation" and solution.estimate.slow):
         return MEASURED
     for scan in solution.scans:
         if statement(scan.film if name in OF_FILM else scan, name) is None:
@@ -135,7 +148,7 @@ def _sizes(effect: Influence, results: Results) -> dict[str, float]:
     return sizes
 
 
-def _correlations(solution: Solution, results: Results) -> Mapping[str, float]:
+def _correlations(solution: Solution, results: Results) -> dict[str, float]:
     """Correlations of neighbours that add a squared uncertainty to the variance by noise."""
     # Of noise whose correlation falls off exponentially along each pass.
     estimate = solution.estimate

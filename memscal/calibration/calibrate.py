@@ -254,7 +254,7 @@ def calibrate(
     effects = _effects(solution, prepared.alternatives)
     results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
-    assumptions = assumptions_of(solution, results)
+    assumptions = assumptions_of(solution, results, loads=prepared.reading.per == "Pa")
     checks = quality_checks(solution, results, by_other_route, assumptions)
     checks, explanations = explained(solution, checks)
     done_with("checks")
@@ -329,7 +329,7 @@ def _effects(
     """Return what the inputs change, to first order; two laws of the film, by calibrating twice."""
     scans = solution.scans
     estimate = solution.estimate
-    stresses: list[BaseStress] = []
+    stresses = []
     spectra = None
     if alternatives is not None:
         pairs = zip(solution.owners, solution.stresses, strict=True)
@@ -356,8 +356,7 @@ def uncertainties(
     reading: Reading = VOLTS,
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
-    wavenumbers = solution.fields.grid.wavenumber_axis
     # The derivatives of the other route, which is linear, are complete.
     drawn = drawn_scatter(solution) if deconvolution is solution.deconvolution else None
-    results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    results = propagate(solution, deconvolution, effects, correlations, drawn)
     return replace(results, parameters=replace(results.parameters, reading=reading))

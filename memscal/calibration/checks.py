@@ -159,8 +159,8 @@ def _agreement(
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
     meaning = (
         f"Difference of the width of G {route} from the one fitted to the scan, in its standard "
-        "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
-        "it is read off. Look at both reconvolutions."
+        "uncertainty. A failure means that G is not Gaussian, or something not as stated, "
+        "so that its width depends on how it is read off. Look at both reconvolutions."
     )
     parameters = results.parameters
     i, j = (parameters.names.index(name) for name in _WIDTHS)
@@ -215,6 +215,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
 def _set_up(solution: Solution) -> list[QualityCheck]:
     """Film, band, reach, baseline, force and outliers."""
     estimate = solution.estimate
+    points = estimate.points
     film = solution.scan.film
     sigma = estimate.gaussian.sigma
     source = solution.stress.form is not None
@@ -240,29 +241,28 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "means that A rests on the extrapolation: scan farther."
     )
     # A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
-    most = 0.10 if estimate.points.order else 0.05
+    most = 0.10 if points.order else 0.05
     checks.append(check("tail_share", solution.tail_share, most, meaning))
     meaning = (
         "Change of the baseline across the scan over the largest signal. It is fitted and removed "
         "as a line that is straight or a little curved; a failure means that what is left of it "
         "may bias A."
     )
-    last = 1 + int(estimate.points.free[0].sum())
+    last = 1 + int(points.free[0].sum())
     change = 2 * np.abs(estimate.drifts[1:last]).max() / estimate.largest_signal
     checks.append(check("baseline_drift", change, 0.05, meaning))
-    own = estimate.points.curvatures(estimate.gaussian.jacobian.shape[1])
-    curvatures = estimate.drifts[estimate.drifts.size - (own.stop - own.start) :]
-    if curvatures.size:
+    count = points.curved.size
+    if count:
         meaning = (
             "Fitted curvature of the baseline, edge to centre, over what its prior and the noise "
             "make of it. A failure means that the baseline bends by more than was allowed for, or "
             "that something else looks like it: a tail of G, the amplifier. State "
             "baseline_curvature_uncertainty, or let amplifier and film settle."
         )
-        prior = estimate.points.curvature[estimate.points.curved] ** 2
+        prior = points.curvature[points.curved] ** 2
         # What a mean has of the prior's variance the posterior has not.
-        found = prior - np.diag(estimate.weighed.covariance)[own]
-        share = np.abs(curvatures) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
+        found = prior - np.diag(estimate.weighed.covariance)[points.curvatures]
+        share = np.abs(estimate.drifts[-count:]) / np.sqrt(np.maximum(found, _LEAST_FOUND * prior))
         checks.append(check("baseline_curvature", share.max(), _CURVED, meaning))
     if not source:
         meaning = (
@@ -385,7 +385,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
         return check("axisymmetry", uneven.fall, math.inf, meaning)
     extra = model_tests.symmetry_test(estimate)
     parity = "odd"
-    failure = ": a tilted rod, an uneven film, or a drifting load"
+    failure = ": a tilted rod, an uneven film, a drifting load, or a lag along the scan"
     if estimate.points.order:
         parity = "even"
         failure = " by more than their sign: cross-talk of the normal stress, "
@@ -474,8 +474,11 @@ def _prediction(estimate: ProfileEstimate, what: str, group: IndexArray) -> Qual
         "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
         "itself and compare",
     }
-    stated = estimate.points.u_errors is not None
-    scale = "" if stated else ", over the others' own scatter as no noise is stated"
+    scale = (
+        ""
+        if estimate.points.u_errors is not None
+        else ", over the others' own scatter as no noise is stated"
+    )
     joined = "" if worst.alone else f", {what}s taken several at a time"
     meaning = (
         f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "
@@ -493,7 +496,7 @@ def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
     clipped = np.flatnonzero(model_tests.clipped_points(estimate))
     where = ""
     if clipped.size:
-        axes = np.stack([points.x, points.y], axis=1)[:, points.free.any(axis=0)] * 1e3
+        axes = points.positions[points.free.any(axis=0)].T * 1e3
         places = [", ".join(f"{p:.4g}" for p in place) for place in axes[clipped[:_MOST_NAMED]]]
         where = f", here at {'; '.join(places)} mm"
         if clipped.size > _MOST_NAMED:

@@ -24,7 +24,7 @@ from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, stat
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -189,8 +189,7 @@ class _Search:
         # Where no noise is stated, it is that of the best fit.
         noise = 1.0
         if self.points[0].u_errors is None:
-            tiny = np.finfo(float).tiny
-            noise = min(robust_scale(trial.residual, tiny) for trial in fitted)
+            noise = min(robust_scale(trial.residual, TINY) for trial in fitted)
         best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
         least = min(trial.loss(noise) for trial in best.values())
         unscaled = trials[self.lengths[0]][0].loss(noise)
@@ -220,7 +219,7 @@ class _Search:
 
     def _coarse(self, length: _Length) -> list[_Trial]:
         """Try the factors of a length until the misfit has risen twice."""
-        trials: list[_Trial] = []
+        trials = []
         for factor in length.factors:
             trials.append(self._trial(length, float(factor)))
             losses = [trial.loss(1.0) for trial in trials]

@@ -64,11 +64,7 @@ _RIVALS = {
     "film_law": ("a film {} of the way from linear to neo-Hookean", 0.3, ""),
     "stage_scale": ("a stage scale of {}", 0.02, ""),
     "line_offset": ("a line {} beside the centre", 0.3e-3, "mm"),
-    "baseline_curvature": (
-        "a baseline that bends by {} of the largest signal beyond what is fitted",
-        0.02,
-        "",
-    ),
+    "baseline_curvature": ("a baseline that bends by {} of the largest signal", 0.02, ""),
     "gain_curvature": ("an amplifier of curvature {}", 0.05, ""),
     "lag": ("a lag of {} along the scan", 0.2e-3, "mm"),
 }
@@ -77,8 +73,8 @@ _FARTHEST = 6.0
 _STEP = 0.03
 #: The loss of a size by which nothing fits the scan.
 _IMPOSSIBLE = 1e6
-#: What a size adds to the voltages of the sensor is calculated again with the sensor found.
-_ROUNDS = 3
+#: What a size adds to the voltages is calculated again with the sensor found, where it is of them.
+_ROUNDS = {"gain_curvature": 3, "lag": 3}
 #: A mean over exponentially distributed delays is summed over so many.
 _DELAYS = 10
 
@@ -145,7 +141,7 @@ def _applicable(solution: Solution) -> list[str]:
     if points.order or points.planar:
         return []
     left_out = list(measured_by(points))
-    if solution.stress.form or any(scan.film is None for scan in solution.scans):
+    if solution.stress.form or not solution.on_films:
         left_out += OF_FILM
     elif not all(is_tabulated(*scan.set_up.under(NEO_HOOKEAN)) for scan in solution.scans):
         left_out.append("film_law")
@@ -164,7 +160,7 @@ def _fitted(solution: Solution, name: str) -> tuple[float, float, float, float]:
 
     def fitted(size: float) -> GaussianFit:
         fit = estimate.gaussian
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS.get(name, 1)):
             model = _changed(solution, name, size, fit)
             fit = fit_gaussian_to_points(model, estimate.weights, start=fit)
         return fit
@@ -200,7 +196,7 @@ def _changed(solution: Solution, name: str, size: float, fit: GaussianFit) -> Fo
     estimate = solution.estimate
     model = estimate.model
     points = model.points
-    place = np.stack([points.x, points.y])
+    place = points.positions
     signal = fit.predicted - model.drift_columns @ fit.drift
     added: FloatArray | float = 0.0
     if name in OF_FILM:

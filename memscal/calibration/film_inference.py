@@ -106,13 +106,13 @@ class FilmLawComparison:
 def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     """Weigh the film's laws by scans at several loads; ``None`` where one load or law is left."""
     loads = tuple(scan.stated_load for scan in solution.scans)
-    if not loads_differ(loads) or any(scan.film is None for scan in solution.scans):
+    if not (loads_differ(loads) and solution.on_films):
         return None
     films = [film_of(stress) for stress in solution.stresses]
     stated = {(film.law, film.mooney_rivlin_ratio) if film else ("", None) for film in films}
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
     channel = solution.estimate.points.channel
-    solutions: dict[str, Solution] = {}
+    solutions = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
         known = ratio if law == reference else None
         scans = []
@@ -151,13 +151,14 @@ def _input_columns(solution: Solution, without: str = "") -> FloatArray:
         if name != "load" and name.rstrip("0123456789") != without:
             columns.append(effect.voltage)
     # A balance's error may differ from load to load; repeats at one load share it.
-    signal = estimate.predicted - estimate.background
     pairs = zip(solution.owners, solution.scans, strict=True)
     balances = [(owner, scan.stated_load, scan.load_uncertainty) for owner, scan in pairs]
     for balance in dict.fromkeys(balances):
         _, load, u = balance
         weighed = np.array([other == balance for other in balances])[estimate.points.scan]
-        columns.append(np.where(weighed, signal * (u or 0.0) / load, 0.0))
+        columns.append(
+            np.where(weighed, (estimate.predicted - estimate.background) * (u or 0.0) / load, 0.0)
+        )
     return np.stack(columns, axis=1)
 
 
@@ -200,7 +201,7 @@ class FreeThickness:
 
 
 def _thickness(film: ElasticFilm) -> dict[str, Any]:
-    u = None if film.thickness_uncertainty is None else film.thickness_uncertainty / MM
+    u = (film.thickness_uncertainty or 0.0) / MM
     return {"value": film.thickness / MM, "standard_uncertainty": u, "unit": "mm"}
 
 

@@ -1,6 +1,6 @@
 """Messages of a calibration: what a user has to know of its result beside the checks."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
+#: Lines of the budget that count what is not stated.
+_LINES = {"film_law": "model_form", "rod_friction": "rod_friction"}
 
 
 def calibration_messages(
@@ -87,7 +89,7 @@ def calibration_messages(
         messages.append(Message("convergence_unstated", text))
     if form is None:
         messages += _law(solution, results) + _unstated(solution)
-    messages += _assumed(assumptions)
+    messages += _assumed(assumptions, results.changes)
     if solution.scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
@@ -139,7 +141,7 @@ def _method(solution: Solution) -> list[Message]:
 
 def _law(solution: Solution, results: Results) -> list[Message]:
     """Return which law the reference has, and what is not known of it."""
-    if any(scan.film is None for scan in solution.scans):
+    if not solution.on_films:
         return []
     film = solution.scan.set_up.film
     law = film.law
@@ -197,11 +199,11 @@ def _unstated(solution: Solution) -> list[Message]:
     return quality.uncertainty_unstated_messages(uncertainties)
 
 
-def _assumed(assumptions: Sequence[Assumption]) -> list[Message]:
+def _assumed(assumptions: Sequence[Assumption], counted: Container[str]) -> list[Message]:
     """Return what is taken for granted, and the size of each that moves A by one u."""
     listed = []
     for assumption in assumptions:
-        if assumption.state == ASSUMED:
+        if assumption.state == ASSUMED and _LINES.get(assumption.name) not in counted:
             reached = assumption.size_text("conversion_constant")
             listed.append(f"{assumption.words} ({assumption.measure}: {reached})")
     if not listed:

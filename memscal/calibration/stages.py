@@ -24,7 +24,6 @@ from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation import points
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.forward import ForwardModel
 from memscal.estimation.model_tests import CentresApart, repeat_centres_test
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
@@ -100,7 +99,7 @@ def require_profile(
     scans: Sequence[Scan],
     stresses: Sequence[BaseStress],
     channel: str,
-    owners: Sequence[int] | None = None,
+    owners: Sequence[int],
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     measured = [points.calibration_points(scan, channel) for scan in scans]
@@ -200,7 +199,7 @@ def prepare_fields(
     data = estimate.points
     if smoothed is not None and (data.as_raster or (data.planar and not divided)):
         return RasterFields.place(estimate, smoothed, choice, divided)
-    if divided and not (type(estimate.model) is ForwardModel or data.as_raster):
+    if divided and not (estimate.model.sums_waves or data.as_raster):
         problem = "The reference is a field that is not round, which a line does not show."
         why = "A division needs the voltage over the plane, as one raster has it."
         cure = 'Use method="bayesian" (--method bayesian), or scan one raster.'
@@ -252,15 +251,20 @@ class Solution:
     def comparable(self) -> bool:
         """Whether the fields can be divided, so that both routes are open."""
         estimate = self.estimate
-        round_fields = type(estimate.model) is ForwardModel or estimate.points.as_raster
+        round_fields = estimate.model.sums_waves or estimate.points.as_raster
         return self.smoothed is not None and self.fields.even and round_fields
 
     @cached_property
     def other(self) -> Deconvolution | None:
         """A and G by the other route, if it is open: Bayesian beside a division, or back."""
-        other: Method = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
+        other = WhiteNoise() if isinstance(self.method, Bayesian) else Bayesian()
         steps = self.estimate, self.band, self.fields, other
         return deconvolve(*steps) if self.comparable else None
+
+    @property
+    def on_films(self) -> bool:
+        """Whether every scan has a film that counts."""
+        return all(scan.film is not None for scan in self.scans)
 
     @property
     def per_repeat(self) -> bool:
@@ -295,12 +299,12 @@ class Solution:
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     """Compare a prediction with the scan, outliers at their reduced weight."""
-    residual = estimate.points.u - predicted
+    data = estimate.points
+    residual = data.u - predicted
     weight = estimate.outlier_weight
-    curvatures = estimate.points.curved.size
-    degrees = float(weight.sum()) + curvatures - estimate.gaussian.jacobian.shape[1]
+    degrees = float(weight.sum()) + data.curved.size - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     # As stated, uncertain positions and correlations included, where anything is stated.
-    noise = estimate.noise_scale if estimate.points.u_errors is None else 1.0
-    square = float(np.sum(estimate.points.standardised(residual, estimate.weights) ** 2))
+    noise = 1.0 if data.u_errors is not None else estimate.noise_scale
+    square = float(np.sum(data.standardised(residual, estimate.weights) ** 2))
     return Misfit(rms, square / noise**2 / degrees, degrees)

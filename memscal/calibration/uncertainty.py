@@ -43,7 +43,7 @@ from memscal.estimation.smoothing import SmoothedProfile
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root, triangular
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record
 from memscal.model.assumptions import MOVED
 from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.stress import StressProfile
@@ -137,15 +137,10 @@ def _load_effects(
     scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
 ) -> dict[str, InputEffect]:
     """Effects of factors: loads, forces of references, and their discretisation."""
-    signal = estimate.predicted - estimate.background
     pairs = zip(stresses, estimate.model.references, strict=True)
-    loads: list[float | None] = []
-    for scan in scans:
-        u = scan.load_uncertainty
-        loads.append(u and u / scan.stated_load)
     shares: dict[str, Sequence[float | None]] = {
         "reference_force": [abs(carried_force(*pair) - 1.0) for pair in pairs],
-        "load": loads,
+        "load": [s.load_uncertainty and s.load_uncertainty / s.stated_load for s in scans],
         "gain": [scan.gain_uncertainty for scan in scans],
         "reference_convergence": [stress.convergence for stress in stresses],
     }
@@ -155,7 +150,9 @@ def _load_effects(
             continue
         by_scan = np.array([share or 0.0 for share in stated])
         apart = (by_scan - by_scan.mean())[estimate.points.scan]
-        effects[source] = InputEffect(-apart * signal, -float(by_scan.mean()))
+        effects[source] = InputEffect(
+            -apart * (estimate.predicted - estimate.background), -float(by_scan.mean())
+        )
     return effects
 
 
@@ -167,9 +164,10 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
     repeats = np.unique(points.repeat)
     if repeats.size == 1 or points.owner.any():
         return 0.0
-    signal = estimate.predicted - estimate.background
     lines = estimate.model.straight_columns
-    columns = np.column_stack([signal, estimate.weighed.residual, lines])
+    columns = np.column_stack(
+        [(estimate.predicted - estimate.background), estimate.weighed.residual, lines]
+    )
     columns = points.standardised(columns, estimate.weights / estimate.noise_scale**2)
     products = []
     for repeat in repeats:
@@ -265,22 +263,23 @@ class _Derivatives:
 def propagate(
     solution: Solution,
     deconvolution: Deconvolution,
-    wavenumbers: FloatArray,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
-    drawn: DrawnScatter | None = None,
+    drawn: DrawnScatter | None,
 ) -> Results:
-    """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
+    """Propagate all stated uncertainties to a deconvolution."""
     estimate = solution.estimate
+    wavenumbers = solution.fields.grid.wavenumber_axis
     kernel, division = _kernel_derivatives(solution, deconvolution, wavenumbers)
     names, values, parameters = _parameters(estimate, deconvolution, kernel, division)
     derivatives = _Derivatives.stacked([parameters, kernel[1:]])
     by_voltage = derivatives.by_voltage
+    curvatures = [names.index(CURVATURE + _suffix(i)) for i in estimate.points.curved]
     columns = {
         "noise": estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.hidden_root,
         "window": derivatives.hidden,
-        CURVATURE: _curvature_columns(estimate, names, by_voltage),
+        CURVATURE: estimate.curved(by_voltage, curvatures),
     }
     rows = [names.index(name) for name in _GAUSSIAN_PARAMETERS if name in names]
     misfit = _misfit_columns(estimate, by_voltage[rows])
@@ -289,17 +288,19 @@ def propagate(
     if drawn is not None:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
-    changes = changes_by(effects, by_voltage, names, values)
-    for (source, effect), column in zip(effects.items(), changes, strict=True):
-        if effect.exact is not None:
-            _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
-        columns[source] = column[:, None]
+    count = len(names)
     if effects:
-        together = np.hstack([columns[name] for name in effects])
-        independent.append(together @ square_root(correlation_matrix(list(effects), correlations)))
+        changes = by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)
+        # No factor changes G and its transfer, beyond the named numbers.
+        scaled = [name.startswith("conversion_constant") for name in names]
+        for (source, effect), column in zip(effects.items(), changes.T, strict=True):
+            column[:count] += np.where(scaled, values, 0.0) * effect.scaling
+            if effect.exact is not None:
+                _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
+            columns[source] = column[:, None]
+        independent.append(changes @ square_root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
     g = deconvolution.g.radial
-    count = len(names)
     stop = count + g.size
     stored = everything[:stop] @ everything[:stop].T
     drawn_again = [columns["noise"], columns[CURVATURE], *(independent[-1:] if effects else [])]
@@ -322,18 +323,6 @@ def propagate(
         kernel_changes=kernel_changes,
         division=division,
     )
-
-
-def _curvature_columns(
-    estimate: ProfileEstimate, names: Sequence[str], by_voltage: VoltageMap
-) -> FloatArray:
-    """Errors (m, c) where the baseline of a scan is curved by its standard deviation."""
-    points = estimate.points
-    deviations = points.curvature[points.curved]
-    errors = by_voltage @ (estimate.model.curvature_columns * deviations)
-    for i, deviation in enumerate(deviations.tolist()):
-        errors[names.index(CURVATURE + _suffix(points.curved[i])), i] -= deviation
-    return errors
 
 
 def _effective_degrees(
@@ -366,23 +355,6 @@ def slow_noise_text(estimate: ProfileEstimate, slow: SlowNoise, results: Results
         f"{slow.share:.0%} of its variance would then fall off over {slow.length:.2g} steps. This "
         f"{verb} the uncertainty of A {a:.2f} and that of sigma {sigma:.2f} times as large."
     )
-
-
-def changes_by(
-    effects: Mapping[str, InputEffect],
-    by_voltage: VoltageMap,
-    names: Sequence[str],
-    values: FloatArray,
-) -> FloatArray:
-    """Changes by one standard uncertainty of each input, (inputs, m): of numbers of ``values``."""
-    # Beyond the named ones, of G and its transfer, which no factor changes.
-    if not effects:
-        return np.zeros((0, len(by_voltage)))
-    changes = (by_voltage @ np.stack([effect.voltage for effect in effects.values()], axis=1)).T
-    scaled = [name.startswith("conversion_constant") for name in names]
-    for column, effect in zip(changes, effects.values(), strict=True):
-        column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
-    return changes
 
 
 def _replace_exactly(
@@ -619,7 +591,7 @@ def _division_map(
     normalised = np.vstack([rings, by_radius, transfer])
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
     direct = normalised @ synthesis @ gain
-    geometry = model.geometry(estimate.centres)
+    geometry = estimate.model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     kernels = np.column_stack([estimate.kernel, basis.kernels(model.k)])
     count = kernels.shape[1] if estimate.points.u.size <= DENSE else _COLUMNS
@@ -658,7 +630,7 @@ def _drawn_columns(
     """Scatter of repeated draws in place of the first-order noise of what the division decides."""
     columns = by_voltage @ drawn.voltages
     # What no division decides keeps its size to first order, and is correlated as the draws are.
-    size = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
+    size = np.maximum(np.linalg.norm(columns, axis=1), TINY)
     columns *= (np.linalg.norm(noise, axis=1) / size)[:, None]
     for name, column in drawn.parameters.items():
         columns[names.index(name)] = column

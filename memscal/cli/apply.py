@@ -8,10 +8,9 @@ import click
 from memscal.cli import output as out
 from memscal.cli.failures import exit_code_of
 from memscal.cli.options import (
-    FILE,
     artifact_argument,
     figure_option,
-    option,
+    out_option,
     report_options,
     scans_argument,
     trust_options,
@@ -29,9 +28,7 @@ Examples:
 @click.command("apply", epilog=EXAMPLES)
 @artifact_argument
 @scans_argument()
-@option("-o --output", FILE, metavar="OUT")(
-    "File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5."
-)
+@out_option("File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5.")
 @trust_options
 @figure_option("Draw the profiles of all loads, linear and logarithmic.")
 @report_options

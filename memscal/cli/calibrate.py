@@ -22,7 +22,6 @@ from memscal.formats.files import together
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
     from memscal.deconvolution.division import Method
-    from memscal.model.result import Result
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
@@ -205,9 +204,7 @@ def calibration_settings(
 
 @click.command("calibrate", epilog=EXAMPLES)
 @common.scans_argument()
-@option("-o --output", FILE, metavar="OUT")(
-    "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
-)
+@common.out_option("Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.")
 @calibration_options
 @option("--free", click.Choice(("thickness",)), multiple=True)(
     "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
@@ -280,7 +277,7 @@ def command(
 
     with out.working(f"Calibrating by {settings['method'].name}"):
         calibration = calibrate(data, **settings)
-    further: dict[str, Result] = {}
+    further = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
             further["sweep"] = calibration.sweep(seed=settings["seed"])

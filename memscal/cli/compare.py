@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
 
 
-def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
+def figure_stems(lubrications: Iterable[str], *, interface: bool) -> list[str]:
     """Return the stems of all figures' names, without matplotlib; a test compares both."""
     tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     stems = []

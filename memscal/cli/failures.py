@@ -69,7 +69,7 @@ class _Ended(KeyboardInterrupt):
 @contextmanager
 def _interruptible() -> Iterator[list[int]]:
     """Have SIGTERM and SIGHUP end the work as Ctrl-C does, cleaned up; yield what came."""
-    came: list[int] = []
+    came = []
 
     def interrupt(number: int, _: object) -> None:
         came.append(number)
@@ -101,7 +101,7 @@ def _interruptible() -> Iterator[list[int]]:
 def guarded(run: Callable[[Session], int]) -> int:
     """Run a command; return its exit code, or that of its failure after saying what it was."""
     session = Session()
-    came: list[int] = []
+    came = []
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:

@@ -104,7 +104,6 @@ _ONLY = {
         *_TAKEN_FOR_GRANTED,
         "load_scatter",
         "position_error",
-        "position_errors_by_repeat",
         "figures",
         "laboratory",
         *_SENSOR_NAMES.values(),

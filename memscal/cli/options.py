@@ -125,6 +125,10 @@ def options_of(*options: _Adder) -> _Adder:
     return add
 
 
+out_option = option("-o --output", FILE, metavar="OUT")
+"""The option of the file to write, once its text says what that is."""
+
+
 def figure_option(about: str) -> _Adder:
     """Return the option of a figure's files; the text says what is drawn."""
     adder = option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")

@@ -154,9 +154,7 @@ Examples:
 @option("--rings", click.IntRange(min=16))(
     "Rings from the axis to the largest contact.  [default: as many as it takes]"
 )
-@option("-o --output", FILE, metavar="OUT")(
-    "Reference file to write (memscal-reference); for one load or depth."
-)
+@common.out_option("Reference file to write (memscal-reference); for one load or depth.")
 @figure_option("Draw the contacts.")
 @option("--mesh", FILE, metavar="FILE.vtu")(
     "Displacement and stress in the film, for ParaView (needs meshio); for finite elements "

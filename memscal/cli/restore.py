@@ -16,6 +16,7 @@ from memscal.cli.options import (
     artifact_argument,
     figure_option,
     option,
+    out_option,
     report_options,
     trust_options,
 )
@@ -36,7 +37,7 @@ Examples:
 @click.command("restore", epilog=EXAMPLES)
 @artifact_argument
 @click.argument("scan", type=FILE)
-@option("-o --output", FILE, metavar="OUT")(
+@out_option(
     "Reference file to write (memscal-reference): the restored stress with its uncertainty."
 )
 @option("--expected", FILE)(

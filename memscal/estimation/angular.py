@@ -106,7 +106,7 @@ class AngularDepartures:
     ) -> FloatArray:
         """Voltages of combinations (count, c) at the points, for centres in m: (n, c), in V."""
         parts = self._by_rings(coefficients)
-        total: FloatArray = np.zeros((model.points.u.size, coefficients.shape[1]))
+        total = np.zeros((model.points.u.size, coefficients.shape[1]))
         for i, m in enumerate(ORDERS):
             rings = self.rings.transform(m, model.k)
             both = model.around(m, rings @ parts[2 * i], rings @ parts[2 * i + 1], centres)

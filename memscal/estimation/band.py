@@ -10,7 +10,7 @@ import numpy as np
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import SmoothedProfile
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record
 
 #: A spectral component is relevant while it stands this many times above its noise: with the
 #: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
@@ -37,28 +37,26 @@ class Band:
 
 def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Band:
     """Find the band of a scan, of a tangential channel (nothing to divide) by its estimate."""
-    yardstick = gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
     k = estimate.model.k
     reference = np.abs(estimate.model.reference.values)
-    error = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny)
+    error = np.maximum(transfer_uncertainty(estimate), TINY)
     clear = RELEVANT
+    signal = np.abs((smoothed or estimate).spectrum.values)
+    points = estimate.points
     if smoothed is None:
-        signal = np.abs(estimate.spectrum.values)
         noise = error * estimate.conversion_constant * reference
-    elif (points := estimate.points).as_raster:
+    elif points.as_raster:
         # Of all points of a raster the noise is equal at all wavenumbers.
         share = points.cell / points.place_numbers("readings") * estimate.outlier_weight
         noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
-        signal = np.abs(smoothed.spectrum.values)
         clear = RELEVANT_OF_RASTER
     else:
-        signal = np.abs(smoothed.spectrum.values)
         noise = smoothed.noise
-    noise = np.maximum(noise, np.finfo(float).tiny)
+    noise = np.maximum(noise, TINY)
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
-    sampled = np.pi / estimate.points.step
+    sampled = np.pi / points.step
     relevant = min(_falls_below(k, signal / noise, clear), sampled)
-    ratio = yardstick / error
+    ratio = gaussian_transfer(k, estimate.gaussian.sigma) / error
     lost = np.flatnonzero(ratio < RESOLVED)
     end = int(lost[0]) + 1 if lost.size else k.size
     resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
@@ -82,6 +80,6 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
     if i in (0, k.size):
         return float(k[max(i - 1, 0)])
     upper = np.log(ratio[i - 1])
-    lower = np.log(max(ratio[i], np.finfo(float).tiny))
+    lower = np.log(max(ratio[i], TINY))
     share = (upper - np.log(threshold)) / (upper - lower)
     return float(k[i - 1] + (k[i] - k[i - 1]) * share)

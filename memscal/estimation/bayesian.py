@@ -353,7 +353,7 @@ class Weighing:
     @cached_property
     def log_marginal_likelihoods(self) -> FloatArray:
         """Of all hypotheses by either prior, up to a constant of the scan, (2,)."""
-        return np.asarray(logsumexp(self.log_marginals, b=_PRIORS, axis=1))
+        return logsumexp(self.log_marginals, b=_PRIORS, axis=1)
 
     def average(self) -> WeighedFit:
         """Average mean and gain by one set of probabilities, squared errors by the other."""

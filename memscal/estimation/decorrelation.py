@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,31 +24,29 @@ class Decorrelation:
 
     def apply(self, values: FloatArray) -> FloatArray:
         """Make columns (n,) or (n, m) white."""
-        white = values.copy()
-        for rows, root in self.blocks:
-            white[rows] = _solved(root, values[rows])
-        return _scaled(self.common, white, 1.0)
+        return _scaled(self.common, self._by_blocks(_solved, values), 1.0)
 
     def adjoint(self, values: FloatArray) -> FloatArray:
         """The transposed transformation of columns."""
-        white = _scaled(self.common[::-1], values, 1.0).copy()
-        for rows, root in self.blocks:
-            white[rows] = _solved(root, white[rows], transposed=True)
-        return white
+        common = _scaled(self.common[::-1], values, 1.0)
+        return self._by_blocks(_solved, common, transposed=True)
 
     def correlate(self, white: FloatArray) -> FloatArray:
         """Give white noise the correlation: the inverse of :meth:`apply`."""
-        values = _scaled(self.common[::-1], white, -1.0).copy()
-        for rows, root in self.blocks:
-            values[rows] = _product(root, values[rows])
-        return values
+        return self._by_blocks(_product, _scaled(self.common[::-1], white, -1.0))
 
     def correlate_adjoint(self, values: FloatArray) -> FloatArray:
         """The transposed of :meth:`correlate`."""
-        moved = values.copy()
+        return _scaled(self.common, self._by_blocks(_product, values, transposed=True), -1.0)
+
+    def _by_blocks(
+        self, change: Callable[..., FloatArray], values: FloatArray, *, transposed: bool = False
+    ) -> FloatArray:
+        """Change columns by the roots of the blocks."""
+        changed = values.copy()
         for rows, root in self.blocks:
-            moved[rows] = _product(root, values[rows], transposed=True)
-        return _scaled(self.common, moved, -1.0)
+            changed[rows] = change(root, values[rows], transposed=transposed)
+        return changed
 
 
 def _scaled(
@@ -71,7 +69,7 @@ class SlowNoise:
     covariance: Decorrelation  # averaged by probability, over the variance of white noise
 
 
-def _solved(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
+def _solved(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatArray:
     """Solve L x = values, or L' x = values."""
     if not is_banded(root):
         return solve_triangular(root, values, lower=True, trans=1 if transposed else 0)
@@ -84,7 +82,7 @@ def _solved(root: FloatArray, values: FloatArray, *, transposed: bool = False) -
     return solve_banded((0, below), upper, values)
 
 
-def _product(root: FloatArray, values: FloatArray, *, transposed: bool = False) -> FloatArray:
+def _product(root: FloatArray, values: FloatArray, *, transposed: bool) -> FloatArray:
     """L times columns, or L' times them."""
     if not is_banded(root):
         return (root.T if transposed else root) @ values

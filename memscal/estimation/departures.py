@@ -316,14 +316,13 @@ class DepartureBasis:
 
 
 def departure_basis(
-    model: ForwardModel,
     fit: GaussianFit,
     reduced: ReducedScan | None = None,
     angular: AngularDepartures | None = None,
 ) -> DepartureBasis:
     """Return the kernels of the fit's own parameters and of every shape about it."""
     # With the scan as reduced about the fit, of the families' best fits, too.
-    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
+    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * fit.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if reduced is None else tuple(_fitted_families(reduced, width))
     flat = fit.jacobian.shape[1] + (angular.count if angular else 0)

@@ -70,12 +70,9 @@ class FieldModel(ForwardModel):
 
     def geometry(self, centres: FloatArray) -> PlaneGeometry:
         """Return distances and places on the grid for trial centres, shape (scans, 2), in m."""
-        centre = np.atleast_2d(centres)[self.points.scan].T
-        offset = np.stack([self.points.x - centre[0], self.points.y - centre[1]])
-        radius = np.hypot(*offset)
-        places = offset[::-1] / self._plane.spacing + self._plane.count / 2
-        towards = -offset / np.where(radius > 0, radius, 1.0)
-        return PlaneGeometry(radius, towards, self.k, False, self.reach, places)
+        plain = super().geometry(centres)
+        places = self.offset(centres)[::-1] / self._plane.spacing + self._plane.count / 2
+        return PlaneGeometry(plain.radius, plain.towards, self.k, False, self.reach, places)
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""

@@ -85,7 +85,7 @@ def wave_table(wave: int, across: bool, reach: float, nodes: bytes) -> WaveTable
 
     k = np.frombuffer(nodes)
     count = int(np.ceil(reach * k[-1] / _TABLE_PHASE)) + 1
-    radii: FloatArray = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
+    radii = reach / count * np.arange(-_DEGREE, count + _DEGREE + 1.0)
     values = _wave(wave, radii, k, across)
     return WaveTable(radii, values, make_interp_spline(radii, values, k=_DEGREE))
 
@@ -208,13 +208,15 @@ class ForwardModel:
         """Weights of the quadrature times the reference of each scan."""
         return [ref.wavenumbers.weights * ref.values for ref in self.references]
 
+    def offset(self, centres: FloatArray) -> FloatArray:
+        """Positions of the points from centres, shape (scans, 2), in m: (2, n)."""
+        return np.stack([self.points.x, self.points.y]) - np.atleast_2d(centres)[self.points.scan].T
+
     def geometry(self, centres: FloatArray) -> Geometry:
         """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
-        centre = np.atleast_2d(centres)[self.points.scan].T
-        dx = self.points.x - centre[0]
-        dy = self.points.y - centre[1]
-        radius = np.hypot(dx, dy)
-        towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
+        offset = self.offset(centres)
+        radius = np.hypot(*offset)
+        towards = -offset / np.where(radius > 0, radius, 1.0)
         across = self.reference.order == ACROSS
         return Geometry(radius, towards, self.k, across, self.reach)
 

@@ -18,7 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry
 from memscal.estimation.outliers import robust_scale
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, evenly, triangular
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import TINY, FloatArray, array_record
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -37,8 +37,8 @@ def gauss_newton(
     # Parameters are scaled to numbers near one.  Steps d of (J'WJ) d = -J'W r, with
     # W = (1 + r^2/c^2)^(-1/2), minimise the soft L1 loss sum 2 c^2 (sqrt(1 + r^2/c^2) - 1), linear
     # from the residual c, ``knee``, on.
-    place: FloatArray = start
-    step: FloatArray = np.zeros_like(start)
+    place = start
+    step = np.zeros_like(start)
     cost = np.inf
     halvings = 0
     for _ in range(_MOST_STEPS):
@@ -145,7 +145,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     drift = root[:, None] * model.straight_columns
     best = np.zeros(0)
     best_cost = np.inf
-    odd: list[FloatArray] = []
+    odd = []
     for sigma, table in zip(widths, tables, strict=True):
         shapes = np.interp(distances, radii, table) * (points.load * root)
         if points.order:
@@ -241,7 +241,7 @@ class GaussianFit:
     @property
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Further rows (c, p) of the jacobian by the curvatures' prior, and their residuals."""
-        rows = self.points.prior_rows(self.jacobian.shape[1])
+        rows = self.points.prior_rows[:, : self.jacobian.shape[1]]
         curvature = self.drift[self.drift.size - len(rows) :]
         return rows, -rows.sum(axis=1) * curvature
 
@@ -309,10 +309,10 @@ def _solve(
     begin = start / scale
     fit = linearise(model, begin * scale)
     left = points.standardised(points.u - fit.predicted, weights)
-    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + np.finfo(float).tiny)
+    noise = robust_scale(left, 1e-12 * float(np.abs(left).max()) + TINY)
     # The solvers ask for residuals and slopes one after the other, at the same place.
     last = {begin.tobytes(): fit}
-    prior = points.prior_rows(start.size)
+    prior = points.prior_rows
     # Of many points there is room for one.
     del fit
 

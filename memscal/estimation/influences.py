@@ -78,7 +78,7 @@ def _of_lines(estimate: ProfileEstimate) -> dict[str, Influence]:
     second = ((fit.sigma * model.k) ** 2 / 2 * gaussian_transfer(model.k, fit.sigma))[:, None]
     oval = model.around(2, second, second[:, :0], fit.centre)[:, 0]
     away = _OFF * fit.sigma
-    passing = model.geometry(estimate.centres)
+    passing = estimate.model.geometry(estimate.centres)
     beside = replace(passing, radius=np.hypot(passing.radius, away))
     change = model.signal(beside, estimate.kernel) - model.signal(passing, estimate.kernel)
     return {
@@ -130,18 +130,23 @@ def _film_changes(
     tried = {"poisson_ratio": (-2 * _STEP_OF_RATIO, -_STEP_OF_RATIO), "thickness": (-step, step)}
     for name, steps in tried.items():
         if getattr(scan.film, f"{name}_uncertainty") is None:
-            value = getattr(film, name)
-            varied = [set_up._replace(film=replace(film, **{name: value + d})) for d in steps]
-            pairs = zip(varied, steps, strict=True)
-            by_step = [difference(set_up, reference, more, set_up) / d for more, d in pairs]
+            by_step = []
+            for d in steps:
+                varied = set_up._replace(film=replace(film, **{name: getattr(film, name) + d}))
+                by_step.append(difference(set_up, reference, varied, set_up) / d)
             square = (by_step[1] - by_step[0]) / (steps[1] - steps[0])
             changes[name] = (by_step[0] - square * steps[0], square)
+    linear = film.law == LINEAR
     rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     rod = set_up.indenter
     if isinstance(rod, Rod) and is_tabulated(rubber, rod, set_up.load):
-        sticks, slides = stick_and_slide(rubber, rod, set_up.load)
+        own = press_rod(rubber, rod, set_up.load, math.inf if linear else set_up.rod_friction)
         light = press_rod(rubber, rod, _LIGHT * set_up.load, math.inf)
-        changes["film_law"] = (spectrum_difference(reference, sticks, light), nothing)
-        if film.law != LINEAR:
-            changes["rod_friction"] = (spectrum_difference(reference, slides, sticks), nothing)
+        changes["film_law"] = (spectrum_difference(reference, own, light), nothing)
+        if not linear:
+            sticks, slides = stick_and_slide(rubber, rod, set_up.load)
+            # Per newton the difference of rods that are solved at less load grows with the load.
+            grown = set_up.load / sticks.load
+            change = grown * spectrum_difference(reference, slides, sticks)
+            changes["rod_friction"] = (change, nothing)
     return changes

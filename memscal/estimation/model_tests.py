@@ -19,7 +19,7 @@ from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
 
 #: More groups than this are held out several at a time.
@@ -101,7 +101,7 @@ def _predict(
     value = max(left - others, 0.0) / degrees
     if stated:
         return float(chdtrc(degrees, degrees * value)), value, degrees, None
-    value /= max(others / others_degrees, np.finfo(float).tiny)
+    value /= max(others / others_degrees, TINY)
     return float(fdtrc(degrees, others_degrees, value)), value, degrees, others_degrees
 
 
@@ -120,22 +120,24 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     if points.planar or repeats.size == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
     model = residuals.free_model(estimate, clip_outliers=True)
-    axis = np.argmax(points.free[points.scan], axis=1)
-    along = np.where(axis == 0, points.x, points.y)
+    along = points.positions[np.argmax(points.free[points.scan], axis=1), range(points.u.size)]
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
     # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
-    moved = shift[axis, np.arange(axis.size)]
-    own = np.stack([np.ones_like(along), along / np.abs(along).max(), moved], axis=1)
+    own = [
+        np.ones_like(along),
+        along / np.abs(along).max(),
+        shift[np.argmax(points.free[points.scan], axis=1), range(points.u.size)],
+    ]
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
-    common, apart, links = _without_repeats(estimate, model, own, shifted)
-    size: FloatArray = np.linalg.norm(model.design, axis=0)
+    common, apart, links = _without_repeats(estimate, model, np.stack(own, axis=1), shifted)
+    size = np.linalg.norm(model.design, axis=0)
     stack = np.vstack(apart)
     without, rank = _left_over(np.vstack(common), size)
     left, _ = _left_over(stack, size)
     count = int(shifted.sum())
     degrees = model.data.size - 2 * repeats.size - rank - count
-    if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
+    if degrees < FEWEST_RESIDUALS or left == 0.0:
         return None
     coefficients = np.linalg.lstsq(stack[:, :-1] / size, stack[:, -1], rcond=_DEPENDENT)[0] / size
     shifts = []
@@ -214,9 +216,9 @@ class ExtraColumns:
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
-    points = estimate.points
-    dx, dy = estimate.offset
-    side = np.where(points.free[points.scan, 0], dx, dy)
+    side = estimate.offset[
+        np.argmax(estimate.points.free[estimate.points.scan], axis=1), range(estimate.points.u.size)
+    ]
     return _add(estimate, side[:, None] * _widened(estimate, (0.5, 1.0, 1.5)))
 
 
@@ -234,8 +236,9 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     mean = load.mean()
     if np.ptp(load) < _SAME_LOAD * mean:
         return None
-    signal = estimate.predicted - estimate.background
-    return _add(estimate, (signal * (load - mean) / mean)[:, None])
+    return _add(
+        estimate, ((estimate.predicted - estimate.background) * (load - mean) / mean)[:, None]
+    )
 
 
 def hysteresis_test(
@@ -246,7 +249,6 @@ def hysteresis_test(
     # the baseline, in V, whose step would else count as a difference of A.  It is A alone where
     # repeats have centres and baselines of their own.  ``owner`` (n,): the scan, repeats included.
     points = estimate.points
-    model = estimate.model
     owner = points.scan if owner is None else owner
     sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
     for scan in np.unique(owner):
@@ -257,9 +259,13 @@ def hysteresis_test(
         return None
     columns = [estimate.predicted - estimate.background]
     if np.array_equal(owner, points.scan):
-        shift = model.shift_derivative(model.geometry(estimate.centres), estimate.kernel)
-        along = np.argmax(points.free[points.scan], axis=1), range(sign.size)
-        columns += [shift[along], np.ones_like(sign)]
+        shift = estimate.model.shift_derivative(
+            estimate.model.geometry(estimate.centres), estimate.kernel
+        )
+        columns += [
+            shift[np.argmax(points.free[points.scan], axis=1), range(points.u.size)],
+            np.ones_like(sign),
+        ]
     return _add(estimate, sign[:, None] * np.stack(columns, axis=1))
 
 
@@ -279,7 +285,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     jacobian = estimate.gaussian.jacobian
-    count = jacobian.shape[1] - points.ellipse
+    count = estimate.gaussian.jacobian.shape[1] - points.ellipse
     gaussian = jacobian[:, :count] / np.linalg.norm(jacobian[:, :count], axis=0)
     left = (estimate.weighed.residual + estimate.oval)[:, None]
     # What the triangular factor has below the rows of the round columns is free of them.
@@ -290,8 +296,8 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     coefficients = information @ (free.T @ residual)
     fall = float(residual @ free @ coefficients)
     # The adopted noise counts what the columns explain, but it is no less than the stated one.
-    least = 0.0 if points.u_errors is None else estimate.noise_scale**-2
-    share = max(1 - fall / max(float(residual @ residual), np.finfo(float).tiny), least)
+    least = estimate.noise_scale**-2 if points.u_errors is not None else 0.0
+    share = max(1 - fall / max(float(residual @ residual), TINY), least)
     errors = np.sqrt(share * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)
@@ -353,9 +359,9 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) 
         return none
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
-    basis = departure_basis(model, fit, reduced, angular)
+    basis = departure_basis(fit, reduced, angular)
     count = (estimate.outlier_weight * ~plateau)[chosen].sum()
-    least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
+    least = 1.0 if points.u_errors is not None else NUMERICAL_FLOOR * estimate.largest_signal
     weighed = weigh_departures(reduced, basis, count, least_noise=least).average()
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau[chosen] / plateau[chosen].sum()

@@ -22,29 +22,25 @@ _UNEVEN = 4.0
 _NEIGHBOURS = 8
 
 
-def robust_scale(values: FloatArray, least: float = 0.0) -> float:
+def robust_scale(values: FloatArray, least: float) -> float:
     """Standard deviation of a normal distribution by the median absolute value, no less."""
     return max(1.4826 * float(np.median(np.abs(values))), least)
-
-
-def outlier_weights(
-    standardised: FloatArray, threshold: float, least: float = np.finfo(float).tiny
-) -> FloatArray:
-    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
-    # The residuals count in robust standard deviations of their own, of ``least`` or more.
-    z = np.abs(standardised) / robust_scale(standardised, least)
-    return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 
 def point_weights(
     points: ScanPoints, residual: FloatArray, stated: FloatArray, threshold: float
 ) -> FloatArray:
     """Weights of the points by their residuals; over the plane by what neighbours do not share."""
+    # One, and beyond the threshold such that the influence w z falls as 1/z^3.  The residuals count
+    # in robust standard deviations of their own, of ``least`` or more.
+    root = np.sqrt(stated)
     least = _MODEL * float(np.abs(points.u).max() * np.sqrt(np.median(stated)))
     if points.planar:
-        least = robust_scale(residual * np.sqrt(stated), least)
+        least = robust_scale(residual * root, least)
         residual = isolated(points, residual)
-    return outlier_weights(residual * np.sqrt(stated), threshold, least)
+    standardised = residual * root
+    z = np.abs(standardised) / robust_scale(standardised, least)
+    return np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4)
 
 
 class RasterNoise(NamedTuple):
@@ -106,8 +102,6 @@ def isolated(points: ScanPoints, residual: FloatArray) -> FloatArray:
     # An outlier stands alone; where a model misses a sensor's shape, neighbours depart together.
     from scipy.spatial import KDTree
 
-    if not points.planar:
-        return residual
     alone = np.zeros_like(residual)
     for scan in range(points.scans):
         rows = np.flatnonzero(points.scan == scan)

@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.decorrelation import Decorrelation
@@ -121,6 +121,11 @@ class ScanPoints:
         return channel_order(self.channel)
 
     @property
+    def positions(self) -> FloatArray:
+        """Positions of the indenter along x and y, shape (2, n), in m."""
+        return np.stack([self.x, self.y])
+
+    @property
     def scans(self) -> int:
         """How many scans there are."""
         return len(self.free)
@@ -147,15 +152,18 @@ class ScanPoints:
         """Numbers of the scans whose baselines may be curved."""
         return np.flatnonzero(self.curvature)
 
-    def curvatures(self, parameters: int) -> slice:
+    @property
+    def curvatures(self) -> slice:
         """Places of the curvatures among the parameters of a Gaussian fit."""
-        last = parameters - self.ellipse
+        # After A, the width, centres and drifts, and baselines; before an ellipse.
+        last = 2 + 2 * int(self.free.sum()) + self.scans + self.curved.size
         return slice(last - self.curved.size, last)
 
-    def prior_rows(self, parameters: int) -> FloatArray:
+    @property
+    def prior_rows(self) -> FloatArray:
         """Further rows (c, p): readings of the curvatures, zero, with noise as that of a point."""
-        rows = np.zeros((self.curved.size, parameters))
-        rows[:, self.curvatures(parameters)] = np.diag(self.unit / self.curvature[self.curved])
+        rows = np.zeros((self.curved.size, self.curvatures.stop + self.ellipse))
+        rows[:, self.curvatures] = np.diag(self.unit / self.curvature[self.curved])
         return rows
 
     @cached_property
@@ -283,6 +291,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     x_errors = 0.0 if scan.x_errors is None else scan.x_errors
     branch = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     correlation = None if channel_order(channel) else scan.u_zz_correlation
+    count = int(keep.sum())
+    first = np.zeros(count, dtype=np.intp)
     points = ScanPoints(
         x=x[keep],
         y=y[keep],
@@ -291,12 +301,12 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         u_errors=None if errors is None else errors[keep],
         x_errors=np.broadcast_to(x_errors, u.shape)[keep],
         repeat=scan.passes[keep],
-        owner=np.zeros(int(keep.sum()), dtype=np.intp),
-        anew=np.full(int(keep.sum()), scan.position_errors_by_repeat),
+        owner=first,
+        anew=np.full(count, scan.position_errors_by_repeat),
         branch=branch[keep],
-        scan=np.zeros(int(keep.sum()), dtype=np.intp),
+        scan=first,
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
-        missing=int(u.size - keep.sum()),
+        missing=u.size - count,
         decorrelation=None if correlation is None else _decorrelation(correlation, keep),
         channel=channel,
         reading=scan.reading,
@@ -330,8 +340,8 @@ def measured_mask(scan: Scan, channel: str = "zz") -> BoolArray:
 
 def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], tuple[int, ...]]:
     """Return each repeat as a scan of its own, and the number of the scan that it belongs to."""
-    separate: list[Scan] = []
-    owners: list[int] = []
+    separate = []
+    owners = []
     for i, scan in enumerate(scans):
         passes = scan.passes
         measured, readings = np.unique(passes[measured_mask(scan, channel)], return_counts=True)
@@ -364,35 +374,31 @@ _SAME_LOAD = 0.02
 
 def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
     """Split scans whose repeats have loads of their own; return each one's number, too."""
-    split: list[Scan] = []
-    owners: list[int] = []
+    split = []
+    owners = []
     for i, scan in enumerate(scans):
-        groups: list[list[tuple[float, int]]] = []
+        parts = []
         loads = scan.normal_load
-        means = []
         if loads is not None:
             stated = np.isfinite(loads)
-            for number in np.unique(scan.passes[stated]):
-                mean = float(loads[stated & (scan.passes == number)].mean())
-                means.append((mean, int(number)))
-        for load, number in sorted(means):
-            if not groups or load > (1 + _SAME_LOAD) * groups[-1][0][0]:
-                groups.append([])
-            groups[-1].append((load, number))
-        parts = []
-        for group in groups if len(groups) > 1 else []:
-            load = float(np.mean([load for load, _ in group]))
-            u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
-            part = scan.only_passes(sorted(number for _, number in group))
-            parts.append(replace(part, load=load, load_uncertainty=u))
+            numbers = np.unique(scan.passes[stated])
+            means = np.array([loads[stated & (scan.passes == n)].mean() for n in numbers])
+            left = np.argsort(means, kind="stable")
+            while left.size and loads_differ(means):
+                group = left[means[left] <= (1 + _SAME_LOAD) * means[left[0]]]
+                left = left[group.size :]
+                load = float(means[group].mean())
+                u = scan.load_uncertainty and scan.load_uncertainty * load / scan.stated_load
+                part = scan.only_passes(np.sort(numbers[group]))
+                parts.append(replace(part, load=load, load_uncertainty=u))
         split += parts or [scan]
         owners += [i] * max(len(parts), 1)
     return split, tuple(owners)
 
 
-def loads_differ(loads: Sequence[float]) -> bool:
+def loads_differ(loads: ArrayLike) -> bool:
     """Whether loads (N) differ by more than repeats of one load do."""
-    return max(loads) > (1 + _SAME_LOAD) * min(loads)
+    return bool(np.max(loads) > (1 + _SAME_LOAD) * np.min(loads))
 
 
 def grouped(*keys: NDArray[Any]) -> IndexArray:
@@ -456,7 +462,7 @@ def _decorrelation(correlation: FloatArray, keep: BoolArray) -> Decorrelation:
     """Cholesky factors of the correlation of all kept points, repeat by repeat."""
     blocks = []
     first = 0
-    roots: dict[bytes, FloatArray] = {}
+    roots = {}
     for measured in keep.reshape(-1, len(correlation)):
         kept = np.flatnonzero(measured)
         if not kept.size:

@@ -20,7 +20,7 @@ from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import OUTLIER_THRESHOLD, RasterNoise, point_weights, raster_noise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.voltage_map import DENSE, VoltageMap, square_root
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import TINY, BoolArray, FloatArray, IndexArray, array_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.progress import done_with
 
@@ -68,12 +68,6 @@ class ProfileEstimate:
         """Correlation of the noise: as stated, or as found where none is."""
         return self.slow.covariance if self.slow else self.points.decorrelation
 
-    def drawn_noise(self, standard: FloatArray) -> FloatArray:
-        """Noise of the voltages, in V, of independent standard normal draws, (n,) or (n, m)."""
-        factor = self.correlation
-        correlated = standard if factor is None else factor.correlate(standard)
-        return (self.noise / self.outlier_weight**0.5 * correlated.T).T
-
     def scattered(self, numbers: VoltageMap) -> FloatArray:
         """Columns (m, c) of a root of the covariance of numbers, by the voltages' noise."""
         factor = self.correlation
@@ -91,9 +85,12 @@ class ProfileEstimate:
     @cached_property
     def curving(self) -> FloatArray:
         """Errors (p, c) of the posterior's mean where a baseline is curved by its deviation."""
+        return self.curved(self.weighed.gain, self.points.curvatures)
+
+    def curved(self, numbers: VoltageMap, own: slice | list[int]) -> FloatArray:
+        """Errors (m, c) of numbers, the curvatures ``own`` among them, by curved baselines."""
         deviation = self.points.curvature[self.points.curved]
-        errors = self.weighed.gain @ (self.model.curvature_columns * deviation)
-        own = self.points.curvatures(self.gaussian.jacobian.shape[1])
+        errors = numbers @ (self.model.curvature_columns * deviation)
         errors[own] -= np.diag(deviation)
         return errors
 
@@ -115,7 +112,7 @@ class ProfileEstimate:
         if self.raster_noise is not None:
             scatter = self.raster_noise.deviation
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
-        return scatter if self.points.u_errors is None else max(scatter, 1.0)
+        return max(scatter, 1.0) if self.points.u_errors is not None else scatter
 
     @cached_property
     def kernel(self) -> FloatArray:
@@ -156,8 +153,7 @@ class ProfileEstimate:
     def drifts(self) -> FloatArray:
         """Each scan's baseline and change over half the range along x (and y); curvatures (V)."""
         first = 2 + int(self.points.free.sum())
-        last = self.gaussian.jacobian.shape[1] - self.points.ellipse
-        return self.gaussian.drift + self.weighed.mean[first:last]
+        return self.gaussian.drift + self.weighed.mean[first : self.points.curvatures.stop]
 
     def oval_kernel(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
@@ -194,13 +190,16 @@ class ProfileEstimate:
         """What a sensor that is not round adds to the radial profile's voltages, (n,), in V."""
         if not self.points.ellipse:
             return np.zeros_like(self.points.u)
-        radial = self.model.signal(self.model.geometry(self.centres), self.kernel)
-        return self.predicted - self.background - radial
+        return (
+            self.predicted
+            - self.background
+            - self.model.signal(self.model.geometry(self.centres), self.kernel)
+        )
 
     @property
     def uneven(self) -> FloatArray:
         """What references that are not round add to the voltages, shape (n,), in V."""
-        if type(self.model) is ForwardModel:
+        if self.model.sums_waves:
             return np.zeros_like(self.points.u)
         even = ForwardModel(self.points, self.model.references)
         whole = self.model.signal(self.model.geometry(self.centres), self.kernel)
@@ -209,8 +208,7 @@ class ProfileEstimate:
     @property
     def offset(self) -> FloatArray:
         """Position of each point from its scan's centre, shape (2, n), in m."""
-        positions = np.stack([self.points.x, self.points.y])
-        return positions - self.centres[self.points.scan].T
+        return self.model.offset(self.centres)
 
     @cached_property
     def distance(self) -> FloatArray:
@@ -252,10 +250,12 @@ def estimate_profile(
     kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
-    along = np.argmax(points.free[points.scan], axis=1), range(points.u.size)
     # Uncertain positions make noise where U is steep.
-    stated = stated_weights(points, slope[along] * points.x_errors)
-    points = points.sharing_positions(slope[along] * points.x_errors, stated)
+    moved = (
+        slope[np.argmax(points.free[points.scan], axis=1), range(points.u.size)] * points.x_errors
+    )
+    stated = stated_weights(points, moved)
+    points = points.sharing_positions(moved, stated)
     model = replace(model, points=points)
     residual = points.u - fit.predicted
     noise = _least_noise(fit)
@@ -313,17 +313,17 @@ def _weighed(
     reduced = ReducedScan.of(model, fit, weights, rings)
     departures = None
     if rings:
-        kernels = departure_basis(model, fit, reduced).kernels(model.k)
+        kernels = departure_basis(fit, reduced).kernels(model.k)
         radial = reduced.signal(kernels[:, fit.jacobian.shape[1] :])
         columns = (reduced.data, reduced.flat, radial, reduced.rings)
         departures = angular_departures(rings, fit, columns, noise)
-    basis = departure_basis(model, fit, reduced, departures)
+    basis = departure_basis(fit, reduced, departures)
     weighing = bayesian.weigh_departures(reduced, basis, count, least_noise=noise)
     return basis, weighing.average()
 
 
 def log_marginal_likelihood(
-    estimate: ProfileEstimate, inputs: FloatArray | None = None, noise: float = 1.0
+    estimate: ProfileEstimate, inputs: FloatArray, noise: float
 ) -> FloatArray:
     """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,)."""
     # The first is by the hypotheses' priors of the estimate, the second by those of the
@@ -332,9 +332,7 @@ def log_marginal_likelihood(
     # Gaussian of unit variance that is integrated, beside ``noise``, that of a point of weight one.
     points = estimate.points
     weights = estimate.weights
-    volume = 0.0
-    if inputs is not None and inputs.size:
-        points, volume = points.sharing(points.standardised(inputs, weights) / noise)
+    points, volume = points.sharing(points.standardised(inputs, weights) / noise)
     model = forward_model(points, estimate.model.references)
     fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     if not fit.has_width(weights, noise):
@@ -342,7 +340,7 @@ def log_marginal_likelihood(
         return np.full(2, -np.inf)
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
-    basis = departure_basis(model, fit, reduced, angular)
+    basis = departure_basis(fit, reduced, angular)
     least = _least_noise(fit)
     if estimate.raster_noise is not None:
         least = max(least, estimate.raster_noise.deviation)
@@ -459,7 +457,7 @@ def _share(estimate: ProfileEstimate, block: IndexArray) -> float:
     """Share of the variance of A that would go if the parameters of a block were known."""
     covariance = estimate.weighed.covariance
     integrals = estimate.basis.integrals
-    deviation = np.sqrt(np.maximum(np.diag(covariance)[block], np.finfo(float).tiny))
+    deviation = np.sqrt(np.maximum(np.diag(covariance)[block], TINY))
     with_a = (integrals @ covariance)[block] / deviation
     correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
     return float(with_a @ np.linalg.pinv(correlation, hermitian=True) @ with_a)
@@ -486,12 +484,7 @@ def constrained_profile(
         profile = np.append(profile[:-1] - profile[1:], profile[-1])
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
     scale = np.abs(profile).max()
-    # A square root of the covariance, from its correlation matrix: amplitudes differ in size.
-    deviation = np.sqrt(np.maximum(np.diag(estimate.weighed.covariance), 0.0))
-    deviation = np.where(deviation > 0, deviation, 1.0)
-    values, vectors = np.linalg.eigh(estimate.weighed.covariance / np.outer(deviation, deviation))
-    positive = values > 1e-12 * values[-1]
-    root = deviation[:, None] * vectors[:, positive] * np.sqrt(values[positive])
+    root = square_root(estimate.weighed.covariance)
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
     weighed = replace(estimate.weighed, mean=estimate.weighed.mean + root @ z)
     return replace(estimate, weighed=weighed)
@@ -521,7 +514,7 @@ _MOST_LISTED = 10
 def point_messages(estimate: ProfileEstimate) -> list[Message]:
     """Return what was left out of a scan, and which points are outliers, the farthest first."""
     points = estimate.points
-    messages: list[Message] = []
+    messages = []
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
         messages.append(Message("missing_points", text))

@@ -193,7 +193,7 @@ def film_sensitivities(set_up: SetUp, reference: RadialSpectrum) -> Mapping[str,
     # elsewhere.
     set_up = set_up.expected
     film = set_up.film
-    changes: dict[str, FloatArray] = {}
+    changes = {}
     if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
     # At a given load the modulus does not change the stress in a linear film.
@@ -266,7 +266,7 @@ def spectrum_difference(reference: RadialSpectrum, first: Contact, second: Conta
     """Difference of the base stress of two contacts, per newton, at the nodes of a reference."""
     k = reference.wavenumbers.k.tobytes()
     upper, lower = (_base_spectrum(c, k, reference.order) / c.load for c in (first, second))
-    return np.asarray(upper - lower)
+    return upper - lower
 
 
 #: Whose error each is: scans of one film share that of the film.
@@ -280,12 +280,8 @@ _SENSITIVITIES = {
 def difference(set_up: SetUp, reference: RadialSpectrum, more: SetUp, less: SetUp) -> FloatArray:
     """Difference of two rods per newton, scaled from the scan's own rod to the reference."""
     law = law_at_once(set_up)
-    k = reference.wavenumbers.k.tobytes()
-    spectra = []
-    for rod in (more, less, set_up):
-        spectrum = _base_spectrum(press_rod(*rod.under(law)), k, reference.order)
-        spectra.append(spectrum * set_up.load / rod.load)
-    upper, lower, own = spectra
+    rods = (more, less, set_up)
+    upper, lower, own = (rod_spectrum(r, reference, law) * set_up.load / r.load for r in rods)
     # Zero where the scan's own ends.
     share = np.divide(upper - lower, own, out=np.zeros_like(own), where=own != 0)
     return reference.values * share

@@ -17,7 +17,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, gammaincc, gammainccinv
 from memscal.estimation.points import grouped
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.voltage_map import DENSE, orthonormalised, triangular
-from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import TINY, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM, OUTLIER_WEIGHT, chi_square_limit
 
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
@@ -212,7 +212,7 @@ def steps_test(residuals: Residuals) -> TestOutcome:
         limit = float(chdtri(1, share))
     else:
         rest = residuals.degrees - 1
-        value = rest * value / max(float(values @ values) - value, np.finfo(float).tiny)
+        value = rest * value / max(float(values @ values) - value, TINY)
         p_value = float(fdtrc(1, rest, value))
         limit = float(fdtri(1, rest, 1 - share))
     return TestOutcome(math.sqrt(value), math.sqrt(limit), min(count * p_value, 1.0))

@@ -32,13 +32,12 @@ def film_of(stress: BaseStress) -> ElasticFilm | None:
 
 def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     """Choose the reference: the argument, the scan's own, or the rod on the expected film."""
-    known = reference or scan.reference
-    return known or press_rod(*scan.set_up.expected)
+    return reference or scan.reference or press_rod(*scan.set_up.expected)
 
 
 def with_film_of(reference: BaseStress | None, scan: Scan) -> Scan:
     """Return a scan with film and rod if the reference depends on them, else without."""
-    stress = scan.reference if reference is None else reference
+    stress = reference or scan.reference
     if stress is None:
         return scan
     film = film_of(stress)
@@ -125,8 +124,8 @@ def require_same_set_up(
     """Refuse a reference of another film, rod or load than its scan; or return the differences."""
     # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
     # alternative may have another law and friction, which it is given for.
-    given = [scan.reference if r is None else r for scan, r in zip(scans, references, strict=True)]
-    differences: list[str] = []
+    given = [r or scan.reference for scan, r in zip(scans, references, strict=True)]
+    differences = []
     for scan, stress in zip(scans, given, strict=True):
         if stress is not None and stress.form is None:
             differences += _other_set_up(scan, stress, "reference")

@@ -144,7 +144,7 @@ def _placed(right: Tall, factors: FloatArray, rows: IndexArray, count: int) -> T
 
 def _gram(first: Any, second: Any, weight: FloatArray | None = None) -> FloatArray:
     """Products of all columns, by blocks of rows."""
-    total: FloatArray = np.zeros((first.shape[1], *second.shape[1:]))
+    total = np.zeros((first.shape[1], *second.shape[1:]))
     for start in range(0, len(second) if weight is None else weight.size, BLOCK):
         rows = slice(start, start + BLOCK)
         weighted = second[rows] if weight is None else weight[rows, None] * second[rows]

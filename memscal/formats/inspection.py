@@ -39,7 +39,9 @@ _MEASURED_ON = {
 _LAYOUTS: dict[str, dict[str, Record]] = {
     writer.SCAN_SCHEMA: {
         "/entry": records.EXPERIMENT,
-        "/entry/data": records.SCAN_DATA,
+        "/entry/data": record(
+            "NXdata", *records.SCAN_DATA.quantities, *records.TAKEN_FOR_GRANTED.quantities
+        ),
         "/entry/reference": records.REFERENCE_DATA,
         **_MEASURED_ON,
         "/entry/synthetic": records.SYNTHETIC,
@@ -102,12 +104,15 @@ def describe(path: FilePath, *, accept_altered: bool = False) -> dict[str, Any]:
         provenance = []
         for at, layout in _layout(file, schema):
             for place, quantity in listed(layout, file, at):
+                value = place.removesuffix("_errors")
                 if quantity.origin:
                     provenance.append((place, quantity))
                 elif quantity.axes:
                     arrays.append(_array_row(file, place))
-                elif not quantity.key.endswith("_errors"):
-                    quantities.append(_quantity_row(file, place, quantity.key))
+                elif value == place:
+                    quantities.append(_quantity_row(file, place))
+                elif quantity.of is not None and value not in [q["path"] for q in quantities]:
+                    quantities.append(_quantity_row(file, value if file.has(value) else place))
         content["quantities"] = quantities
         content["arrays"] = arrays
         content["checks"] = [
@@ -177,8 +182,8 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
         yield path, records.STRESS_PROFILE
 
 
-def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
-    row: dict[str, Any] = {"path": path, "name": name}
+def _quantity_row(file: SafeFile, path: str) -> dict[str, Any]:
+    row: dict[str, Any] = {"path": path, "name": path.rpartition("/")[2]}
     if file.is_text(path):
         row["value"] = file.text(path)
     else:

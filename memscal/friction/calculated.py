@@ -86,10 +86,11 @@ def external_family(
         transforms = [hankel_transform(cell.r, cell.sigma_zz, k) for cell in row]
         scales = [load / cell.load for load, cell in zip(nominal, row, strict=True)]
         spectra.append(np.multiply(transforms, np.reshape(scales, (-1, 1))))
-    numbers: dict[str, Any] = {}
-    for name in ("depth", "contact_radius", "convergence"):
-        rows = [[getattr(cell, name) for cell in row] for row in grid]
-        numbers[name] = np.array(rows, dtype=np.float64)
+
+    def numbers(name: str) -> FloatArray:
+        """Numbers of all tables, not a number where one is not stated."""
+        return np.array([[getattr(cell, name) for cell in row] for row in grid], dtype=np.float64)
+
     return replace(
         solved,
         name="external",
@@ -97,9 +98,9 @@ def external_family(
         spectra=np.array(spectra),
         # What the tables have beside the contacts solved here counts as proportional to the load.
         by_load=solved.by_load + (spectra - solved.spectra),
-        depths=numbers["depth"],
-        contact_radii=numbers["contact_radius"],
-        convergence=numbers["convergence"],
+        depths=numbers("depth"),
+        contact_radii=numbers("contact_radius"),
+        convergence=numbers("convergence"),
         notes=("Sensitivities are those of the contacts that memscal calculates.",),
     )
 

@@ -26,7 +26,7 @@ def comparison_checks(
 ) -> tuple[QualityCheck, ...]:
     """Return the checks of every load (one loading has to explain it), and those of all loads."""
     # A noise that was estimated from the scatter about a contact is as large as the misfit.
-    checks: list[QualityCheck] = []
+    checks = []
     for i, by_loading in enumerate(zip(*loads.values(), strict=True), start=1):
         profile = by_loading[0].profile
         outside = 1 - max(load.bracketed for load in by_loading)
@@ -72,7 +72,7 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
 
 def frictionless_check(
     by_loading: Mapping[str, BoundedEstimate],
-    beside: Sequence[Mapping[str, BoundedEstimate]] = (),
+    beside: Sequence[Mapping[str, BoundedEstimate]],
 ) -> QualityCheck:
     """Return the check that the lubricated loads have no friction that moves others ``beside``."""
     # The first of the values is no friction.
@@ -125,19 +125,18 @@ def comparison_messages(
             text = f"contacts{words} have converged to {worst:.1%} of their stress only."
             messages.append(Message("convergence", f"The calculated {text}"))
         messages += [Message("calculated", text) for text in family.notes]
-    unstated: dict[str, float | None] = {}
-    for profile in measured.profiles:
-        film = profile.scan.film
-        indenter = profile.scan.indenter
-        stated = {
-            "Young's modulus": film.young_modulus_uncertainty,
-            "Poisson's ratio": film.poisson_ratio_uncertainty,
-            "film thickness": film.thickness_uncertainty,
-            f"{indenter.shape} radius": indenter.radius_uncertainty,
-            "load": profile.load_uncertainty,
-        }
-        unstated |= {name: value for name, value in stated.items() if value is None}
-    messages += quality.uncertainty_unstated_messages(unstated)
+    # All scans are of one film and one sphere.
+    film = measured.scans[0].film
+    indenter = measured.scans[0].indenter
+    loads = [profile.load_uncertainty for profile in measured.profiles]
+    stated = {
+        "Young's modulus": film.young_modulus_uncertainty,
+        "Poisson's ratio": film.poisson_ratio_uncertainty,
+        "film thickness": film.thickness_uncertainty,
+        f"{indenter.shape} radius": indenter.radius_uncertainty,
+        "load": None if None in loads else loads[0],
+    }
+    messages += quality.uncertainty_unstated_messages(stated)
     return tuple(dict.fromkeys([*messages, *measured.messages]))
 
 

@@ -48,10 +48,7 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
     """Return the scans, and those of which a stress was measured."""
     scans: list[Scan | MeasuredScan] = []
     for item in contacts:
-        if isinstance(item, Scan):
-            scans.append(item)
-        else:
-            scans += item.scans
+        scans += [item] if isinstance(item, Scan) else item.scans
     return scans
 
 
@@ -227,6 +224,13 @@ def compare(
     if lubricated not in (None, FRICTIONLESS, APART):
         problem = f"Lubricated loads cannot be fitted {lubricated!r}."
         raise InputError(problem, cure=f"Give {FRICTIONLESS!r} or {APART!r}, or leave it out.")
+    if lubricated and lubricated_friction not in (0.0, LUBRICATED_FRICTION):
+        problem = (
+            f"Lubricated loads are to be fitted {lubricated!r}, and with a friction of their own."
+        )
+        raise InputError(
+            problem, cure="Leave out lubricated (--lubricated), or lubricated_friction."
+        )
     require_non_negative("friction of lubricated loads", lubricated_friction)
     require_non_negative("gain between scans", between_scan_gain)
     beside = {None: lubricated_friction, FRICTIONLESS: 0.0, APART: None}[lubricated]
@@ -462,15 +466,16 @@ def _loads(
     measured: MeasuredStress, fits: Mapping[str, FrictionFit]
 ) -> dict[str, tuple[LoadComparison, ...]]:
     """Compare each load by each loading; its coefficients are the middle of both."""
-    loads: dict[str, list[LoadComparison]] = {loading: [] for loading in fits}
+    loads = []
     for i, profile in enumerate(measured.profiles):
         by_loading = {loading: load_comparison(profile, fit, i) for loading, fit in fits.items()}
         maxima = with_loading({loading: load.by_maximum for loading, load in by_loading.items()})
         profiles = with_loading({loading: load.by_profile for loading, load in by_loading.items()})
         for loading, load in by_loading.items():
-            counted = replace(load, by_maximum=maxima[loading], by_profile=profiles[loading])
-            loads[loading].append(counted)
-    return {loading: tuple(compared) for loading, compared in loads.items()}
+            by_maximum = maxima[loading]
+            by_loading[loading] = replace(load, by_maximum=by_maximum, by_profile=profiles[loading])
+        loads.append(by_loading)
+    return {loading: tuple(load[loading] for load in loads) for loading in fits}
 
 
 def fit_together(
@@ -510,16 +515,15 @@ def _compared_by_shear(
     channels = channels_of(measured, apparatus, families)
     fits = {loading: fit_friction(channel) for loading, channel in channels.items()}
     overridden = override_messages(measured.overridden)
-    by_shear: dict[str, list[BoundedEstimate]] = {loading: [] for loading in fits}
+    loads = []
     for i in range(len(measured.profiles)):
-        counted = with_loading({loading: fit.coefficient([i]) for loading, fit in fits.items()})
-        for loading, estimate in counted.items():
-            by_shear[loading].append(estimate)
+        by_loading = {loading: fit.coefficient([i]) for loading, fit in fits.items()}
+        loads.append(with_loading(by_loading))
     return FrictionComparison(
         measured=measured,
         friction=next(iter(families.values())).values,
         loads={},
-        by_shear={loading: tuple(each) for loading, each in by_shear.items()},
+        by_shear={loading: tuple(load[loading] for load in loads) for loading in fits},
         joint=fit_together(measured, fits),
         messages=(*overridden, *notes, *synthetic_messages(measured)),
         shear=apparatus,

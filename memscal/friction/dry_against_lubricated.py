@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
@@ -57,7 +56,7 @@ def dry_against_lubricated(
         return None
     common = []
     for points, chosen in zip(averaged, places, strict=True):
-        arrays: dict[str, Any] = {name: getattr(points, name)[chosen] for name in _BY_POINT}
+        arrays = {name: getattr(points, name)[chosen] for name in _BY_POINT}
         if points.correlation is not None:
             arrays["correlation"] = points.correlation[np.ix_(chosen, chosen)]
         common.append(replace(points, **arrays))

@@ -66,7 +66,7 @@ class FrictionFit:
             held = self._near(lubricated)(mean)
             return self._near(chosen)(value).with_held(held, spread / by_coordinate)
 
-        both = replace(along, loads=(*along.loads, *beside.loads))
+        both = self.whole.only([*chosen, *lubricated])
         estimate = self._estimate(both, -2 * logs, chi_square, near)
         budget = dict(estimate.budget)
         interval = estimate.interval
@@ -244,7 +244,6 @@ def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> L
     nodes = np.searchsorted(along.coordinates, family.coordinates - 1e-12)
     chi_square = along.chi_square[nodes]
     deviance = along.deviance
-    measured = profile.s_zz
     return LoadComparison(
         profile=profile,
         loading=family.loading,
@@ -261,7 +260,7 @@ def load_comparison(profile: MeasuredProfile, fit: FrictionFit, index: int) -> L
         deviance=deviance[nodes] - deviance.min(),
         p_values=chdtrc(points.degrees, chi_square),
         degrees=points.degrees,
-        bracketed=bracketed_share(measured, profile.s_zz_errors, calculated, calculated_errors),
+        bracketed=bracketed_share(profile.s_zz, profile.s_zz_errors, calculated, calculated_errors),
         by_maximum=fit.coefficient_of_maximum(profile, index),
         by_profile=fit.coefficient([index]),
     )

@@ -80,7 +80,7 @@ class ProfileFamily(FrozenArrays):
     depths: FloatArray  # (M, L), in m; NaN where unknown, as the next two
     contact_radii: FloatArray  # (M, L), in m
     convergence: FloatArray  # (M, L): largest relative change under refinement
-    notes: tuple[str, ...] = field(default=())  # what was assumed
+    notes: tuple[str, ...] = ()  # what was assumed
     order: int = 0  # one of the shear
     slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
 

@@ -347,15 +347,14 @@ def stacked(
         return arrays
 
     correlations = []
-    contacts: dict[tuple[float, int], int] = {}
-    numbers = []
+    contacts = []
     for channel in points:
         own = np.eye(channel.u.size) if channel.correlation is None else channel.correlation
         correlations.append(own)
         # A contact is known by its place, and by which of those there it is.
         count: Counter[float] = Counter()
         for place in np.round(channel.offset, 12).tolist():
-            numbers.append(contacts.setdefault((place, count[place]), len(contacts)))
+            contacts.append((place, count[place]))
             count[place] += 1
     names = ("u", "offset", "log_load", "noise", "load_errors", "x_errors")
     together = replace(
@@ -363,7 +362,7 @@ def stacked(
         **joined(points, names, axis=0),
         flat=block_diag(normal[0].flat, shear[0].flat),
         correlation=block_diag(*correlations),
-        contacts=np.eye(len(contacts))[numbers],
+        contacts=_own(contacts),
     )
     if points[0].places is not None:
         together = replace(together, places=_own(np.round(together.offset, 12).tolist()))
@@ -428,10 +427,10 @@ class Standardised:
     log_determinant: FloatArray  # (V,): of N and of the flat information
     degrees: int
 
-    def with_column(self, source: str, column: FloatArray) -> Standardised:
+    def with_lubricated_friction(self, column: FloatArray) -> Standardised:
         """Return the load with one systematic column (V, n, 1) more."""
         columns = np.concatenate([self.columns, column], axis=-1)
-        return replace(self, columns=columns, widths={**self.widths, source: 1})
+        return replace(self, columns=columns, widths={**self.widths, LUBRICATED_FRICTION: 1})
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -501,25 +500,18 @@ class Likelihood:
         """Return the likelihood of some of the loads."""
         return replace(self, loads=tuple(self.loads[i] for i in chosen))
 
-    def with_held(self, held: Likelihood, spread: float = 0.0) -> Likelihood:
-        """Add loads that are held at their first value; all share systematic errors.
+    def with_held(self, held: Likelihood, spread: float) -> Likelihood:
+        """Add loads that are held at one value; all share systematic errors.
 
         ``spread`` is the standard uncertainty of that value, in the bounded coordinate.
         """
         loads = []
         for load in self.loads:
             unmoved = np.zeros((*load.slope.shape, 1))
-            loads.append(load.with_column(LUBRICATED_FRICTION, unmoved))
+            loads.append(load.with_lubricated_friction(unmoved))
         for load in held.loads:
-            first = replace(
-                load,
-                residual=load.residual[:1],
-                slope=np.zeros_like(load.slope[:1]),
-                columns=load.columns[:1],
-                log_determinant=load.log_determinant[:1],
-            )
-            moved = spread * load.slope[:1, :, None]
-            loads.append(first.with_column(LUBRICATED_FRICTION, moved))
+            still = replace(load, slope=np.zeros_like(load.slope))
+            loads.append(still.with_lubricated_friction(spread * load.slope[..., None]))
         return replace(self, loads=tuple(loads))
 
     def averaged_over(
@@ -554,14 +546,10 @@ class Likelihood:
         # Chi-square alone would prefer the value with the larger error bars.
         return -2 * log_likelihood(self.statistics)[0]
 
-    @property
-    def information(self) -> FloatArray:
-        """Inverse variance of the bounded coordinate that the likelihood's slope tells, (V,)."""
-        return self._slope_fit()[0]
-
-    def _slope_fit(self) -> tuple[FloatArray, FloatArray]:
+    def slope_fit(self) -> tuple[FloatArray, FloatArray]:
         """Fit the slopes by the systematic columns: what is left, squared, and coefficients."""
-        # By Woodbury's identity, C^-1 = 1 - D (1 + D^T D)^-1 D^T.
+        # What is left, (V,), is the inverse variance of the bounded coordinate.  By Woodbury's
+        # identity, C^-1 = 1 - D (1 + D^T D)^-1 D^T.
         information = self.statistics.information
         square: FloatArray = np.zeros(())
         projection: FloatArray = np.zeros(())
@@ -574,7 +562,7 @@ class Likelihood:
 
     def budget(self) -> dict[str, float]:
         """Contribution of each source to the coordinate's uncertainty, at the first value."""
-        (information, *_), (response, *_) = self._slope_fit()
+        (information, *_), (response, *_) = self.slope_fit()
         if not information > 0:
             return {}
         kinds: dict[str, list[float]] = {}

@@ -121,4 +121,4 @@ def bounded_prior(scale: float) -> Prior:
 def log_uniform_prior(low: float, high: float) -> Prior:
     """Return the prior that gives each decade from ``low`` to ``high`` the same share."""
     whole = math.log(high / low)
-    return lambda values: np.asarray(np.log(np.clip(values, low, high) / low) / whole)
+    return lambda values: np.log(np.clip(values, low, high) / low) / whole

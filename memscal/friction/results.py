@@ -285,7 +285,7 @@ class FrictionComparison(Result, Checked):
     interface: InterfaceComparison | None = None
     macroscopic: tuple[float, float | None] | None = None
     checks: tuple[QualityCheck, ...] = ()
-    messages: tuple[Message, ...] = field(default=())
+    messages: tuple[Message, ...] = ()
     shear: ApparatusFunction | None = None
     by_shear: Mapping[str, tuple[BoundedEstimate, ...]] = field(default_factory=dict)
 

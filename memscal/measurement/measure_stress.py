@@ -19,7 +19,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process, accepted_alterations
-from memscal.model.scan import Scan
+from memscal.model.scan import STATED_ERRORS, Scan
 from memscal.model.sizes import MOST_OF_CORRELATED_CONTACT
 from memscal.parallel import single_threaded
 from memscal.progress import Listener, Task, reported
@@ -307,6 +307,12 @@ def _profile_messages(
             "load_errors_unstated",
             "normal_load_errors is absent: the recorded loads are taken as exact.",
         )
+    # The first two, scale and gain, a comparison counts.
+    others = [n for n in STATED_ERRORS[2:] if getattr(scan, f"{n}_uncertainty")]
+    if others:
+        names = ", ".join(others).replace("_", " ")
+        text = f"Uncertainties that the scan states count in a calibration only: {names}."
+        yield Message("statement_unused", text)
     if not scan.lubrication:
         yield Message("lubrication_unstated", "The scan does not state its lubrication.")
     for message in restored.messages:

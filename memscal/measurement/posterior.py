@@ -216,7 +216,7 @@ def weighed_shapes(shapes: Sequence[PressureShape], start: ProfileEstimate) -> l
     count = float(start.outlier_weight.sum())
     weighed = []
     for shape, fit in zip(shapes, fitted_shapes(shapes, start), strict=True):
-        about = departure_basis(model, fit)
+        about = departure_basis(fit)
         rings = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in about.rings)
         basis = _Basis(fit.conversion_constant, fit.sigma, about.flat, rings, (), None, shape)
         reduced = ReducedScan.of(model, fit, start.weights)

@@ -49,6 +49,8 @@ def _shows_fields(cls: type) -> bool:
     return not any("__repr__" in vars(base) for base in cls.__mro__[:-1])
 
 
+#: In place of zero where a divisor or a logarithm must not be that.
+TINY = float(np.finfo(float).tiny)
 #: Sizes of numbers, in SI units, whose squares and quotients neither overflow nor vanish.
 _SMALLEST = 1e-30
 _LARGEST = 1e30

@@ -77,9 +77,10 @@ class Assumption:
     name : str
         Such as ``roundness``; see docs/assumptions.md.
     state : str
-        ``"assumed"``: taken for granted, and in no uncertainty (of a curved baseline: beyond its
-        prior, which is in the budget); ``"stated"``: the scan states its uncertainty, which is in
-        the budget; ``"measured"``: the scan itself determines it.
+        ``"assumed"``: taken for granted, and in no uncertainty (but for what the budget counts of
+        a curved baseline, of the law and of the rod's friction, where these are not stated);
+        ``"stated"``: the scan states its uncertainty, which is in the budget (or states the law,
+        the rod's friction or the correlation itself); ``"measured"``: the scan determines it.
     sizes : mapping of str to float
         By parameter (``conversion_constant``, ``gaussian_sigma``, ``fwhm``) the size, in m of a
         length, that moves it by one standard uncertainty; infinite where none does.

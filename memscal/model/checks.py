@@ -70,7 +70,7 @@ residual_correlation: correlation of neighbouring residuals
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear
-    look for a tilted rod, an uneven film, a drifting load
+    look for a tilted rod, uneven film, drifting load or lag
 axisymmetry: ellipticity of the sensor or of the contact (rasters)
     contact or sensor is not round; of a calibration G(r) is a mean over directions
 load_linearity: change of A with the load (several loads)

@@ -88,7 +88,7 @@ def of_points(correlation: FloatArray, kept: IndexArray) -> FloatArray:
         return chosen
     # So few points that all are neighbours.
     whole = sum(np.diag(chosen[: kept.size - j, j], -j) for j in range(kept.size))
-    return np.asarray(whole + np.tril(whole, -1).T)
+    return whole + np.tril(whole, -1).T
 
 
 def root_of(correlation: FloatArray) -> FloatArray:

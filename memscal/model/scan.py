@@ -518,7 +518,7 @@ def only_points(scan: Scan, keep: IndexArray, **changes: Any) -> Scan:
 def _rows(scan: Scan, keep: IndexArray, *names: str) -> dict[str, Any]:
     """Return some rows of the readings, of what is stated like them, and of further arrays."""
     stated = {name: getattr(scan, name) for name in (*names, "branch", "u_zz", *LIKE_SIGNAL)}
-    rows: dict[str, Any] = {n: values[keep] for n, values in stated.items() if values is not None}
+    rows = {n: values[keep] for n, values in stated.items() if values is not None}
     rows["channels"] = {name: values[keep] for name, values in scan.channels.items()}
     return rows
 

@@ -85,8 +85,8 @@ class IdealReference:
             far = phase != 0
             return square * np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=far)
         if self.shape == "slit":
-            return np.asarray(self.size * np.sinc(phase / (2 * math.pi)))
-        return np.asarray(np.exp(-0.5 * phase**2) * (2 * square or 1.0))
+            return self.size * np.sinc(phase / (2 * math.pi))
+        return np.exp(-0.5 * phase**2) * (2 * square or 1.0)
 
     def profile(self) -> "StressProfile":
         """Return the profile that a calibration takes, with a table to draw; a point has none."""
@@ -168,7 +168,7 @@ class StressField:
         values = arrays.finite_vector("The field", np.ravel(self.values)).reshape(expected)
         object.__setattr__(self, "values", values)
         border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
-        left = np.abs(border).mean() / max(np.abs(values).max(), np.finfo(float).tiny)
+        left = np.abs(border).mean() / max(np.abs(values).max(), arrays.TINY)
         if left > _BORDER or not values.sum() > _LEAST * np.abs(values).sum():
             raise InputError(
                 f"The field adds up to {values.sum():.3g}, with {left:.1%} of its largest value "
@@ -217,7 +217,7 @@ class StressField:
     def transform(self, k: FloatArray) -> FloatArray:
         """Return the Hankel transform of the mean over directions about the axis."""
         r, total, _ = self._rings(_RINGS)
-        return np.asarray(j0(np.multiply.outer(k, r)) @ total * self.cell_area)
+        return j0(np.multiply.outer(k, r)) @ total * self.cell_area
 
     def unevenness(self, k: FloatArray) -> float:
         """Return the share of the transform up to the last of ``k`` that is not round."""

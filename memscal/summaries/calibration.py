@@ -89,8 +89,7 @@ def answer(result: Calibrated) -> str:
 
 
 def _explanations(apparatus: ApparatusData) -> Sequence[Mapping[str, Any]]:
-    rows: Sequence[Mapping[str, Any]] = apparatus.process.configuration.get("explanations", ())
-    return rows
+    return list(apparatus.process.configuration.get("explanations", ()))
 
 
 def _dominating_law(apparatus: ApparatusData) -> str:
@@ -134,7 +133,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     apparatus = apparatus_of(result)
     parameters = apparatus.parameters
     configuration = apparatus.process.configuration
-    values: dict[str, Any] = {
+    values = {
         "schema_version": "1",
         "method": _method(apparatus) or None,
         **parameters_json(parameters),

@@ -125,13 +125,13 @@ def correlated(comparison: FrictionComparison) -> dict[str, Any]:
     # is common to them; each source moves all coefficients to the same side.
     names = []
     values = []
-    uncertainties = []
+    variances = []
     budgets = []
     for lubrication, loading, estimate in _joint(comparison):
         if estimate.standard_uncertainty is not None:
             names.append(f"friction_{lubrication or 'unstated'}_{loading or 'given'}")
             values.append(estimate.best)
-            uncertainties.append(estimate.standard_uncertainty)
+            variances.append(estimate.standard_uncertainty**2)
             budget = {}
             for source, u in estimate.budget.items():
                 budget[source, lubrication if source in _SCAN_SOURCES else ""] = u
@@ -144,11 +144,9 @@ def correlated(comparison: FrictionComparison) -> dict[str, Any]:
         )
     sources = set().union(*budgets)
     shares = np.array([[budget.get(source, 0.0) for source in sources] for budget in budgets])
-    # The budget is linear; the standard uncertainty is that of the likelihood.
-    shares /= np.maximum(np.linalg.norm(shares, axis=1, keepdims=True), np.finfo(float).tiny)
-    correlation = shares @ shares.T
-    np.fill_diagonal(correlation, 1.0)
-    covariance = correlation * np.outer(uncertainties, uncertainties)
+    covariance = shares @ shares.T
+    # One without a budget has the standard uncertainty of its likelihood.
+    np.fill_diagonal(covariance, variances)
     return correlated_numbers(names, values, covariance)
 
 
@@ -215,7 +213,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
 def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
     """Return an estimate with its fit and its profile likelihood."""
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
-    fit: dict[str, Any] = {} if tested else {"least": None, "p_value": None}
+    fit = {} if tested else {"least": None, "p_value": None}
     return {
         **bounded_json(records.FRICTION, estimate),
         **members(records.ESTIMATE_FIT, estimate, **fit),

@@ -73,7 +73,7 @@ def worst_checks(checks: Iterable[QualityCheck]) -> list[QualityCheck]:
     kinds: dict[str, list[QualityCheck]] = {}
     for check in checks:
         kinds.setdefault(check.kind, []).append(check)
-    shown: list[QualityCheck] = []
+    shown = []
     for kind, made in kinds.items():
         passed = [check for check in made if check.passed]
         shown += [check for check in made if not check.passed]

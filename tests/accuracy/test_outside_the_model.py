@@ -21,10 +21,10 @@ from helpers.outside_study import (
     RUNS,
     NoiseRow,
     StatesRow,
-    calibrated,
     of_rubber,
     outcome,
 )
+from helpers.scans import calibrated
 from scipy.stats import binom, norm
 
 import memscal

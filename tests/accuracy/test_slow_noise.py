@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
 from helpers.outside import FILM, ROUND, A, Noise, correlated, line, scan
-from helpers.outside_study import TRUTHS, calibrated, deviates
+from helpers.outside_study import TRUTHS, deviates
+from helpers.scans import calibrated
 
 from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.model.arrays import FloatArray

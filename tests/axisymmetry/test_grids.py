@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.signal import fftconvolve
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, on_grid
 from memscal.axisymmetry.hankel import radial_spline
@@ -58,18 +57,6 @@ def test_an_integral_counts_each_pixel_of_the_image_once(count: int, seed: int) 
 
 
 @given(seed=SEEDS)
-def test_convolution_on_a_quarter_plane_is_linear_convolution_in_the_plane(seed: int) -> None:
-    # The fields end before half of the grid, so that nothing wraps around.
-    count = 16
-    rng = np.random.default_rng(seed)
-    grid = EvenGrid(count, 0.4)
-    kernel, field = np.zeros((2, count, count))
-    kernel[:7, :7], field[:7, :7] = rng.normal(size=(2, 7, 7))
-    plane = fftconvolve(grid.to_image(kernel), grid.to_image(field), mode="same") * 0.4**2
-    np.testing.assert_allclose(grid.to_image(grid.convolve(kernel, field)), plane, atol=1e-11)
-
-
-@given(seed=SEEDS)
 def test_a_lattice_gives_the_direct_sum_about_its_first_point(seed: int) -> None:
     grid, field = random_field(seed)
     dy, dx = grid.spacing
@@ -92,29 +79,6 @@ def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed:
     np.testing.assert_allclose(np.sort(centred.ravel()), np.sort(field.ravel()), atol=1e-12)
     assert grid.to_image(field) is field
     assert grid.from_image(field) is field
-
-
-@pytest.mark.parametrize("axis", [(0.0, 0.0), (0.07, -0.11), (1.31, 0.9)])
-def test_the_quotient_of_two_displaced_fields_is_centred(axis: tuple[float, float]) -> None:
-    grid = Lattice(centred_axis(81, 0.25, -axis[0]), centred_axis(61, 0.35, -axis[1]))
-    middle = Lattice(centred_axis(81, 0.25), centred_axis(61, 0.35))
-    narrow = grid.forward(unit_gaussian(grid.radius, 0.45))
-    wide = grid.forward(unit_gaussian(grid.radius, 1.0))
-    open_ = np.exp(-(grid.wavenumber**2) * 0.45**2 / 2) > 1e-7
-    quotient = np.divide(wide, narrow, out=np.zeros_like(wide), where=open_)
-    exact = unit_gaussian(middle.radius, np.sqrt(1 - 0.45**2))
-    np.testing.assert_allclose(grid.inverse(quotient), exact, atol=1e-7)
-
-
-@given(seed=SEEDS)
-def test_convolution_on_a_lattice_is_linear_convolution_of_what_does_not_wrap(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    grid = Lattice(centred_axis(17, 0.4, 0.13), centred_axis(15, 0.3, -0.2))
-    kernel, field = np.zeros((2, 15, 17))
-    kernel[4:11, 5:12] = rng.normal(size=(7, 7))
-    field[3:12, 3:14] = rng.normal(size=(9, 11))
-    plane = fftconvolve(kernel, field, mode="same") * 0.4 * 0.3
-    np.testing.assert_allclose(grid.convolve(kernel, field), plane, atol=1e-11)
 
 
 @given(seed=SEEDS, factor=st.sampled_from([1, 3, 5]))

@@ -88,7 +88,6 @@ def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: f
     ("function", "transform", "k_max"),
     [
         (lambda r: (1 + r**2) ** -1.5, lambda k: 2 * np.pi * np.exp(-k), 36.0),
-        (gaussian, lambda k: np.exp(-(k**2) / 2), 9.0),
         # Two Gaussians, one taken off the other: a ring with a hole of no stress.
         (
             lambda r: np.exp(-(r**2) / 4) - np.exp(-(r**2)),

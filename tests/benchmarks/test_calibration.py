@@ -72,6 +72,3 @@ def test_a_calibration_costs_as_much_as_it_has_points() -> None:
     rasters = [simulate(points=side, raster=True, noise=0.003, seed=1) for side in (65, 129)]
     small, large = (lambda s=s: memscal.calibrate(s) for s in rasters)
     show("calibration of a raster of 129 x 129 points, over 65 x 65", turns(large, small, 2), 8)
-
-
-#: Processes start by importing: a second or two, which a few hundred scans outweigh.

@@ -11,6 +11,7 @@ from helpers.outside import ROUND, A, World, elliptic
 from helpers.outside import scan as outside_scan
 
 import memscal
+from memscal.errors import InputError
 from memscal.model.scan import STATED_ERRORS
 
 SIZES = {
@@ -28,6 +29,10 @@ SIZES = {
 def stated(**sizes: float) -> memscal.Scan:
     uncertainties = {f"{name}_uncertainty": size for name, size in sizes.items()}
     return replace(outside_scan(ROUND, 1), **uncertainties)
+
+
+def text_of(apparatus: memscal.ApparatusFunction) -> str:
+    return " ".join(message.text for message in apparatus.process.messages)
 
 
 def test_every_statement_has_a_size_here() -> None:
@@ -114,6 +119,36 @@ def test_a_raster_measures_what_a_line_assumes() -> None:
     assert states["roundness"] == states["line_offset"] == "measured"
 
 
+def test_what_the_budget_counts_unasked_is_listed_with_its_size() -> None:
+    made = memscal.simulate(seed=5, load=0.6)
+    # Half is the largest Poisson's ratio in the table of rods.
+    film = replace(made.film, law="", poisson_ratio_uncertainty=None)
+    apparatus = memscal.calibrate(
+        replace(made, film=film, rod_friction=None), other=False
+    ).apparatus
+    listed = {assumption.name: assumption for assumption in apparatus.assumptions}
+    # Half the difference of the ends, and the whole one, as rectangles.
+    for name, line, ends in (("film_law", "model_form", 3), ("rod_friction", "rod_friction", 12)):
+        for parameter in ("conversion_constant", "gaussian_sigma"):
+            moved = apparatus.parameters.uncertainty(parameter) / listed[name].sizes[parameter]
+            counted = ends**0.5 * apparatus.budget[parameter][line]
+            assert moved == pytest.approx(counted, rel=0.3)
+        assert listed[name].words not in text_of(apparatus)
+    assert listed["poisson_ratio"].words in text_of(apparatus)
+
+
+def test_of_a_relative_constant_no_load_is_taken_for_granted() -> None:
+    scan = replace(stated(), load_uncertainty=None)
+    for relative in (False, True):
+        found = memscal.calibrate(scan, relative=relative).assumptions
+        assert ("load_scale" in {assumption.name for assumption in found}) is not relative
+
+
+def test_an_offset_as_in_another_unit_is_refused() -> None:
+    with pytest.raises(InputError, match="line offset uncertainty of the scan is 100 mm"):
+        memscal.calibrate(stated(line_offset=0.1))
+
+
 def test_assumptions_are_in_file_json_and_text(tmp_path: Path) -> None:
     calibration = memscal.calibrate(stated())
     path = tmp_path / "a.apparatus.h5"
@@ -126,7 +161,7 @@ def test_assumptions_are_in_file_json_and_text(tmp_path: Path) -> None:
     offset = listed[1]["size_for_one_u"]
     assert offset["unit"] == "mm"
     assert 0.1 < offset["value"] < 0.3
-    text = " ".join(message.text for message in calibration.apparatus.process.messages)
+    text = text_of(calibration.apparatus)
     assert "the sensor is round" in text
     assert f"{roundness['size_for_one_u']['value']:.2g}" in text
 
@@ -140,7 +175,12 @@ def test_options_of_import_state_them(run: Run, tmp_path: Path) -> None:
     given += ["--base-slip-uncertainty", "0.1", "--baseline-curvature-uncertainty", "0"]
     given += ["--gain-curvature-uncertainty", "0.01", "--shear-sensitivity-uncertainty", "0.05"]
     columns = ["--x", "x", "--u", "U"]
-    run("import", tmp_path / "t.csv", "-o", tmp_path / "s.h5", *columns, *given)
+    said = run("import", tmp_path / "t.csv", "-o", tmp_path / "s.h5", *columns, *given).out
+    assert "position scale 0.002, gain 0.005" in said
+    assert "line offset 0.1 mm" in said
+    held = run("inspect", tmp_path / "s.h5", "--json").json["quantities"]
+    sizes = {row["name"]: row["standard_uncertainty"] for row in held}
+    assert (sizes["line_offset"], sizes["roundness"]) == (0.1, 0.05)
     read = memscal.read_scan(tmp_path / "s.h5")
     values = {name: getattr(read, f"{name}_uncertainty") for name in STATED_ERRORS}
     assert values == {
@@ -179,6 +219,13 @@ def test_crossed_lines_measure_axis_ratio_and_each_other_s_offset(world: World) 
     assert states["roundness"] == states["line_offset"] == "measured"
     texts = [m.text for m in apparatus.process.messages if m.kind == "line_offset"]
     assert "at 0.30" in texts[0]
+
+
+def test_lines_of_unlike_zeros_measure_no_offset() -> None:
+    along, across = crossed(ROUND)
+    apparatus = memscal.calibrate([along, replace(across, x=across.x + 5e-3)]).apparatus
+    states = {assumption.name: assumption.state for assumption in apparatus.assumptions}
+    assert (states["roundness"], states["line_offset"]) == ("measured", "assumed")
 
 
 def test_points_on_two_lines_are_two_lines() -> None:

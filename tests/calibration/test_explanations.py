@@ -4,6 +4,8 @@ import re
 from dataclasses import replace
 
 import pytest
+from helpers.outside import ROUND
+from helpers.outside import scan as outside_scan
 from helpers.scans import LINEAR_FILM, simulated
 
 import memscal
@@ -27,6 +29,14 @@ def test_a_wrong_thickness_is_named_with_its_size(wrong) -> None:
     assert rows["thickness"]["log_bayes_factor"] > rows["baseline_curvature"]["log_bayes_factor"]
 
 
+def test_a_curved_baseline_is_named_with_its_whole_size() -> None:
+    world = replace(ROUND, parabola=0.03)
+    rows = memscal.calibrate(outside_scan(world, 1)).to_dict()["explanations"]
+    said = next(row for row in rows if row["name"] == "baseline_curvature")["words"]
+    size = re.fullmatch(r"a baseline that bends by (\S+) ± (\S+) of the largest signal", said)
+    assert abs(float(size[1]) - 0.03) < 2 * float(size[2])
+
+
 def test_first_lines_checks_and_report_say_so(wrong) -> None:
     words = wrong.to_dict()["explanations"][0]["words"]
     first, second = wrong.answer().splitlines()
@@ -35,6 +45,7 @@ def test_first_lines_checks_and_report_say_so(wrong) -> None:
     assert second.endswith("or by a cause that is not listed.")
     failed = [check for check in wrong.apparatus.checks if check.name == "gaussian_evidence"]
     assert words in failed[0].meaning
+    assert not any("G is not Gaussian, so" in check.meaning for check in wrong.apparatus.checks)
     assert "ln of the Bayes factor" in wrong.report()
 
 

@@ -144,7 +144,8 @@ def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draw
     assert not {"held_out_scan", "repeat_centres"} & names
     # Drawn as one line about the first centre, by points that no line joins.
     assert saved.reconvolution.x.min() < -7.9e-3
-    assert memscal.monte_carlo(own, draws=4).sources == ("noise", *common.effects)
+    drawn = memscal.monte_carlo(own, draws=4)
+    assert drawn.sources == ("noise", "baseline_curvature", *common.effects)
 
 
 @pytest.mark.parametrize(

@@ -176,19 +176,6 @@ def test_what_cannot_be_used_is_refused_in_words(arguments, words):
         memscal.calibrate(simulated(), **arguments)
 
 
-def shapely(scan: memscal.Scan, method: str, seed: int = 0) -> bool:
-    checks = memscal.calibrate(scan, method=method, seed=seed).apparatus.checks
-    passed = [c.passed for c in checks if c.name.startswith("shape_")]
-    assert len(passed) == 3
-    return all(passed)
-
-
-def test_ripples_are_no_sound_shape():
-    # All of 450 simulated scans failed, while A and the reconvolution were right.
-    kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
-    assert not shapely(simulated(kernel=kernel, seed=0), "white-noise-draw")
-
-
 def test_a_raster_may_miss_whole_rows_and_columns():
     scan = simulated(raster=True, points=21, noise=0.002)
     u = scan.u_zz.copy()

@@ -124,25 +124,6 @@ def test_bands_of_g_and_a_hold_a_sensor_that_is_no_gaussian(name):
     assert np.sum(np.abs(z) < 1.96) >= binom.ppf(CHANCE, count, 0.95)
 
 
-def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side():
-    found = calibrated(shear_scan(seed=3))
-    apparatus = found.apparatus
-    estimate = found.solution.estimate
-    contact = memscal.indent(apparatus.film.expected, apparatus.indenter, load=1.0)
-    r = np.linspace(0.0, 30e-3, 1501)
-    profile = apparatus.predict(r, contact.base_shear(r))
-    side = np.sign(estimate.points.x - estimate.centre[0])
-    expected = side * np.interp(estimate.distance, r, profile) + estimate.background
-    largest = float(np.abs(profile).max())
-    np.testing.assert_allclose(
-        found.solution.deconvolution.predicted, expected, atol=3e-3 * largest
-    )
-    # At larger x than the sensor the film is squeezed towards smaller x: the voltage falls.
-    assert profile.min() < 0 < np.abs(profile).max()
-    assert profile.max() < 0.01 * largest
-    assert 0 < apparatus.predict_uncertainty(r, contact.base_shear(r)).max() < 0.1 * largest
-
-
 def test_convolution_with_a_tangential_g_keeps_a_vector_field_s_zero_on_the_axis():
     apparatus = calibrated(shear_scan(seed=3)).apparatus
     r = np.linspace(0.0, 30e-3, 1501)
@@ -191,8 +172,11 @@ def test_a_line_along_y_calibrates_the_other_channel():
 def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part():
     failed = 0
     for seed in range(8):
-        assert checks_of(shear_scan(seed=seed))["symmetry"].p_value is not None
-        check = checks_of(shear_scan(seed=seed, crosstalk=0.05))["symmetry"]
+        scan = shear_scan(seed=seed)
+        assert checks_of(scan)["symmetry"].p_value is not None
+        # A twentieth of the largest voltage of the shear.
+        channels = {**scan.channels, "u_xz": scan.channels["u_xz"] + 0.009 * scan.u_zz}
+        check = checks_of(replace(scan, channels=channels))["symmetry"]
         failed += not check.passed
     assert failed >= 7
     assert "cross-talk" in check.meaning

@@ -93,7 +93,6 @@ def test_an_altered_file_is_used_by_no_command_unless_that_is_recorded(
 @pytest.mark.parametrize(
     ("scan", "words"),
     [
-        (memscal.simulate(points=5, seed=1), ("5 measured positions", "Scan more positions")),
         (replace(SCAN, indenter=memscal.Rod(radius=1.2e-3)), ("rod's width is 2.4 mm", "of 2 mm")),
         (replace(SCAN, u_zz=-SCAN.u_zz), ("falls by", "sign of u_zz", "--u-sign -1")),
         (

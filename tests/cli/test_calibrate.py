@@ -49,18 +49,16 @@ def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Ru
     assert [f"Overridden: {text}." for text in process.configuration["override"]] == [message.text]
 
 
-def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path):
-    options = ["--method", "tikhonov", "--option", "amplitude=0.5", "-o", "out.h5"]
-    assert run("calibrate", scan, *options, "--json").json["method"] == "tikhonov"
-    configuration = memscal.load_apparatus("out.h5").process.configuration
-    assert configuration["method"] == "tikhonov"
-    assert configuration["options"]["amplitude"] == 0.5
-
-
-def test_the_seed_of_a_draw_is_recorded(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_method_its_options_and_its_seed_reach_the_artifact(
+    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
-    run("calibrate", scan, "--method", "white-noise-draw", "--seed", 6, "-o", "c.h5")
-    assert memscal.load_apparatus("c.h5").process.configuration["seed"] == 6
+    options = ["--method", "white-noise-draw", "--option", "amplitude=0.5", "--seed", 6]
+    told = run("calibrate", scan, *options, "-o", "out.h5", "--json").json
+    configuration = memscal.load_apparatus("out.h5").process.configuration
+    assert told["method"] == configuration["method"] == "white-noise-draw"
+    assert configuration["options"]["amplitude"] == 0.5
+    assert configuration["seed"] == 6
 
 
 def test_the_name_of_the_artifact_keeps_what_is_no_suffix(run: Run, good_scan: Path, folder: Path):

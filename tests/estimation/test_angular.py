@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.rasters import tailed_raster
 from helpers.scans import estimated, simulated
 from scipy.signal import fftconvolve
 
@@ -12,19 +13,9 @@ import memscal
 from memscal.estimation.angular import ORDERS, AngularDepartures, AngularRings
 from memscal.estimation.outliers import raster_noise
 from memscal.estimation.points import measured_points
-from memscal.model.scan import Scan
 
 RADII = np.array([0.3e-3, 0.8e-3])
 ONE_EACH = tuple(np.eye(2) for _ in range(2 * len(ORDERS)))
-
-
-def tailed_raster(*, seed: int, side: int) -> Scan:
-    """Raster of a sensor with a tail along x, and of noise that it does not state."""
-    clean = simulated(raster=True, points=side, half_range=6e-3, noise=0.0)
-    u = clean.u_zz + 0.3 * np.roll(clean.u_zz, side // 8, axis=1)
-    noise = 0.005 * float(u.max())
-    u += np.random.default_rng(seed).normal(0.0, noise, u.shape)
-    return replace(clean, u_zz=u, u_zz_errors=None, synthetic={"noise": noise})
 
 
 def test_kernels_are_blurred_rings_of_their_order() -> None:

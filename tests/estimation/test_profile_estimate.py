@@ -66,20 +66,6 @@ def test_gross_outliers_leave_the_noise_as_it_is() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.02)
 
 
-def test_repeats_narrow_the_uncertainty_as_their_square_root() -> None:
-    # What a baseline may be curved by does not fall with the noise: it is held straight.
-    straight = {"baseline_curvature_uncertainty": 0.0}
-    one = estimated(replace(simulated(seed=5), **straight))
-    nine = estimated(replace(simulated(seed=5, repeats=9), **straight))
-    variances = [
-        np.diag(estimate.gaussian.covariance(estimate.weights, estimate.noise_scale))
-        for estimate in (one, nine)
-    ]
-    ratio = np.sqrt(variances[0] / variances[1])
-    # Up to Birge's ratio, which raises a single scan's stated noise by what its scatter exceeds it.
-    np.testing.assert_allclose(ratio * nine.noise_scale / one.noise_scale, 3.0, rtol=0.02)
-
-
 def test_a_scan_beside_the_sensor_is_refused() -> None:
     with pytest.raises(FitError, match="outside the scan"):
         estimated(simulated(centre=(8.4e-3, 0.0)))

@@ -293,12 +293,6 @@ def test_a_line_of_two_columns_runs_along_the_one_that_spreads(tmp_path: Path, o
     np.testing.assert_allclose(scan.x, [-2e-3, 0, 3e-3])
 
 
-def test_notes_state_rod_and_film(tmp_path: Path):
-    scan = scan_table(tmp_path, LONG, x_unit="um")
-    assert "Rod: radius 0.25 mm" in scan.notes
-    assert "Young's modulus (2.20 ± 0.10) MPa" in scan.notes
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

@@ -81,7 +81,7 @@ def test_repeats_share_the_error_of_their_position(complete: bool) -> None:
     assert there == pytest.approx(generalised(*dense(found, 0.15)), rel=1e-6)
     anew = [replace(each, places=None) for each in found.channel.points]
     apart = likelihood(replace(found.channel, points=anew).at(0.15))
-    assert likelihood(found.channel.at(0.15)).information[0] < apart.information[0]
+    assert likelihood(found.channel.at(0.15)).slope_fit()[0][0] < apart.slope_fit()[0][0]
 
 
 def test_one_load_of_several_is_that_load_alone(laboratory: Laboratory) -> None:
@@ -95,7 +95,7 @@ def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory: Laboratory
     there = likelihood(found.channel.at(0.15))
     budget = there.budget()
     assert set(budget) == {"noise", "load_scatter", "position", "apparatus", "thickness", "load"}
-    variance = 1 / there.information[0]
+    variance = 1 / there.slope_fit()[0][0]
     assert sum(part**2 for part in budget.values()) == pytest.approx(variance, rel=1e-9)
 
 
@@ -111,7 +111,7 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
     found = likelihood(laboratory.channel(points).at(values))
     curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
     assert found.chi_square[1] == pytest.approx(0.0, abs=1e-9)
-    assert curvature == pytest.approx(found.information[1], rel=0.02)
+    assert curvature == pytest.approx(found.slope_fit()[0][1], rel=0.02)
 
 
 def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
@@ -138,7 +138,8 @@ def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
 
 def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory: Laboratory) -> None:
     found = laboratory.drawn(0.15, seed=8)
-    together = found.whole.only([0]).with_held(found.whole.only([1]))
+    frictionless = likelihood(found.channel.only([1]).at(0.0))
+    together = found.whole.only([0]).with_held(frictionless, 0.0)
     for value in (0.0, 0.1, 0.3):
         free, held = (dense(found, each) for each in (value, 0.0))
         size = found.channel.points[0].u.size
@@ -154,7 +155,7 @@ def test_a_load_that_is_held_shares_its_errors_with_the_others(laboratory: Labor
         i = int(np.argmin(np.abs(found.whole.values - value)))
         expected = generalised(residual, noise + shared @ shared.T, flat)
         assert together.chi_square[i] == pytest.approx(expected, rel=1e-6)
-    assert together.information[30] > found.whole.only([0]).information[30]
+    assert together.slope_fit()[0][30] > found.whole.only([0]).slope_fit()[0][30]
 
 
 def predicted_of(found: FrictionFit, value: float) -> list[Predicted]:
@@ -174,6 +175,6 @@ def test_the_most_likely_coefficient_is_right_on_average(friction: float) -> Non
     for seed in range(40 if FULL else 20):
         along = laboratory.drawn(friction, seed).whole
         i = int(np.argmin(along.deviance))
-        errors.append((along.coordinates[i] - t) * np.sqrt(along.information[i]))
+        errors.append((along.coordinates[i] - t) * np.sqrt(along.slope_fit()[0][i]))
     assert abs(np.mean(errors)) < 0.15 + 3.3 * np.std(errors) / np.sqrt(len(errors))
     assert np.std(errors) == pytest.approx(1.0, abs=3.3 / np.sqrt(2 * len(errors)))

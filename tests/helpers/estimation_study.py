@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 from helpers.bounds import FULL, cramer_rao, root_mean_square_limit
 from helpers.direct import Kernel, Tapered, direct_scan
-from helpers.scans import CONVERSION
+from helpers.scans import CONVERSION, calibrated
 from scipy.stats import binom, t
 
 import memscal
@@ -447,7 +447,7 @@ def study(name: str, seeds: int = SEEDS) -> Outcome:
     rows = []
     z = []
     for seed in range(seeds):
-        apparatus = memscal.calibrate(case.scan(seed), method=METHOD).apparatus
+        apparatus = calibrated(case.scan(seed), method=METHOD).apparatus
         rows.append(errors_of(case, seed, apparatus))
         p = apparatus.parameters
         width = half_width(case.drawn(seed)[0])

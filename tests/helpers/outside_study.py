@@ -11,8 +11,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 from helpers import two_states
@@ -20,11 +18,11 @@ from helpers.bounds import FULL
 from helpers.direct import LOADS, TABLE, base_stresses
 from helpers.outside import ROUND, SIGMA, A, Noise, World, correlated, elliptic, lobe, tail
 from helpers.outside import scan as perturbed_scan
+from helpers.scans import calibrated
 from scipy.interpolate import make_interp_spline
 from scipy.special import j0
 
-import memscal
-from memscal import ApparatusFunction, Calibration, Scan
+from memscal import ApparatusFunction, Scan
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 
@@ -39,12 +37,6 @@ _RATIO = 1.25
 COUNTED = 1.4
 ALARMED = 0.9
 NAMED = 1.5
-
-
-def calibrated(scan: Scan, **options: Any) -> Calibration:
-    """Calibrate a scan, and spend no time on what explains the checks that it fails."""
-    with patch("memscal.calibration.calibrate.explained", lambda _, checks: (checks, [])):
-        return memscal.calibrate(scan, **options)
 
 
 def deviates(parameters: ParameterSet, truths: dict[str, float] = TRUTHS) -> list[float]:

@@ -212,12 +212,6 @@ def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
     assert found.process.configuration["override"] == list(found.overridden)
 
 
-def test_films_that_agree_within_their_uncertainties_are_one() -> None:
-    film = replace(made.EXACT_FILM, thickness=2.08e-3, thickness_uncertainty=0.05e-3)
-    found = memscal.measure_stress(replace(made.contact_scan(load=(1.37,)), film=film), SENSOR)
-    assert found.overridden == ()
-
-
 def spoilt(row: int, columns: slice) -> Scan:
     scan = made.contact_scan()
     u = scan.u_zz.copy()
@@ -241,6 +235,12 @@ def test_a_few_missing_points_are_no_gap() -> None:
     found = memscal.measure_stress(spoilt(3, slice(14, 16)), SENSOR)
     assert found.profiles[3].r.size == 31
     assert any("2 points of the scan are missing" in message.text for message in found.messages)
+
+
+def test_what_only_a_calibration_counts_is_named() -> None:
+    scan = replace(made.contact_scan(load=(1.37,)), roundness_uncertainty=0.1, gain_uncertainty=0.1)
+    found = memscal.measure_stress(scan, SENSOR)
+    assert any(m.text.endswith("in a calibration only: roundness.") for m in found.messages)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

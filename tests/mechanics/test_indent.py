@@ -20,16 +20,6 @@ def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
     return indent(film(nu), Rod(radius=radius), load=0.5, friction=friction)
 
 
-@pytest.mark.parametrize("radius", [0.25e-3, 4e-3])
-@pytest.mark.parametrize(("nu", "friction"), CASES)
-def test_the_base_carries_the_load(nu, friction, radius) -> None:
-    contact = press(nu, friction, radius)
-    r, weights = gauss_panels(radius + 40 * 2e-3, 4e-3)
-    force = 2 * np.pi * np.sum(weights * r * contact.base_stress(r))
-    assert force == pytest.approx(0.5, rel=1e-9)
-    assert 2 * np.pi * contact.traction.pressure_transform(np.zeros(1))[0] == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize("friction", [0.0, math.inf])
 def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction) -> None:
     contact = indent(FILM, ROD, load=0.5, friction=friction)

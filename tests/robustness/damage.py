@@ -1,7 +1,5 @@
 """Damage to valid files: bytes, values of HDF5 with the digest made anew, cells of tables."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 from collections.abc import Callable, Sequence

@@ -3,8 +3,6 @@
 The whole campaign, of 100,000 inputs, is ``nox --session robustness``.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import resource

@@ -3,8 +3,6 @@
 The whole campaign is ``nox --session robustness``.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

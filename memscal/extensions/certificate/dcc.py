@@ -59,6 +59,10 @@ def _texts(certificate: Certificate) -> dict[str, str]:
     begin = conditions["start_time"][:10]
     t = conditions["temperature"]
     humidity = conditions["humidity"]
+    assumptions = []
+    for each in certificate.apparatus.assumptions:
+        size = f"{each.measure}: {each.size_text('conversion_constant')}"
+        assumptions.append(f"{each.sentence} {each.state.capitalize()}; {size}.")
     texts = {}
     for section in ("laboratory", "customer", "person", "sensor"):
         for key in SECTIONS[section]:
@@ -72,6 +76,7 @@ def _texts(certificate: Certificate) -> dict[str, str]:
         "issued": certificate.issued,
         "accreditation": certificate.accreditation,
         "quality": " ".join(certificate.warnings) or "No check failed.",
+        "assumptions": " ".join(assumptions) or "None is recorded.",
         "method": str(process.configuration.get("method", "not stated")),
         "temperature": _numbers(t.value - ZERO_CELSIUS),
         "temperature_expanded": _numbers(COVERAGE_FACTOR * t.uncertainty),

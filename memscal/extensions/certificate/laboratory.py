@@ -140,8 +140,7 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     for kind in KINDS:
         if sum(item.get("kind") == kind for item in listed) > 1:
             raise FormatError(f"{name} has more than one {kind}.", cure="Leave all but one out.")
-    known = [section for section in NEEDED if section != "equipment"]
-    known += ["decision", "uncertainties"]
+    known = [*NEEDED, "decision", "uncertainties"]
     for section in content:
         _require_known(name, section, known)
     sections = {key: _section(f"{name}: [{key}]", key, item) for key, item in content.items()}

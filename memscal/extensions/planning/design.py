@@ -183,7 +183,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     weights = 1 / points.u_errors**2
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
     reduced = ReducedScan.of(model, fit, weights)
-    basis = departure_basis(model, fit, reduced)
+    basis = departure_basis(fit, reduced)
     count = float(plan.repeats * weights.size)
     weighed = weigh_departures(reduced, basis, count, expected_noise=1.0).average()
     ones = np.ones_like(weights)

@@ -21,7 +21,7 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.notation import Reading, format_measured
 from memscal.model.old_keywords import with_old_keywords
 from memscal.model.quantities import dimension_in
-from memscal.model.records import FILM, LOAD, ROUND_INDENTER
+from memscal.model.records import FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
 from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
 from memscal.readings.dead_rows import without_dead_rows
@@ -367,6 +367,7 @@ def _scan_of(
     if "u_zz_errors" in columns:
         noise = f"{reading.text(np.nanmedian(columns['u_zz_errors']))} (median)"
     notes.append(f"Standard uncertainty of each reading: {noise}.")
+    notes += _granted_in_words(stated)
     messages = import_notes(notes)
     if "y" not in columns and "normal_load" in columns:
         messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), conditions.indenter)
@@ -440,6 +441,19 @@ def _set_up_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
                 value = format_measured(value / scale, u and u / scale, quantity.unit)
             words.append(f"{quantity.words} {value}")
         yield f"{name.capitalize()}: {', '.join(words) or 'not stated'}."
+
+
+def _granted_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which uncertainties are stated of what a scan else takes for granted."""
+    words = []
+    for quantity in TAKEN_FOR_GRANTED.quantities:
+        name = quantity.name.removesuffix("_uncertainty")
+        value = stated.get(quantity.name)
+        if name != quantity.name and value is not None:
+            size = f"{value / quantity.scale:.4g} {quantity.unit}".rstrip()
+            words.append(f"{name.replace('_', ' ')} {size}")
+    if words:
+        yield f"Standard uncertainties: {', '.join(words)}."
 
 
 def _direction(columns: Columns, notes: list[str]) -> str:

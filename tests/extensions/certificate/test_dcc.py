@@ -133,6 +133,11 @@ def test_values_uncertainties_and_covariance_are_those_of_the_artifact(root, app
     assert numbers(region, "si:coverageFactorXMLList") ** 2 == pytest.approx(12.592, abs=1e-3)
 
 
+def test_what_is_assumed_stands_among_the_statements(root, apparatus):
+    declared = [element.text or "" for element in root.iterfind(".//dcc:declaration/*", NAMES)]
+    assert any(apparatus.assumptions[0].sentence in text for text in declared)
+
+
 def test_the_profile_is_that_of_the_page(root, certificate):
     r, g = root.findall(".//dcc:result[2]//si:realListXMLList", NAMES)
     np.testing.assert_allclose(numbers(r, "si:valueXMLList"), 1e3 * certificate.profile.r)

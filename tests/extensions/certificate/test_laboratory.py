@@ -22,6 +22,7 @@ def written(folder: Path, text: str) -> Path:
     ("text", "words"),
     [
         ("[laboratories]\nname = 'a'", "Did you mean laboratory?"),
+        ("[load_cell]\nname = 'a'", "equipment, conditions, decision"),
         ("[sensor]\nserial_number = '1'", "Did you mean serial?"),
         ("[decision]\ngaussian_sigm = {lower = 1, unit = 'mm'}", "Did you mean gaussian_sigma?"),
         ("[laboratory]\nname = 5", "[laboratory] name is 5, but should be text"),

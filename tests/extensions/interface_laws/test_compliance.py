@@ -47,7 +47,7 @@ def relative_uncertainty(length: float, precision: Precision) -> float:
     points = read_without_error(family, length, precision)
     curve = likelihood(measured(points, family).at(length))
     t = bounded(length, family.scale)
-    return float(1 / np.sqrt(curve.information[0])) / (t * (1 - t))
+    return float(1 / np.sqrt(curve.slope_fit()[0][0])) / (t * (1 - t))
 
 
 @pytest.mark.parametrize("length", [7e-6, 50e-6])

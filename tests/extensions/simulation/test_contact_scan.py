@@ -59,13 +59,6 @@ def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads():
         assert scan.u_zz[i] == pytest.approx(1e-7 * float(np.sum(weight * stress)), rel=1e-4)
 
 
-def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads():
-    heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
-    np.testing.assert_allclose(heavy.u_zz, simulate_contacts(load=[1.1], **EXACT).u_zz, rtol=1e-12)
-    assert (heavy.load, truth(heavy)["load_1"]) == pytest.approx((1.0, 1.1))
-    np.testing.assert_array_equal(heavy.normal_load, np.ones(33))
-
-
 @pytest.mark.parametrize(
     ("options", "error", "problem"),
     [
@@ -142,6 +135,7 @@ def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_one
         assert getattr(found.dry.film, name) == getattr(PAPER_FILM, name)
     assert (found.dry.indenter, found.rod.indenter) == (PAPER_SPHERE, PAPER_ROD)
     assert (found.dry.load, found.rod.load) == (0.69, 1.0)
+    np.testing.assert_array_equal(found.dry.normal_load, np.full(9, 0.69))
     assert found.rod.load_uncertainty == pytest.approx(0.01)
     assert told["load_1"] == pytest.approx(0.69 * told["load_scale"])
     film = replace(PAPER_FILM, **{name: told[name] for name in names})

@@ -72,21 +72,13 @@ def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int):
     assert not np.array_equal(first, simulate(points=17, seed=seed + 1).u_zz)
 
 
-def test_several_loads_give_a_repeat_each_in_proportion():
-    options: dict[str, Any] = {"repeats": 2, "points": 17, "film": LINEAR_FILM}
-    scan = simulate(load=[0.34, 0.69, 1.37], load_uncertainty=0.02, **options, **STILL)
-    assert (scan.kind, scan.u_zz.shape) == ("repeats", (6, 17))
-    loads = np.array([0.34, 0.34, 0.69, 0.69, 1.37, 1.37])
-    np.testing.assert_array_equal(scan.normal_load, np.tile(loads[:, None], 17))
-    np.testing.assert_allclose(scan.u_zz / loads[:, None], np.tile(scan.u_zz[0] / 0.34, (6, 1)))
-    assert scan.load == pytest.approx(0.8)
-    assert scan.load_uncertainty == pytest.approx(0.016)
-
-
-def test_the_rod_is_pressed_by_the_law_at_each_load():
+def test_several_loads_give_repeats_of_a_rod_pressed_by_the_law_at_each():
     options: dict[str, Any] = {"points": 17, "half_range": 4e-3, **STILL}
     loads = [0.1, 1.0]
-    scan = simulate(load=loads, repeats=2, **options)
+    scan = simulate(load=loads, repeats=2, load_uncertainty=0.02, **options)
+    assert (scan.kind, scan.load) == ("repeats", pytest.approx(0.55))
+    assert scan.load_uncertainty == pytest.approx(0.011)
+    np.testing.assert_array_equal(scan.normal_load[:, 5], np.repeat(loads, 2))
     for rows, load in zip((scan.u_zz[:2], scan.u_zz[2:]), loads, strict=True):
         np.testing.assert_allclose(rows, [simulate(load=load, **options).u_zz] * 2, rtol=1e-9)
     light = scan.u_zz[0].max() / loads[0]
