@@ -166,7 +166,7 @@ def _varying_gain(estimate: ProfileEstimate) -> float:
         return 0.0
     lines = estimate.model.straight_columns
     columns = np.column_stack(
-        [(estimate.predicted - estimate.background), estimate.weighed.residual, lines]
+        [estimate.predicted - estimate.background, estimate.weighed.residual, lines]
     )
     columns = points.standardised(columns, estimate.weights / estimate.noise_scale**2)
     products = []
