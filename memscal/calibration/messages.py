@@ -21,7 +21,11 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Lines of the budget that count what is not stated.
-_LINES = {"film_law": "model_form", "rod_friction": "rod_friction"}
+_LINES = {
+    "baseline_curvature": "baseline_curvature",
+    "film_law": "model_form",
+    "rod_friction": "rod_friction",
+}
 
 
 def calibration_messages(
