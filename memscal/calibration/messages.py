@@ -93,7 +93,7 @@ def calibration_messages(
         messages.append(Message("convergence_unstated", text))
     if form is None:
         messages += _law(solution, results) + _unstated(solution)
-    messages += _assumed(assumptions, results.changes)
+    messages += _assumed(assumptions, results.budget["conversion_constant"])
     if solution.scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
