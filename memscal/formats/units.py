@@ -38,6 +38,7 @@ _POWERS = {
     "angle": {"rad": 0},
     "energy": {"J": 0},
     "temperature": {"K": 0},
+    "time": {"s": 0, "ms": -3},
     "stress per length": {"MPa/mm": 9},
     "dimensionless": dict.fromkeys(("1", "", *ARBITRARY), 0),
 }

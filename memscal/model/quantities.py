@@ -43,6 +43,7 @@ DIMENSIONS = {
     "angle": Dimension("rad", "rad", "rad", 1.0),
     "energy": Dimension("J", "J", "J", 1.0),
     "temperature": Dimension("K", "K", "K", 1.0),
+    "time": Dimension("s", "s", "s", 1.0),
     "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
 

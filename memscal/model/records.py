@@ -127,6 +127,7 @@ SCAN_DATA = record(
         Quantity("u_xz_errors", _U, "noise of the channel xz"),
         Quantity("u_yz", _U, "voltage of the channel yz", "U_yz"),
         Quantity("u_yz_errors", _U, "noise of the channel yz"),
+        Quantity("time", "time", "time from the first reading", "t"),
     ),
     signal="u_zz",
 )

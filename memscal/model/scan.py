@@ -24,7 +24,7 @@ from memscal.model.notation import Reading
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
-LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors")
+LIKE_SIGNAL = ("u_zz_errors", "normal_load", "normal_load_errors", "time")
 """Arrays of a scan that have the shape of its readings, where they are stated."""
 
 LUBRICATIONS = ("", "dry", "lubricated")
@@ -188,6 +188,8 @@ class Scan:
     normal_load, normal_load_errors : ndarray, shape of ``u_zz``, optional
         Load at each point where it was recorded, and its standard uncertainty, independent from
         point to point, in N.
+    time : ndarray, shape of ``u_zz``, optional
+        Time of each reading from the first one, in s; NaN where it is not known.
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from position to position, in m.
     position_errors_by_repeat : bool
@@ -257,6 +259,7 @@ class Scan:
     u_zz_errors: FloatArray | None = None
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
+    time: FloatArray | None = None
     x_errors: FloatArray | None = None
     position_errors_by_repeat: bool = False
     u_zz_correlation: FloatArray | None = None
@@ -463,9 +466,11 @@ class Scan:
         return array
 
     def _check_values(self) -> None:
-        if np.any(np.isinf(self.u_zz)):
-            problem = "u_zz holds an infinite voltage."
-            raise InputError(problem, cure="Mark missing points with NaN.")
+        for name, kind in (("u_zz", "voltage"), ("time", "time")):
+            values = getattr(self, name)
+            if values is not None and np.any(np.isinf(values)):
+                problem = f"{name} holds an infinite {kind}."
+                raise InputError(problem, cure="Mark missing points with NaN.")
         for name in ("u_zz_errors", "normal_load_errors"):
             errors = getattr(self, name)
             if errors is not None and np.any((errors < 0) | np.isinf(errors)):

@@ -52,6 +52,7 @@ def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
         branch=count % 3,
         film=film,
         normal_load_errors=errors,
+        time=np.where(count % 33 == 4, np.nan, 0.25 * count),
         lubrication="lubricated",
         lubricant="glycerol, 99 %",
         direction="x" if kind == "raster" else direction,
@@ -67,6 +68,7 @@ def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
     assert found.source == SourceFile("scan.h5", hashlib.sha256(path.read_bytes()).hexdigest())
     with h5py.File(path) as file:
         assert file["/entry/data/normal_load_errors"].attrs["units"] == "N"
+        assert file["/entry/data/time"].attrs["units"] == "s"
         assert "1 approach, 2 retreat" in file["/entry/data/branch"].attrs["meaning"]
 
 
