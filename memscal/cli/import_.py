@@ -76,9 +76,34 @@ extra tables: pip install "memscal[tables]".
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
-_COLUMNS = ("x", "y", "u", "u_errors", "u_xz", "u_yz", "load_column", "depth", "repeat", "branch")
+_COLUMNS = (
+    *(
+        "x",
+        "y",
+        "u",
+        "u_errors",
+        "u_xz",
+        "u_yz",
+        "load_column",
+        "depth",
+        "repeat",
+        "branch",
+        "time",
+    ),
+)
 _OF_HOLDS = ("depth", "depth_unit", "baseline")
-_LAYOUT = ("x_unit", "u_unit", "load_unit", "u_sign", "holds", "ceiling", "scan", *_OF_HOLDS[1:])
+_LAYOUT = (
+    "x_unit",
+    "u_unit",
+    "load_unit",
+    "time_unit",
+    "u_sign",
+    "holds",
+    "ceiling",
+    "scan",
+    *_OF_HOLDS[1:],
+)
+_MADE = ("speed", "step")
 _CONDITIONS = ("rod_friction", "lubrication", "lubricant", "title")
 _UNCERTAINTIES = ("noise", "load_uncertainty", "position_errors_by_repeat")
 #: Powers of ten of the units in which what a scan takes for granted is stated.
@@ -104,6 +129,7 @@ _ONLY = {
         *_TAKEN_FOR_GRANTED,
         "load_scatter",
         "position_error",
+        *_MADE,
         "figures",
         "laboratory",
         *_SENSOR_NAMES.values(),
@@ -132,6 +158,17 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 )
 @option("--y", "COLUMN")(
     "Scan: column of the second position, of points in a plane, or of a line along y."
+)
+@option("--time", "COLUMN")("Scan: column of the time of each reading, which is kept.")
+@option("--time-unit", "UNIT")(
+    "Scan: unit of the times, s or ms.  [default: that of the column's head]"
+)
+@option("--speed", Quantity("mm/s", low=-float("inf")))(
+    "Scan without positions: speed of the stage, in mm/s. The position is speed times time."
+)
+@option("--step", Quantity("mm"))(
+    "Scan: distance of neighbouring places, in mm. They are counted by --x or, with --holds and "
+    "without --x, by the presses of the load or the depth."
 )
 @option("--u-errors", "COLUMN")("Scan: column of each reading's standard uncertainty.")
 @option("--noise", Quantity("unit of u"))(
@@ -328,8 +365,10 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
     needed = list(_NEEDED[kind])
     if kind == "reference":
         needed += _NEEDED_WITH_MESH if mesh else _TABLE_ONLY
-    elif options["y"] is not None:
-        needed.remove("x")
+    elif not _stated(options, ("x", "u")) and hook("kind_of_record")(path) == "HDF5 file":
+        needed = []  # but what it plots
+    elif _stated(options, ("y", "time", *_MADE)):
+        needed.remove("x")  # the library knows what they need, and says it
     missing = [name for name in needed if options[name] is None]
     if missing:
         raise click.UsageError(
@@ -393,7 +432,10 @@ def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     return import_table(
         path,
         **_stated(options, _COLUMNS),
-        layout=TableLayout(**_stated(options, (*_LAYOUT, *_READING))),
+        layout=TableLayout(
+            **_stated(options, (*_LAYOUT, *_READING)),
+            **{name: si(options[name], -3) for name in _MADE},
+        ),
         conditions=conditions,
         uncertainties=uncertainties,
     )

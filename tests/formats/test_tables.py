@@ -513,27 +513,35 @@ def test_a_typographic_minus_is_one_and_d_begins_a_power_of_ten(tmp_path: Path):
     assert np.isnan(found.u_zz).sum() == 1
 
 
+TIMED = {"t (ms)": 1e12 + 125 * np.arange(4.0), "x (mm)": [1, 0, 0, 1], "n": [1, 1, 2, 2]}
+TIMED |= {"U (mV)": np.arange(4.0), "back (s)": [0, 2, 1, 3]}
+
+
+def test_times_stay_with_their_readings_and_make_positions_of_a_speed():
+    moved = import_table(TIMED, u="U", time="t", layout=TableLayout(speed=-2e-3))
+    np.testing.assert_allclose(moved.x, -0.25e-3 * np.arange(4), atol=1e-9)
+    rows = import_table(TIMED, x="x", u="U", time="t", repeat="n")
+    np.testing.assert_allclose(rows.time, [[0.125, 0], [0.25, 0.375]])
+    np.testing.assert_allclose(rows.only_passes(1).time, [[0.25, 0.375]])
+
+
 @pytest.mark.parametrize(
-    ("begun", "scan", "place"),
-    [((1, 2, 3), 2, 1), ((3, 5, 9), 5, 1), ((3, 5, 9), 3, 0), ((7, 8, 9), 3, 2), ((4,), None, 0)],
+    ("named", "layout", "cure"),
+    [
+        ("time=t", {}, "--speed"),
+        ("", {"speed": 1.0}, "--time"),
+        ("time=t x=x", {"speed": 1.0}, "leave out"),
+        ("time=t repeat=n", {"speed": 1.0}, "--repeat"),
+        ("time=back", {"speed": 1.0}, "back in row 3"),
+        ("time=n x=x", {}, "--time-unit"),
+        ("", {"step": 1e-3}, "--x COLUMN"),
+        ("x=x", {"step": 1e-3}, "dimensionless"),
+    ],
 )
-def test_one_scan_of_a_file_is_read_and_several_are_refused(begun, scan, place, tmp_path: Path):
-    """By the number after #S, else counted; names hold single blanks, and motors differ."""
-    path = tmp_path / "run.spec"
-    blocks = [
-        f"#S {n}  ascan\n#N 3\n#L Motor {i}  Epoch  Sensor zz\n"
-        + "".join(f"{x} {9 + x} {10 * i + x}\n" for x in range(-4, 5))
-        for i, n in enumerate(begun)
-    ]
-    path.write_text("#F run\n\n" + "\n".join(blocks))
-    names: Any = {"x": f"Motor {place}", "u": "Sensor zz"}
-    units: Any = {"x_unit": "mm", "u_unit": "mV"}
-    read = import_table(path, **names, layout=TableLayout(**units, scan=scan))
-    np.testing.assert_allclose(read.u_zz * 1e3, 10 * place + np.arange(-4, 5), atol=1e-12)
-    wrong = {99: "has no scan 99"} if len(begun) == 1 else {None: "several scans"}
-    for number, why in wrong.items():
-        with pytest.raises(FormatError, match=why):
-            import_table(path, **names, layout=TableLayout(**units, scan=number))
+def test_a_log_without_positions_is_refused_with_the_option_that_makes_them(named, layout, cure):
+    columns = dict(text.split("=") for text in named.split())
+    with pytest.raises(InputError, match=cure):
+        import_table(TIMED, u="U", **columns, layout=TableLayout(**layout))
 
 
 @pytest.mark.parametrize(

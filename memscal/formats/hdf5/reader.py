@@ -218,7 +218,7 @@ class SafeFile:
         return item
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
-        key = name.encode("ascii")
+        key = name.encode()
         links = folder.links if isinstance(folder, h5py.h5g.GroupID) else None
         if links is None or not links.exists(key):
             return None

@@ -60,13 +60,16 @@ class NamedColumns:
     """Columns of numbers whose heads may state units; they are read once, part by part."""
 
     names: tuple[str, ...] = ()
+    defaults: Mapping[str, str] = MappingProxyType({})
+    """Columns that the file itself names for some arrays of a scan where none is asked for."""
     source: SourceFile | None = None
     notes: tuple[str, ...] = ()
     others = ""
     """Names of the columns that were not asked for; of a text those that vary in its first rows."""
     decimal: str | None = None
-    #: What a row is called in messages.
+    #: What a row is called in messages, and what cuts a head into the name and its unit.
     _row = "row"
+    _cut = staticmethod(cut_head)
 
     def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
         self._name = name
@@ -118,7 +121,7 @@ class NamedColumns:
         """Return the unit of a column: of its head, of the row of units, or the one given."""
         index = self._index(column)
         below = self._unit_row[index] if index < len(self._unit_row) else ""
-        head = next((u for u in cut_head(self.names[index])[1:] if is_unit(u)), "")
+        head = next((u for u in self._cut(self.names[index])[1:] if is_unit(u)), "")
         if below and head and not same_unit(below, head):
             problem = f"{self.where(column)} has the unit {head!r} in its head, and {below!r}."
             raise InputError(problem, why="One of them is wrong.", cure="Correct the table.")
@@ -160,7 +163,7 @@ class NamedColumns:
     def _index(self, column: str | int) -> int:
         if isinstance(column, str) and self.names.count(column) == 1:
             return self.names.index(column)
-        heads = [cut_head(name)[0] for name in self.names]
+        heads = [self._cut(name)[0] for name in self.names]
         sought = str(column)
         if heads.count(sought) > 1:
             named = [n for n, head in zip(self.names, heads, strict=True) if head == sought]

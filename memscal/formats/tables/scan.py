@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
+from memscal.extensions import hook
 from memscal.formats.tables.columns import NamedColumns, Wanted
+from memscal.formats.tables.positions import (
+    direction_of,
+    make_positions,
+    require_positions,
+)
 from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
@@ -22,7 +28,7 @@ from memscal.model.notation import Reading, format_measured
 from memscal.model.old_keywords import with_old_keywords
 from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
-from memscal.model.scan import BRANCHES, LINE, Scan, branch_numbers, load_groups
+from memscal.model.scan import BRANCHES, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
 from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
@@ -37,15 +43,18 @@ from memscal.readings.mistaken_unit import (
 
 Column = str | int
 Columns = dict[str, NDArray[Any]]
+#: Dimension of a column, its unit as it is stated, the option that states it, and the default.
+Form = tuple[str, str | None, str, str | None]
 
 _RECORDS = {
     "layout": TableLayout,
     "conditions": ScanConditions,
     "uncertainties": ScanUncertainties,
 }
-_U_UNIT = "u_unit (--u-unit)"
+#: What of a layout is for who opens the table.
+_READING = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
 #: Options that name columns, besides x and u.
-_ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz")
+_ARRAYS = ("y", "repeat", "branch", "u_errors", "load_column", "depth", "u_xz", "u_yz", "time")
 #: Words of a column that tells when the indenter presses.
 _PRESSING = {"false": 0.0, "true": 1.0}
 #: Positions closer than this share of the typical spacing are probably one place, and a table with
@@ -73,7 +82,7 @@ class ImportedScan(Scan):
 def import_table(
     source: Any,
     *,
-    u: Column,
+    u: Column | None = None,
     x: Column | None = None,
     y: Column | None = None,
     u_errors: Column | None = None,
@@ -83,6 +92,7 @@ def import_table(
     depth: Column | None = None,
     repeat: Column | Sequence[Column] | None = None,
     branch: Column | None = None,
+    time: Column | None = None,
     layout: TableLayout | None = None,
     conditions: ScanConditions | None = None,
     uncertainties: ScanUncertainties | None = None,
@@ -98,11 +108,12 @@ def import_table(
     Parameters
     ----------
     source : path, data frame or mapping of str to array
-        Text (CSV; UTF-8, UTF-16 or Latin-1), .xlsx, Parquet, or columns in memory.
+        Text (CSV; UTF-8, UTF-16 or Latin-1), .xlsx, Parquet, HDF5, TDMS, or columns in memory.
     x, y, u : str or int
         Columns of the positions and of the normal channel's readings, by name, or by number from 1
         where no column has a number as its name (a frame's column 1 is the one named 1).  Of
-        positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.
+        positions along one axis, ``y`` alone or with an ``x`` that stays, a line is made.  An
+        HDF5 file that plots a signal against its axis (NXdata) needs neither.
     u_errors : str or int, optional
         Column of the standard uncertainty of each reading.
     u_xz, u_yz, load_column, branch : str or int, optional
@@ -111,6 +122,9 @@ def import_table(
     depth : str or int, optional
         Of a log with holds: column that grows as the indenter is lowered, or is 1 where it presses
         and 0 elsewhere.  It tells the presses, and is not kept.
+    time : str or int, optional
+        Column of the times, which the scan keeps in s from the first; with a speed
+        (``TableLayout``) they make the positions.
     repeat : str or int, or several
         Columns that number the passes; each combination of several is one.
     layout : TableLayout, optional
@@ -171,17 +185,17 @@ def import_table(
         "x": x,
         "y": y,
         "branch": branch,
+        "time": time,
     }
     numbering = [repeat] if isinstance(repeat, str | int) else list(repeat or ())
     named |= {f"repeat {i}": column for i, column in enumerate(numbering)}
     require_sign("sign of the voltage", layout.u_sign)
+    table = open_table(source, named, **{name: getattr(layout, name) for name in _READING})
+    named |= table.defaults
     _require_use(named, layout, conditions, uncertainties)
-    reading_options = ("sheet", "scan", "skip_rows", "missing", "delimiter", "decimal")
-    table = open_table(source, **{name: getattr(layout, name) for name in reading_options})
-    u_unit = table.unit_of(u, layout.u_unit, _U_UNIT)
-    reading = reading_of(u_unit, table.where(u))
-    wanted = _wanted(table, named, layout, u_unit, dimension_in("voltage", reading))
+    wanted, reading = _wanted(table, named, layout)
     columns, notes = _read_columns(table, wanted, layout.u_sign, uncertainties.noise)
+    presses = make_positions(columns, layout, notes, table.lines)
     if numbering:
         columns["repeat"] = _lines(columns, numbering, notes)
     holds = None
@@ -193,15 +207,13 @@ def import_table(
             depth=columns.pop("depth", None),
             baseline=layout.baseline is not None,
         )
+        if presses is not None:
+            hook("require_all_held")(holds, presses)
         notes += holds.notes
         columns = dict(holds.mean)
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
-    at_ceiling = 0
-    if layout.ceiling is not None:
-        of = wanted["u_zz"]
-        ceiling = to_si(layout.ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
-        at_ceiling = _leave_out_clipped(columns, holds, float(ceiling), notes)
+    at_ceiling = _leave_out_clipped(columns, holds, layout.ceiling, wanted["u_zz"], notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
     scan = _scan_of(columns, notes, reading, conditions, uncertainties, table, holds)
@@ -230,6 +242,8 @@ def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
         problem = f"An array does not have the shape of u, {readings.shape}: {error}."
         raise InputError(problem, cure="Give one value for each reading.") from error
     options = {"x_unit": "m", "u_unit": "V", **options}
+    if "time" in given:
+        options.setdefault("time_unit", "s")
     records: dict[str, Any] = {}
     for name, record in _RECORDS.items():
         stated = options.keys() & {item.name for item in fields(record)}
@@ -267,29 +281,36 @@ def _require_use(
     if layout.depth_unit and named["depth"] is None:
         problem = "depth_unit (--depth-unit) belongs to a column of depths."
         raise InputError(problem, cure="Name the column (--depth COLUMN).")
-    if named["x"] is None and named["y"] is None:
-        raise InputError("No column of the positions is named.", cure="Give x (--x COLUMN).")
+    if layout.time_unit and named["time"] is None:
+        problem = "time_unit (--time-unit) belongs to a column of times."
+        raise InputError(problem, cure="Name the column (--time COLUMN).")
+    require_positions(named, layout)
 
 
 def _wanted(
-    table: NamedColumns,
-    named: Mapping[str, Column | None],
-    layout: TableLayout,
-    u_unit: str,
-    dimension_of_u: str,
-) -> dict[str, Wanted]:
-    """Return the columns that are named, with their units."""
-    reading = (dimension_of_u, layout.u_unit, _U_UNIT, u_unit)
-    length = ("length", layout.x_unit, "x_unit (--x-unit)", None)
-    forms: dict[str, tuple[str, str | None, str, str | None]] = {
-        "u_zz": reading,
-        "u_xz": reading,
-        "u_yz": reading,
-        "u_zz_errors": (dimension_of_u, None, "", u_unit),
+    table: NamedColumns, named: Mapping[str, Column | None], layout: TableLayout
+) -> tuple[dict[str, Wanted], Reading]:
+    """Return the columns that are named, with their units, and the unit of the readings."""
+    u = named["u_zz"]
+    if u is None:
+        raise InputError("No column of the readings is named.", cure="Give u (--u COLUMN).")
+    u_unit = table.unit_of(u, layout.u_unit, "u_unit (--u-unit)")
+    reading = reading_of(u_unit, table.where(u))
+    of_u = dimension_in("voltage", reading)
+    channel = (of_u, layout.u_unit, "u_unit (--u-unit)", u_unit)
+    length: Form = ("length", layout.x_unit, "x_unit (--x-unit)", None)
+    if layout.step is not None:
+        length = ("dimensionless", layout.x_unit, "x_unit (--x-unit)", "1")
+    forms: dict[str, Form] = {
+        "u_zz": channel,
+        "u_xz": channel,
+        "u_yz": channel,
+        "u_zz_errors": (of_u, None, "", u_unit),
         "normal_load": ("force", layout.load_unit, "load_unit (--load-unit)", "N"),
         "depth": ("", layout.depth_unit, "depth_unit (--depth-unit)", "1"),
         "x": length,
         "y": length,
+        "time": ("time", layout.time_unit, "time_unit (--time-unit)", None),
     }
     wanted = {}
     for name, column in named.items():
@@ -301,7 +322,7 @@ def _wanted(
             unit = table.unit_of(column, unit, option, default)
             dimension = dimension or dimension_in("voltage", reading_of(unit, table.where(column)))
             wanted[name] = Wanted(column, unit, dimension, _PRESSING if name == "depth" else {})
-    return wanted
+    return wanted, reading
 
 
 def _read_columns(
@@ -321,20 +342,22 @@ def _read_columns(
     if "branch" in columns:
         where = table.where(wanted["branch"].column)
         columns["branch"] = branch_numbers(where, np.nan_to_num(columns["branch"]))
-    if "x" not in columns:
-        columns["x"] = np.zeros(columns["y"].size)
+    if "time" in columns:
+        columns["time"] -= np.fmin.reduce(columns["time"], initial=np.inf)
     return columns, notes
 
 
 def _leave_out_clipped(
-    columns: Columns, holds: Holds | None, ceiling: float, notes: list[str]
+    columns: Columns, holds: Holds | None, ceiling: float | None, of: Wanted, notes: list[str]
 ) -> int:
     """Mark readings at a ceiling, and holds with a row there, as missing; return how many."""
+    if ceiling is None:
+        return 0
     highest = columns["u_zz"]
     if holds is not None:
         rows = zip(holds.first, holds.stop, strict=True)
         highest = np.array([holds.log["u_zz"][first:stop].max() for first, stop in rows])
-    clipped = highest >= ceiling
+    clipped = highest >= to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
     columns["u_zz"] = np.where(clipped, np.nan, columns["u_zz"])
     number = int(clipped.sum())
     notes.append(at_ceiling_text(number))
@@ -359,7 +382,7 @@ def _scan_of(
     stated["load"] = _nominal_load(columns.get("normal_load"), conditions.load, notes)
     if load_scatter is not None and "normal_load" not in columns:
         columns["normal_load"] = np.full(columns["u_zz"].shape, stated["load"])
-    along = _direction(columns, notes)
+    along = direction_of(columns, notes)
     stated["direction"] = conditions.direction or along
     notes += _counted(columns, table.others)
     notes += _set_up_in_words({**stated, "load": loads_in_words or stated["load"]})
@@ -454,22 +477,6 @@ def _granted_in_words(stated: Mapping[str, Any]) -> Iterator[str]:
             words.append(f"{name.replace('_', ' ')} {size}")
     if words:
         yield f"Standard uncertainties: {', '.join(words)}."
-
-
-def _direction(columns: Columns, notes: list[str]) -> str:
-    """Return the axis of a line; points of two axes that spread along one become one."""
-    x, y = (np.ptp(columns[name]) if name in columns else 0.0 for name in ("x", "y"))
-    if "y" not in columns or min(x, y) > LINE * max(x, y):
-        return "x"
-    along, across = ("y", "x") if y > x else ("x", "y")
-    stays = ""
-    if across in columns and min(x, y) > 0:
-        stays = f": {across} stays within {min(x, y) * 1e3:.4g} mm"
-    notes.append(f"The points are a line along {along}{stays}.")
-    if along == "y":
-        columns["x"] = columns["y"]
-    columns.pop("y", None)
-    return along
 
 
 def _lines(columns: Columns, numbering: Sequence[Column], notes: list[str]) -> NDArray[Any]:

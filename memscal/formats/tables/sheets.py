@@ -1,4 +1,4 @@
-"""Tables that are no text: sheets of a workbook, Parquet files, and columns in memory.
+"""Tables of all kinds: sheets of a workbook, Parquet files, and columns in memory by themselves.
 
 A workbook is a zip file of XML: what it inflates to, and how many elements that holds, is known
 before openpyxl sees it.
@@ -12,11 +12,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from memscal.errors import FormatError, InputError, UnsafeFileError, placed
+from memscal.extensions import hook
 from memscal.formats.files import damage_named, read_bytes
 from memscal.formats.tables.columns import Lines, NamedColumns, Wanted
 from memscal.formats.tables.dialect import find_decimal
@@ -31,12 +33,13 @@ _KINDS = {".xlsx": "workbook", ".xlsm": "workbook", ".parquet": "Parquet", ".pq"
 _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 #: Options of reading by the kinds of tables that have a use for them.
 _USES = {
-    "delimiter": ("text",),
-    "scan": ("text",),
-    "skip_rows": ("text", "workbook"),
+    "delimiter": ("text", "SPEC file"),
+    "scan": ("SPEC file",),
+    "skip_rows": ("text", "SPEC file", "workbook"),
     "sheet": ("workbook",),
 }
 _PIECE = 2**16
+_NONE: Mapping[str, Any] = MappingProxyType({})
 #: What a sheet holds besides its values: hidden rows, merged cells, and formulas without results
 #: (of an empty text the result is empty), in whose place openpyxl would give nothing.
 _HIDDEN = re.compile(rb'<(?:\w+:)?row\b(?=[^>]*\bhidden="(?:1|true)")[^>]*?\br="(\d+)"')
@@ -49,36 +52,49 @@ _SAID = rb'<\1c \2 t="str"><\1v>a formula without a stored result</\1v></\1c>'
 _MAX_NAME = 80
 
 
-def open_table(source: Any, **reading: Any) -> NamedColumns:
-    """Open a table of any kind: a path, or columns in memory (a mapping, a data frame)."""
+def open_table(source: Any, named: Mapping[str, Any] = _NONE, **reading: Any) -> NamedColumns:
+    """Open a table of any kind: a path, or columns in memory (a mapping, a data frame).
+
+    ``named`` are the columns of a scan that are asked for, or ``None``, by the names of its arrays.
+    """
     reading = {name: value for name, value in reading.items() if value or value == 0}
     path = isinstance(source, str) or hasattr(source, "__fspath__")
     ending = PurePath(source).suffix.lower() if path else ""
-    kind = _KINDS.get(ending, "text") if path else "table in memory"
-    useless = [name for name in reading if kind not in _USES.get(name, (kind,))]
-    if useless:
-        named = ", ".join(f"{name} (--{name.replace('_', '-')})" for name in useless)
-        raise InputError(f"{named} has no effect on a {kind}.", cure="Leave it out.")
     if ending in _OTHERS:
         problem = f"{source} is a workbook of a kind that is not read."
         raise FormatError(problem, cure="Save it as .xlsx or as CSV.")
+    kind = "table in memory"
+    if path:
+        kind = _KINDS.get(ending) or hook("kind_of_record")(source)
+    useless = [name for name in reading if kind not in _USES.get(name, (kind,))]
+    if useless:
+        options = ", ".join(f"{name} (--{name.replace('_', '-')})" for name in useless)
+        raise InputError(f"{options} has no effect on a {kind}.", cure="Leave it out.")
     if kind == "text":
         return TextTable(source, **reading)
     if not path:
         return _columns_in_memory(source, **reading)
+    if ending not in _KINDS:
+        record: NamedColumns = hook("open_record")(kind, source, named, **reading)
+        return record
     name = PurePath(source).name
     data = read_bytes(source)
     library = {"workbook": "openpyxl", "Parquet": "pyarrow.parquet"}[kind]
-    try:
-        reader = import_module(library)
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"A {kind} is read by {library.partition('.')[0]}, which is not installed.",
-            cure='Install it with the extra "tables": pip install "memscal[tables]"',
-        ) from error
+    reader = installed(library, f"A {kind}", "tables")
     read: Callable[..., NamedColumns] = _sheet_table if kind == "workbook" else _parquet_table
     with _reading(f"{name} cannot be read"):
         return read(reader, name, data, **reading)
+
+
+def installed(library: str, what: str, extra: str) -> Any:
+    """Import a library that an extra brings; say where it is not installed what needs it."""
+    try:
+        return import_module(library)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"{what} is read by {library.partition('.')[0]}, which is not installed.",
+            cure=f'Install it with the extra "{extra}": pip install "memscal[{extra}]"',
+        ) from error
 
 
 _reading = partial(damage_named, why="Its reader gave no table back", cure="Save it as CSV.")

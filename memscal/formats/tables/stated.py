@@ -20,6 +20,13 @@ class TableLayout:
     x_unit, u_unit, load_unit : str, optional
         Units of ``x`` and ``y``, of all channels, and of the column of loads (by default N), where
         the table states none.
+    time_unit : str, optional
+        Unit of the times, where the table states none.
+    speed : float, optional
+        Where no column states positions: that of the stage, in m/s, which moves on with the time.
+    step : float, optional
+        Length, in m, from each place to the next: ``x`` counts the places or, of a log with holds
+        and without ``x``, the presses that a load or a depth tells are counted.
     u_sign : int
         -1 where the voltage falls when the indenter presses.
     holds : bool
@@ -54,6 +61,9 @@ class TableLayout:
     x_unit: str | None = None
     u_unit: str | None = None
     load_unit: str | None = None
+    time_unit: str | None = None
+    speed: float | None = None
+    step: float | None = None
     u_sign: int = 1
     holds: bool = False
     depth_unit: str | None = None

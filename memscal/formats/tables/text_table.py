@@ -7,7 +7,7 @@ import itertools
 import os
 import re
 import warnings
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -36,10 +36,7 @@ from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_COLUMNS, MOST_TABLE_BYTES, too_large
 
 #: Begins a line of cells, which is no comment: what a spreadsheet writes for an error is a cell.
-_CELLS = re.compile(r"\s*(?:[^\s#%]|#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?))", re.IGNORECASE)
-#: Begins a scan in a file of SPEC or Bluesky; labels of its columns may hold single spaces.
-_SCAN = re.compile(r"^#S\s+(\d+)", re.MULTILINE)
-_LABELS = re.compile(r"#L\s+(.+)")
+CELLS = re.compile(r"\s*(?:[^\s#%]|#(?:N/A|(?:DIV/0|REF|NUM|VALUE|NULL)!|NAME\?))", re.IGNORECASE)
 #: Share of an indenter's height by which its axis may lie above the lowest point.
 _HOLLOW = 1e-3
 _MAX_COMMENTS = 20
@@ -80,7 +77,6 @@ class TextTable(NamedColumns):
         missing: Sequence[str] = (),
         skip_rows: int | None = None,
         sheet: Sheet | None = None,
-        scan: int | None = None,
     ) -> None:
         super().__init__(os.path.basename(os.fspath(path)), missing)
         self._path = path
@@ -90,9 +86,6 @@ class TextTable(NamedColumns):
         self._latin = False
         self._reach = 0  # cells of the longest row
         self._line = 1
-        self._scans = 0
-        self._labelled = False
-        self._scan = None if scan is None else self._place_of(scan)
         self._blocks = self._whole_lines()
         lines = Numbered()
         comments = Numbered()
@@ -103,8 +96,8 @@ class TextTable(NamedColumns):
             block = next(self._blocks, b"")
             if not block:
                 break
-            seen += len(block) if self._scan in (None, self._scans) else 0
             more_lines, more_comments = self._numbered(block)
+            seen += sum(len(line) for _, line in more_lines + more_comments)
             lines += more_lines
             comments += more_comments
         below = [(number, line) for number, line in lines if number > skipped]
@@ -214,7 +207,7 @@ class TextTable(NamedColumns):
             notes.append("The table is not UTF-8; it was read as Latin-1.")
         notes += self._sayings()
         units = ", a row of units below it" if self._unit_row else ""
-        if self._headed and (units or any(map(_CELLS.match, self._said))):
+        if self._headed and (units or any(map(CELLS.match, self._said))):
             notes.append(f"The header is {self._row} {self._header}{units}.")
         if self._comments:
             notes.append(
@@ -365,12 +358,7 @@ class TextTable(NamedColumns):
 
     def _bare_numbers(self, block: bytes) -> FloatArray | None:
         """Return a block of bare numbers in full rows, in a fifth of the time that cells take."""
-        if (
-            self._scans
-            or not block.isascii()
-            or block.isspace()
-            or (self._comma_alone and b"." in block)
-        ):
+        if not block.isascii() or block.isspace() or (self._comma_alone and b"." in block):
             return None
         lines = block.replace(b",", b".") if self._comma_alone else block
         delimiter = None if self._delimiter == " " else self._delimiter
@@ -405,44 +393,17 @@ class TextTable(NamedColumns):
         written = text.replace("\r\n", "\n").replace("\r", "\n").replace("−", "-").split("\n")
         lines = Numbered()
         comments = Numbered()
-        for number, line in enumerate(self._of_scan(written), self._line):
-            if _CELLS.match(line):
+        for number, line in enumerate(self._table_of(written), self._line):
+            if CELLS.match(line):
                 lines.append((number, line))
             elif line.strip():
                 comments.append((number, line))
         self._line += len(written) - 1
         return lines, comments
 
-    def _place_of(self, scan: int) -> int:
-        """Return the place of a scan in the file, by the number after #S or counted from 1."""
-        text = b"".join(self._raw()).decode("latin-1").replace("\r", "\n")
-        numbers = [int(number) for number in _SCAN.findall(text)]
-        place = numbers.index(scan) + 1 if numbers.count(scan) == 1 else scan
-        if not 0 < place <= len(numbers):
-            why = f"It has {len(numbers)} (lines that begin with #S)."
-            raise FormatError(f"{self._name} has no scan {scan}.", why=why, cure="Give another.")
-        return place
-
-    def _of_scan(self, lines: Sequence[str]) -> Iterator[str]:
-        """Yield lines, those of other scans empty, and those below labels with tabs."""
-        for line in lines:
-            labels = _LABELS.match(line)
-            text = line
-            if _SCAN.match(line):
-                self._scans += 1
-                self._labelled = False
-            elif labels and self._scans:
-                self._labelled = True
-                text = "\t".join(re.split(r"\t|\s{2,}", labels[1].strip()))
-            elif self._labelled and _CELLS.match(line):
-                text = "\t".join(line.split())
-            if self._scan is None and self._scans > 1:
-                raise FormatError(
-                    f"{self._name} holds several scans.",
-                    why="Each begins with #S, and may have columns of its own.",
-                    cure="Choose one: scan=N (--scan N), the number after #S or counted from 1.",
-                )
-            yield text if self._scan in (None, self._scans) else ""
+    def _table_of(self, lines: Sequence[str]) -> Iterable[str]:
+        """Return lines as they stand in the table, empty where they are no part of it."""
+        return lines
 
     def _rows(self, lines: Numbered) -> tuple[Rows, list[int]]:
         """Cut lines into cells; return them with the numbers of their lines."""

@@ -1,0 +1,125 @@
+"""TDMS files of LabVIEW, through npTDMS, after a look at what they claim."""
+
+import hashlib
+import io
+import logging
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError, UnsafeFileError
+from memscal.extensions.recorded.columns import RecordedColumns
+from memscal.formats.files import FilePath, damage_named, read_bytes
+from memscal.formats.tables.dialect import cut_head
+from memscal.formats.tables.sheets import installed
+from memscal.formats.units import is_unit
+from memscal.model.provenance import SourceFile
+from memscal.model.sizes import too_large
+
+_LEAD_IN = 28
+_BIG_ENDIAN = 0x40
+#: Each segment may copy the list of all channels; each scale may refer twice to the one before.
+_MOST_SEGMENTS = 10_000
+_MOST_SCALES = 12
+#: Properties that state a unit, the column that those of a waveform make, and the unit of that.
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
+_TIME = "wf_increment"
+_TIME_UNIT = "wf_xunit_string"
+_DEFRAGMENT = "Get the file again, or let LabVIEW defragment it (TDMS Defragment)."
+
+
+def open_channels(path: FilePath, named: Mapping[str, Any], **reading: Any) -> RecordedColumns:
+    """Open the channels by group/channel; the waveform of the readings makes a column of times."""
+    name = PurePath(path).name
+    data = read_bytes(path)
+    nptdms = installed("nptdms", "A TDMS file", "recorded")
+    channels: dict[str, Any] = {}
+    with damage_named(f"{name} cannot be read as TDMS"), _warnings_refused():
+        _require_whole(name, data)
+        file = nptdms.TdmsFile.open(io.BytesIO(data))
+        for group in file.groups():
+            for channel in group.channels():
+                channels[f"{group.name}/{channel.name}"] = channel
+                _require_bounded(f"{name}: {channel.path}", (file, group, channel), len(data))
+        used = {column: channels[column] for column in named.values() if column in channels}
+        arrays = channels | {column: channel[:] for column, channel in used.items()}
+    _require_one_clock(name, used)
+    units = [_unit_of(channel) for channel in channels.values()]
+    signal = used.get(named["u_zz"], ())
+    defaults = {}
+    if signal and _TIME in signal.properties:
+        arrays[_TIME] = np.arange(len(signal)) * signal.properties[_TIME]
+        units.append(str(signal.properties.get(_TIME_UNIT) or "s"))
+        defaults = {"time": _TIME} if named["time"] is None else {}
+    rows = len(signal) or max(map(len, channels.values()), default=0)
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    return RecordedColumns(source, arrays, units, rows, defaults, **reading)
+
+
+@contextmanager
+def _warnings_refused() -> Iterator[None]:
+    """Refuse what npTDMS warns of, and goes on: the file is not what it claims to be."""
+
+    def refuse(record: logging.LogRecord) -> bool:
+        raise ValueError(record.getMessage())
+
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms.")]
+    for name in names:
+        logging.getLogger(name).addFilter(refuse)
+    try:
+        yield
+    finally:
+        for name in names:
+            logging.getLogger(name).removeFilter(refuse)
+
+
+def _require_whole(name: str, data: bytes) -> None:
+    """Refuse a file that does not end with a segment: readings would be missing in silence."""
+    position = 0
+    for _ in range(_MOST_SEGMENTS):
+        contents = struct.unpack_from("<I", data, position + 4)[0]
+        order = ">" if contents & _BIG_ENDIAN else "<"
+        position += _LEAD_IN + struct.unpack_from(f"{order}Q", data, position + 12)[0]
+        if position >= len(data):
+            break
+    if position != len(data):
+        problem = (
+            f"{name} does not end where its last segment, of at most {_MOST_SEGMENTS:,}, does."
+        )
+        raise FormatError(problem, why="It was cut short, or not closed.", cure=_DEFRAGMENT)
+
+
+def _require_bounded(where: str, owners: Sequence[Any], size: int) -> None:
+    """Refuse a channel, the last of its owners, that claims more than the file can hold."""
+    if len(owners[-1]) > size:
+        cure = "Get the file again from where it came from."
+        raise too_large(where, len(owners[-1]), size, "values", cure=cure, error=UnsafeFileError)
+    for owner in owners:
+        scales = int(owner.properties.get("NI_Number_Of_Scales", 0))
+        if scales > _MOST_SCALES:
+            cure = "Save it with scaled values."
+            raise too_large(where, scales, _MOST_SCALES, "scales", cure=cure, error=UnsafeFileError)
+
+
+def _unit_of(channel: Any) -> str:
+    """Return the unit in a channel's properties, or in its name, or of its time stamps."""
+    if channel.dtype.kind == "M":
+        return "s"
+    stated = [channel.properties[name] for name in _UNITS if channel.properties.get(name)]
+    unit = str([*stated, *cut_head(channel.name)[1:], ""][0]).strip()
+    return unit if is_unit(unit) else unit.lower()  # Volts
+
+
+def _require_one_clock(name: str, channels: Mapping[str, Any]) -> None:
+    """Refuse channels that were not sampled together: their rows do not belong together."""
+    stated = {column: channel.properties.get(_TIME) for column, channel in channels.items()}
+    if len({*stated.values()} - {None}) > 1:
+        raise InputError(
+            f"{name}: {_TIME} differs between the channels: {stated}.",
+            why="A row is what was read at one time.",
+            cure="Name channels of one rate.",
+        )
