@@ -170,7 +170,7 @@ def _chunks(
 ) -> Iterator[list[Any]]:
     """Cut items into chunks; what the source raises is kept until those before it are done."""
     for size in sizes:
-        chunk: list[Any] = []
+        chunk = []
         try:
             for item in islice(source, size):
                 chunk.append(item)  # noqa: PERF402 - what there is before the source fails

@@ -295,8 +295,8 @@ def _compared_pictures(compared: FrictionComparison) -> Iterator[Picture]:
 
 def _measured_on(measured: MeasuredStress) -> dict[str, Any]:
     """Return what was measured on what, and the files and versions of it."""
-    settings: list[Table] = []
-    files: dict[str, SourceFile | None] = {"artifact": measured.artifact}
+    settings = []
+    files = {"artifact": measured.artifact}
     for i, scan in enumerate(measured.scans, start=1):
         files[f"scan {i}"] = scan.source
         setting = _setting(scan)

@@ -12,7 +12,6 @@ from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import (
     ARTIFACT_SCHEMA,
     Group,
-    Node,
     file_tree,
     si,
     to_json,
@@ -76,7 +75,7 @@ def artifact_tree(data: ApparatusData) -> Group:
     """Return what a memscal-artifact file holds; its root states the content digest."""
     sensor = data.sensor.name
     reconvolution = records.RECONVOLUTION.read_in(data.reading)
-    children: dict[str, Node] = {
+    children = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),

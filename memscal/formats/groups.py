@@ -134,7 +134,7 @@ def listed(record: Record, file: SafeFile, path: str) -> Iterator[tuple[str, Qua
 
 def _paths(record: Record, path: str) -> Iterator[tuple[str, Quantity]]:
     """Yield where each quantity stands; an attribute that is stored twice is read once."""
-    names: set[str] = set()
+    names = set()
     for quantity in record.quantities:
         if quantity.name not in names:
             names.add(quantity.name)
@@ -269,7 +269,7 @@ def named_collection(children: Mapping[str, Node]) -> Group:
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
     """Return the uncertainty budget: one group per quantity, one number per source."""
-    children: dict[str, Node] = {}
+    children = {}
     for quantity, sources in budget.items():
         dimension = dimensions.get(quantity) or parameter_dimension(quantity)
         numbers = {source: si(value, dimension) for source, value in sources.items()}
@@ -312,7 +312,7 @@ _NOWHERE = {"depends_on": "."}
 def sample_group(film: ElasticFilm | None, lubrication: str = "", lubricant: str = "") -> Group:
     """Return the NXsample that holds the film, and how it was lubricated."""
     stated = {"lubrication": lubrication, "lubricant": lubricant}
-    children: dict[str, Node] = {}
+    children = {}
     if film is not None:
         children["film"] = write_record(records.FILM, film)
     sample = write_record(records.SAMPLE, stated)
@@ -392,7 +392,7 @@ def read_instrument(file: SafeFile, path: str = "/entry") -> dict[str, Any]:
 def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
     user = write_record(records.USER, of.user)
-    stated: dict[str, Node] = {"user": user} if user.children else {}
+    stated = {"user": user} if user.children else {}
     return {**write_record(records.TIMES, of).children, **stated}
 
 
@@ -424,7 +424,7 @@ def _form(form: IdealReference | StressField) -> Group:
     """Return an ideal reference, or a field as NXdata in its own unit."""
     if isinstance(form, IdealReference):
         return write_record(records.IDEAL_REFERENCE, form)
-    axes: dict[str, Node] = {name: si(getattr(form, name), "length", (name,)) for name in "xy"}
+    axes = {name: si(getattr(form, name), "length", (name,)) for name in "xy"}
     axes["field"] = Number(form.values, form.unit, ("y", "x"))
     if form.load is not None:
         axes["load"] = si(form.load, "force")
@@ -496,7 +496,7 @@ def read_process(file: SafeFile) -> Process:
 
 def assumption_group(assumptions: tuple[Assumption, ...]) -> Group:
     """Return what was taken for granted, one NXcollection each."""
-    children: dict[str, Node] = {}
+    children = {}
     for assumption in assumptions:
         declared = records.assumption_record(is_length=assumption.is_length)
         stated = {"state": assumption.state, **assumption.sizes}
@@ -517,7 +517,7 @@ def read_assumptions(file: SafeFile) -> tuple[Assumption, ...]:
 
 def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
     """Return the quality checks, one NXcollection each."""
-    children: dict[str, Node] = {}
+    children = {}
     for check in checks:
         name = re.sub(r"[^a-z0-9_]+", "_", check.name.lower()).strip("_")
         if not name or name in children:

@@ -291,7 +291,7 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
     path = "/entry/synthetic"
     if not file.is_group(path):
         return None
-    truth: dict[str, Any] = {}
+    truth = {}
     for name in text_list(file, f"{path}/names"):
         item = f"{path}/{name}"
         truth[name] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]

@@ -34,7 +34,7 @@ _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 def _read_points(file: SafeFile, name: str, of: Reading) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
-    points: dict[str, MeasuredPoints] = {}
+    points = {}
     for channel in _CHANNELS:
         group = f"/entry/points_{channel}/{name}"
         if file.has(group):
@@ -218,7 +218,7 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     numbers = dict(write_record(record, _numbers(profile)).children)
     # What not every profile has comes last.
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
-    children: dict[str, Node] = {
+    children = {
         **arrays.children,
         "scan": writer.count(scans.index(profile.scan) + 1),
         **numbers,
@@ -300,7 +300,7 @@ def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, Float
         where = _part_of_profile(file, "covariances", name, path)
         prefix = "covariance_"
         dimension = "stress squared"
-    roots: dict[str, FloatArray] = {}
+    roots = {}
     for source in text_list(file, f"{where}/sources"):
         place = f"{where}/{prefix}{source}"
         stored = values.require_array(file, place, dimension)

@@ -134,7 +134,7 @@ class ProfileFamily(FrozenArrays):
         names = ["spectra", "by_load", *_NUMBERS]
         if self.slopes is not None:
             names.append("slopes")
-        arrays: dict[str, Any] = {name: getattr(self, name)[:, chosen] for name in names}
+        arrays = {name: getattr(self, name)[:, chosen] for name in names}
         changes = {name: change[:, chosen] for name, change in self.changes.items()}
         return replace(self, loads=self.loads[chosen], changes=changes, **arrays)
 

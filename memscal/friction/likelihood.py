@@ -551,8 +551,8 @@ class Likelihood:
         # What is left, (V,), is the inverse variance of the bounded coordinate.  By Woodbury's
         # identity, C^-1 = 1 - D (1 + D^T D)^-1 D^T.
         information = self.statistics.information
-        square: FloatArray = np.zeros(())
-        projection: FloatArray = np.zeros(())
+        square = np.zeros(())
+        projection = np.zeros(())
         for load in self.loads:
             square = square + np.sum(load.slope**2, axis=-1)
             projection = projection + (load.slope[:, None] @ load.columns)[:, 0]

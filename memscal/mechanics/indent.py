@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 
@@ -184,7 +184,7 @@ def indent(
 def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
     """Return contacts with more and less of each uncertain input, and u over its difference."""
     names = ("film", "indenter", "load", "friction", "backend", "interface", "strain")
-    settings: dict[str, Any] = {name: getattr(contact, name) for name in names}
+    settings = {name: getattr(contact, name) for name in names}
     again = partial(indent, loading=contact.loading or "incremental", **settings)
     if abs(again().depth / contact.depth - 1) > max(_SAME, 2 * contact.convergence):
         raise InputError(

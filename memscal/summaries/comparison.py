@@ -81,7 +81,7 @@ def frame(comparison: FrictionComparison) -> DataFrame:
     tested = comparison.measured.noise_stated
     for loading in comparison.loadings:
         for i, profile in enumerate(comparison.measured.profiles):
-            row: dict[str, Any] = {"loading": loading, **columns(records.COMPARED_LOAD, profile)}
+            row = {"loading": loading, **columns(records.COMPARED_LOAD, profile)}
             if comparison.by_shear:
                 row |= _columns("friction", comparison.by_shear[loading][i], tested)
             else:

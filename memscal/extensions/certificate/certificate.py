@@ -275,7 +275,7 @@ def _profile(apparatus: ApparatusFunction) -> CertifiedProfile:
     reach = profile.r[shown][-1]
     sizes = (MM * np.multiply.outer(10.0 ** np.arange(-4, 3), [1, 2, 5])).ravel()
     step = sizes[np.searchsorted(sizes, reach / _MOST_RADII)]
-    r: FloatArray = step * np.arange(int(reach / step) + 1, dtype=np.float64)
+    r = step * np.arange(int(reach / step) + 1, dtype=np.float64)
     # A spline is linear in the values that it goes through.
-    weights: FloatArray = radial_spline(profile.r, np.eye(profile.r.size))(r)
+    weights = radial_spline(profile.r, np.eye(profile.r.size))(r)
     return CertifiedProfile(r, weights @ profile.g, weights @ profile.g_covariance @ weights.T)

@@ -38,7 +38,7 @@ def certificate_xml(certificate: Certificate) -> bytes:
         element.text = Template((element.text or "").strip()).substitute(texts)
     equipment = [_equipment(item) for item in certificate.equipment]
     results = [_values(certificate), _profile(certificate), _artifact(certificate)]
-    variable: dict[str, Tree] = {
+    variable = {
         "measuringEquipments": {"measuringEquipment": equipment},
         "results": {"result": results},
         "measurementMetaData": {"metaData": _conformity(certificate)},
@@ -212,7 +212,7 @@ def _profile(certificate: Certificate) -> Tree:
 def _artifact(certificate: Certificate) -> Tree:
     digest = f"Content digest of the artifact: {certificate.apparatus.content_digest}."
     if not certificate.artifact:
-        data: Tree = {"text": _words(f"{digest} It is too large to be held here.")}
+        data = {"text": _words(f"{digest} It is too large to be held here.")}
     else:
         file = {
             "description": _words(f"The artifact in its compact form. {digest}"),

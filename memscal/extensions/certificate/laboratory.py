@@ -91,7 +91,7 @@ class LaboratoryFile:
             sensor["temperature_uncertainty"] = temperature.uncertainty
         operator = self.stated("person", "operator")
         user = {"name": operator, "affiliation": self.stated("laboratory", "name")}
-        parts: dict[str, Mapping[str, Any]] = {"sensor": sensor, "user": user}
+        parts = {"sensor": sensor, "user": user}
         for kind, attribute in KINDS.items():
             found = [item for item in self.equipment if item.get("kind") == kind]
             parts[attribute] = {k: v for k, v in found[0].items() if k != "kind"} if found else {}

@@ -228,7 +228,7 @@ def _budget(certificate: Certificate) -> str:
             percent = 100 / abs(value.value)
             shares = {source: percent * u for source, u in budget.items()}
             columns[f"({i})"] = {**shares, _TOTAL: percent * total_of(budget)}
-    rows: dict[str, list[float]] = {}
+    rows = {}
     for column in columns.values():
         for source in column:
             rows[source] = [other.get(source, 0.0) for other in columns.values()]

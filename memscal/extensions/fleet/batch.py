@@ -163,7 +163,7 @@ class Batch:
         write_batch(self.results, {"scans": self.count, "shard_size": self.shard_size})
         shards = self.shards()
         tasks = set[Future[ShardOutcome]]()
-        lost: list[str] = []
+        lost = []
         try:
             while True:
                 some = islice(shards, max(0, most() - len(tasks)))
@@ -243,7 +243,7 @@ def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
     """Calibrate a scan and return its row; an error is a row, too."""
     item = shard.scans[i]
     path = batch.folder / item.path
-    row: dict[str, Any] = {
+    row = {
         "place": shard.first + i,
         **asdict(item),
         "passed": False,

@@ -22,7 +22,7 @@ def tables(result: FleetCalibration) -> list[Table]:
 
 def mapping(result: FleetCalibration) -> dict[str, Any]:
     """Return the estimates and the quality checks, or the error."""
-    values: dict[str, Any] = {"index": result.index, "passed": result.passed}
+    values = {"index": result.index, "passed": result.passed}
     if result.parameters is None or result.resolved_wavenumber is None:
         return values | {"error": str(result.error)}
     estimates = parameters_json(result.parameters)
@@ -36,7 +36,7 @@ def frame(result: FleetCalibration) -> DataFrame:
     """Return one row, which ``pandas.concat`` joins with those of the other scans."""
     import pandas as pd
 
-    row: dict[str, Any] = {"passed": result.passed, "error": str(result.error or "")}
+    row = {"passed": result.passed, "error": str(result.error or "")}
     parameters = result.parameters
     if parameters is not None:
         for name in parameters.names:

@@ -103,8 +103,8 @@ def _shares(fleet: FleetResults, numbers: dict[str, int]) -> list[tuple[str, str
 
 
 def _distributions(fleet: FleetResults) -> Table:
-    rows: list[tuple[str, ...]] = []
-    heads: list[str] = []
+    rows = []
+    heads = []
     for name, symbol in _VALUES.items():
         distribution = _distribution(fleet, name)
         unit, *numbers = distribution.values()

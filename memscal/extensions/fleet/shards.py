@@ -181,7 +181,7 @@ def fleet_row(data: ApparatusData) -> dict[str, Any]:
     radial = data.radial_profile
     quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
     names = [name for name in _PARAMETERS if name in quantities]
-    row: dict[str, Any] = {
+    row = {
         "passed": data.passed,
         "calibrated_at": data.process.date,
         "method": data.process.configuration["method"],

@@ -109,7 +109,7 @@ def _between(ends_about_best: FloatArray) -> str:
 
 def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
     """Return laws, evidence and lengths as JSON holds them."""
-    whole: dict[str, Any] = {}
+    whole = {}
     for direction, compared in comparison.by_direction.items():
         whole[direction] = {
             **members(COMPARED_LAWS, compared),

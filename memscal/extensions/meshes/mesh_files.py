@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
-from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.units import from_si
 from memscal.model.arrays import FloatArray, IndexArray, array_record
 from memscal.model.field_mesh import FieldMesh
@@ -75,7 +75,7 @@ def heavy_arrays(data: bytes, path: str) -> tuple[dict[str, NDArray[Any]], list[
     folder, name = os.path.split(path)
     stem = os.path.splitext(name)[0]
     arrays = {}
-    files: dict[str, SafeFile] = {}
+    files = {}
     with contextlib.ExitStack() as opened:
         for file_name, inside in _addresses(data):
             file_stem, ending = os.path.splitext(file_name)

@@ -78,7 +78,7 @@ class DrawnScans:
         rng, standard = self._random(index)
         estimate = self.solution.estimate
         points = estimate.points
-        noise: FloatArray = rng.standard_normal(points.u.size)
+        noise = rng.standard_normal(points.u.size)
         if estimate.correlation is not None:
             noise = estimate.correlation.correlate(noise)
         deviations = points.curvature[points.curved]
@@ -112,7 +112,7 @@ class DrawnScans:
         values, vectors = np.linalg.eigh(matrix)
         # By the symmetric root every input keeps its draw where there are no correlations.
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-        joined: dict[str, FloatArray] = dict(zip(self.effects, root @ normal, strict=True))
+        joined = dict(zip(self.effects, root @ normal, strict=True))
         if "model_form" in joined:
             joined["model_form"] = np.sqrt(3) * (2 * ndtr(joined["model_form"]) - 1)
         return joined | {item.source: item.truncated(joined[item.source]) for item in self.solved}
@@ -368,8 +368,8 @@ def monte_carlo(
     solution = calibration.solution
     effects = calibration.effects
     model = DrawnScans(solution, effects, calibration.correlations, seed)
-    rows: list[FloatArray] = []
-    failures: list[str] = []
+    rows = []
+    failures = []
     results = shared(model.result, range(draws), workers=workers)
     for result in Task("draws", draws).counted(results):
         if isinstance(result, str):

@@ -58,7 +58,7 @@ def simulate_contacts(
     _require_row(loads, points, spacing, repeats, seed)
     require_positive("load_scale", load_scale)
     sensor = simulated_sensor(kernel, conversion_constant, shear)
-    law: dict[str, Any] = {
+    law = {
         "friction": friction,
         "loading": loading,
         "interface": interface or Interface(),
@@ -191,7 +191,7 @@ def _described_interface(interface: Interface) -> dict[str, float | str]:
     """Return what yields of the interface, by the names of a truth; nothing if it is rigid."""
     if interface.rigid:
         return {}
-    described: dict[str, float | str] = {}
+    described = {}
     if interface.slip_length > 0:
         described["slip_length"] = interface.slip_length
     if interface.normal_law is not None:

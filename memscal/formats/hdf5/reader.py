@@ -177,7 +177,7 @@ class SafeFile:
     def scaled_by(self, path: str, scale: str) -> list[int]:
         """Return the axes of a dataset to which the dimension scale at a path is attached."""
         item = self._existing(path)
-        axes: list[int] = []
+        axes = []
         if h5py.h5a.exists(item, _SCALES):
             with damage_named(f"{self.where(path)}@DIMENSION_LIST cannot be read"):
                 attribute = h5py.h5a.open(item, _SCALES)

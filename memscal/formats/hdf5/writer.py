@@ -86,7 +86,7 @@ def index_axis(name: str, size: int) -> Number:
 
 def note(text: str, *, media_type: str = "text/plain", description: str = "") -> Group:
     """Return text as an NXnote."""
-    children: dict[str, Node] = {"type": media_type, "data": text}
+    children = {"type": media_type, "data": text}
     if description:
         children["description"] = description
     return Group("NXnote", children)

@@ -290,7 +290,7 @@ class TextTable(NamedColumns):
 
     def _pieces(self) -> Iterator[bytes]:
         """Yield the text piece by piece; UTF-16, which its mark tells, as UTF-8."""
-        decode: codecs.IncrementalDecoder | None = None
+        decode = None
         for number, piece in enumerate(filter(None, self._raw())):
             self._digest.update(piece)
             if number == 0 and piece.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
