@@ -243,13 +243,7 @@ def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) 
 
     output = options["output"]
     mesh = options["mesh"]
-    figures = {}
-    if options["figures"]:
-        from memscal.figures.stress import contact_figure
-
-        figures = out.rendered(
-            partial(contact_figure, contacts[0], beside=contacts[1:]), options["figures"]
-        )
+    figures = out.rendered(partial(contacts[0].plot, beside=contacts[1:]), options["figures"])
     if mesh is not None:
         hook("write_mesh")(contacts[0].mesh(), mesh, overwrite=force)
     if output is not None:

@@ -16,7 +16,14 @@ from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
-from memscal.formats.values import altered, has_no_digest, optional_text, require_schema, units_of
+from memscal.formats.values import (
+    altered,
+    has_no_digest,
+    only_number,
+    optional_text,
+    require_schema,
+    units_of,
+)
 from memscal.model import records
 from memscal.model.quantities import Record, record
 
@@ -187,7 +194,7 @@ def _quantity_row(file: SafeFile, path: str) -> dict[str, Any]:
     if file.is_text(path):
         row["value"] = file.text(path)
     else:
-        number = _single(file, path)
+        number = only_number(file, path, file.array(path))
         row["value"] = "inf" if number == np.inf else _plain(number)
     row["standard_uncertainty"] = _uncertainty(file, path)
     row["unit"] = None if file.is_text(path) else units_of(file, path) or "1"
@@ -199,7 +206,7 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     errors = f"{path}_errors"
     if not file.has(errors):
         return None
-    spread = _single(file, errors)
+    spread = only_number(file, errors, file.array(errors))
     unit = units_of(file, path)
     spread_unit = units_of(file, errors)
     if spread_unit != unit:
@@ -207,15 +214,6 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
         scale = to_si(1.0, unit, dimension, file.where(path))
         spread = float(to_si(spread, spread_unit, dimension, file.where(errors)) / scale)
     return _plain(spread)
-
-
-def _single(file: SafeFile, path: str) -> float | int:
-    numbers = file.array(path)
-    if numbers.size != 1:
-        problem = f"{file.where(path)} has {numbers.size} values, but one number is expected."
-        raise FormatError(problem)
-    number: float | int = numbers.item()
-    return number
 
 
 def _array_row(file: SafeFile, path: str) -> dict[str, Any]:

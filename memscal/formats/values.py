@@ -74,11 +74,15 @@ def require_array(
 
 def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
     """Return the one number at a path in SI units; an array of one is accepted."""
-    values = require_array(file, path, dimension)
+    return only_number(file, path, require_array(file, path, dimension))
+
+
+def only_number(file: SafeFile, path: str, values: FloatArray) -> float:
+    """Return the one number that is stored at a path."""
     if values.size != 1:
         problem = f"{file.where(path)} has {values.size} values, but one number is expected."
         raise FormatError(problem)
-    return float(values.reshape(()))
+    return values.item()
 
 
 def any_scalar(file: SafeFile, path: str) -> tuple[float, str]:

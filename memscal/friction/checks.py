@@ -189,13 +189,12 @@ def _against_macroscopic(
         if lubrication == "lubricated":
             continue
         for loading, joint_estimate in by_loading.items():
-            low = joint_estimate.interval.low
-            high = joint_estimate.interval.high
-            if value + spread < low:
+            interval = joint_estimate.interval
+            if value + spread < interval.low:
                 verdict = "is larger than the macroscopic one"
-            elif high is not None and value - spread > high:
+            elif value - spread > interval.upper:
                 verdict = "is smaller than the macroscopic one"
-            elif high is None:
+            elif interval.high is None:
                 verdict = "has no upper bound, so that it does not contradict the macroscopic one"
             else:
                 verdict = "agrees with the macroscopic one"

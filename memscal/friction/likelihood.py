@@ -526,7 +526,7 @@ class Likelihood:
         both = Statistics(*(own[:, None] + other[among] for own, other in pairs))
         logs, chi_square = log_likelihood(both)
         weighed = logs + np.log(weights[among])
-        whole = np.asarray(logsumexp(weighed, axis=1))
+        whole = logsumexp(weighed, axis=1)
         shares = np.exp(weighed - whole[:, None])
         return whole, np.sum(shares * chi_square, axis=1), shares @ held.values[among]
 

@@ -239,8 +239,8 @@ def _timed(
     if end - begin < _PRESSED:
         why = "The readings rise at other times at each place."
         raise InputError("The log does not show when the indenter presses.", why=why, cure=_CURE)
-    pressed = np.asarray((time >= begin) & (time <= end) & (size[dwell] >= _FEWEST))
-    waiting = np.asarray(time < np.quantile(begins, 0.1))
+    pressed = (time >= begin) & (time <= end) & (size[dwell] >= _FEWEST)
+    waiting = time < np.quantile(begins, 0.1)
     press = (end - begin) * usual
     for i in np.flatnonzero(~alike & ((end - begin) * size >= _FEWEST)):
         place = np.arange(starts[i], starts[i] + size[i])

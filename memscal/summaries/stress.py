@@ -27,11 +27,10 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
     applied = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED]
     profiles = []
     for profile in stress.profiles:
-        source = profile.scan.source
         numbers = [quantity.read_in(profile.scan.reading) for quantity in _IN_JSON]
         profiles.append(
             {
-                "scan": None if source is None else source.file_name,
+                "scan": getattr(profile.scan.source, "file_name", None),
                 **declared.members(numbers, profile, **_centre(profile)),
                 "stress": declared.members(_POINTS_IN_JSON, profile),
             }

@@ -23,7 +23,7 @@ def tables(result: FleetCalibration) -> list[Table]:
 def mapping(result: FleetCalibration) -> dict[str, Any]:
     """Return the estimates and the quality checks, or the error."""
     values = {"index": result.index, "passed": result.passed}
-    if result.parameters is None or result.resolved_wavenumber is None:
+    if result.parameters is None:
         return values | {"error": str(result.error)}
     estimates = parameters_json(result.parameters)
     checks = checks_json(result.checks)

@@ -1,7 +1,6 @@
 """Columns of numbers: chosen by name or number, with units from their heads, read part by part."""
 
 import re
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from types import MappingProxyType
@@ -70,6 +69,8 @@ class NamedColumns:
     #: What a row is called in messages, and what cuts a head into the name and its unit.
     _row = "row"
     _cut = staticmethod(cut_head)
+    #: Whether a point in a number would be a separator of thousands.
+    _comma_alone = False
 
     def __init__(self, name: str, missing: Sequence[str] = ()) -> None:
         self._name = name
@@ -84,8 +85,8 @@ class NamedColumns:
         self._sentinels = [number_of(w.replace(",", ".")) for w in missing if is_number(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
         self._wrong: dict[str | int, tuple[list[int], list[str]]] = {}
-        # First row of each part, and the lines of its rows.
-        self._lines_of: list[tuple[int, Lines]] = []
+        # Lines of the rows, part by part.
+        self._lines_of: list[Lines] = []
 
     def columns(self, wanted: Mapping[str, Wanted]) -> dict[str, FloatArray]:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
@@ -99,7 +100,7 @@ class NamedColumns:
         values = [np.empty(2 * rows + _SPARE) for _ in wanted]
         parts = self._parts([*wanted.values()])
         for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
-            self._lines_of.append((count, lines))
+            self._lines_of.append(lines)
             for item, column, numbers in zip(wanted.values(), values, part, strict=True):
                 if self._sentinels:
                     numbers = np.where(np.isin(numbers, self._sentinels), np.nan, numbers)
@@ -144,12 +145,7 @@ class NamedColumns:
 
     def lines(self, rows: Sequence[int]) -> str:
         """Name the lines of the file in which rows stand: the first five, and how many more."""
-        starts = [start for start, _ in self._lines_of]
-        named = []
-        for row in rows[:_NAMED]:
-            start, lines = self._lines_of[bisect_right(starts, row) - 1]
-            named.append(lines[row - start])
-        return self._named(named, len(rows))
+        return self._named(self.all_lines()[rows[:_NAMED]].tolist(), len(rows))
 
     def _named(self, lines: Sequence[int], count: int) -> str:
         more = f" and {count - _NAMED} more" if count > _NAMED else ""
@@ -158,7 +154,7 @@ class NamedColumns:
 
     def all_lines(self) -> NDArray[Any]:
         """Return the line of the file of each row, (n,)."""
-        return np.concatenate([np.asarray(lines) for _, lines in self._lines_of])
+        return np.concatenate(self._lines_of)
 
     def _index(self, column: str | int) -> int:
         if isinstance(column, str) and self.names.count(column) == 1:
@@ -216,11 +212,6 @@ class NamedColumns:
                     return numbers
         pairs = zip(cells, lines, strict=True)
         return np.array([self._number(cell, line, item) for cell, line in pairs])
-
-    @property
-    def _comma_alone(self) -> bool:
-        """Whether a point in a number would be a separator of thousands."""
-        return False
 
     def _number(self, cell: str, line: int, item: Wanted) -> float:
         cell = cell.strip()

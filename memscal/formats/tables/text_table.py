@@ -116,6 +116,8 @@ class TextTable(NamedColumns):
         marks = {",": ""}.get(self._delimiter, "," if sheet else ",.")
         with placed(self._name):
             self.decimal = decimal or find_decimal(self._first[0], marks)
+        # The numbers of a workbook have points, whatever its texts have.
+        self._comma_alone = self.decimal == "," and not sheet
 
     def _find_head(self, lines: Numbered, comments: Numbered) -> None:
         """Find the first row of numbers, and the header and the row of units above it."""
@@ -234,11 +236,6 @@ class TextTable(NamedColumns):
                 why="The last columns are empty, or the names are not above their cells.",
                 cure="If columns are empty, state what separates cells (--delimiter ',' or TAB).",
             )
-
-    @property
-    def _comma_alone(self) -> bool:
-        # The numbers of a workbook have points, whatever its texts have.
-        return self.decimal == "," and not self._sheet
 
     def _require_whole(self, rows: Rows, places: list[int], lines: Numbered) -> None:
         """Refuse rows with more cells than the header, or spaces for a cell; and open quotes."""

@@ -218,7 +218,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     import skfem
 
     # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
-    dofs = np.asarray(system.displacement.element_dofs)
+    dofs = system.displacement.element_dofs
     local = np.asarray(skfem.ElementTriP4.doflocs)
     outward = dofs[0::2]
     inward = dofs[1::2]
