@@ -225,14 +225,18 @@ class ApparatusFunction(Result, ApparatusData):
         from scipy.signal import fftconvolve
 
         if self.order:
-            problem = f"Channel {self.sensor.channel} measures a component of a vector field."
-            raise InputError(problem, cure="Give the radial profile of the shear, without y.")
+            raise InputError(
+                f"Channel {self.sensor.channel} measures a component of a vector field.",
+                cure="Give the radial profile of the shear, without y.",
+            )
         stress = np.asarray(sigma_zz, dtype=np.float64)
         g = self.field
         offsets = []
         if stress.ndim != 2 or not np.isfinite(stress).all():
-            problem = "sigma_zz is no field (y, x) of finite stresses."
-            raise InputError(problem, cure="Give an array of two axes without missing values.")
+            raise InputError(
+                "sigma_zz is no field (y, x) of finite stresses.",
+                cure="Give an array of two axes without missing values.",
+            )
         for name, values, size in (("x", x, stress.shape[-1]), ("y", y, len(stress))):
             axis = finite_vector(name, values)
             step = float(np.ptp(axis)) / max(axis.size - 1, 1)
@@ -244,9 +248,11 @@ class ApparatusFunction(Result, ApparatusData):
                     cure="Give a field of shape (y, x).",
                 )
             if np.abs(np.diff(axis) - step).max() > _UNEVEN * step:
-                problem = f"The positions along {name} are not even."
-                why = "The field is convolved on its own lattice."
-                raise InputError(problem, why=why, cure="Interpolate it to even positions.")
+                raise InputError(
+                    f"The positions along {name} are not even.",
+                    why="The field is convolved on its own lattice.",
+                    cure="Interpolate it to even positions.",
+                )
             self._require_fine(step)
             reach = int(max(np.abs(getattr(g, name)).max() / step, 1))
             offsets.append(step * np.arange(-reach, reach + 1))
@@ -276,9 +282,11 @@ class ApparatusFunction(Result, ApparatusData):
     def _require_decayed(self, left: float, peak: float, end: str) -> None:
         """Refuse a stress of which a share of its peak is left at its end."""
         if left > _DECAYED * peak:
-            problem = f"{left / peak:.1%} of the largest stress is left at {end}."
-            why = "A convolution needs the stress out to where it has decayed."
-            raise InputError(problem, why=why, cure="Extend the table.")
+            raise InputError(
+                f"{left / peak:.1%} of the largest stress is left at {end}.",
+                why="A convolution needs the stress out to where it has decayed.",
+                cure="Extend the table.",
+            )
 
     def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:
         radii = np.abs(np.asarray(r, dtype=np.float64))
@@ -301,8 +309,10 @@ class ApparatusFunction(Result, ApparatusData):
         if radii.size < _FEWEST_RADII:
             raise InputError(f"A stress at {radii.size} radii cannot be interpolated.")
         if not 0 <= radii[0] <= radii[1] - radii[0]:
-            problem = f"r begins at {radii[0]:g} m."
-            raise InputError(problem, cure="Give the stress from the axis (r = 0) outward.")
+            raise InputError(
+                f"r begins at {radii[0]:g} m.",
+                cure="Give the stress from the axis (r = 0) outward.",
+            )
         # A step matters only where there is stress.
         peak = np.abs(stress).max()
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak

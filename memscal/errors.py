@@ -90,5 +90,4 @@ def placed(where: str) -> Iterator[None]:
     except InputError as error:
         if where in error.problem:
             raise
-        problem = f"{where}: {error.problem}"
-        raise type(error)(problem, why=error.why, cure=error.cure) from error
+        raise type(error)(f"{where}: {error.problem}", why=error.why, cure=error.cure) from error

@@ -68,8 +68,10 @@ def cores() -> int:
 def require_workers(workers: Any) -> None:
     """Refuse a number of processes that is not whole, or out of range."""
     if not isinstance(workers, Integral) or not 1 <= int(workers) <= _MOST_WORKERS:
-        problem = f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}."
-        raise InputError(problem, cure="Give one process per core, at the most.")
+        raise InputError(
+            f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}.",
+            cure="Give one process per core, at the most.",
+        )
 
 
 @contextmanager
@@ -194,11 +196,15 @@ def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
 
         client = Client(address, timeout=_CONNECTING)
     except ModuleNotFoundError as error:
-        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
-        raise MemscalError("Dask (distributed) is not installed.", cure=cure) from error
+        raise MemscalError(
+            "Dask (distributed) is not installed.",
+            cure='Install it with the extra "fleet": pip install "memscal[fleet]".',
+        ) from error
     except (OSError, ValueError) as error:
-        cure = "Give the address that the scheduler states, such as tcp://node1:8786."
-        raise InputError(f"No scheduler answers at {address}: {error}", cure=cure) from error
+        raise InputError(
+            f"No scheduler answers at {address}: {error}",
+            cure="Give the address that the scheduler states, such as tcp://node1:8786.",
+        ) from error
     with client:
         executor = client.get_executor()
         try:

@@ -95,8 +95,9 @@ def _check_kinds(values: dict[str, Any], usual: Method) -> None:
         default = getattr(usual, name, None)
         number = type(value) in (int, float) and math.isfinite(value)
         if isinstance(default, float) and not number:
-            problem = f"--option {name}={value}: {name} is a number, such as {default}."
-            raise click.UsageError(problem)
+            raise click.UsageError(
+                f"--option {name}={value}: {name} is a number, such as {default}."
+            )
         if type(default) is int and type(value) is not int:
             raise click.UsageError(f"--option {name}={value}: {name} is a whole number.")
 

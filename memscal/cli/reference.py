@@ -188,8 +188,9 @@ def _check_usage(options: dict[str, Any]) -> None:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
     for name in ("output", "mesh"):
         if options[name] is not None and max(len(loads), len(depths)) > 1:
-            problem = f"A file holds one load: with --{name} give one --load or one --depth."
-            raise click.UsageError(problem)
+            raise click.UsageError(
+                f"A file holds one load: with --{name} give one --load or one --depth."
+            )
     _choose_law(options)
     if mesh is not None and options["backend"] != "fem" and options["film_law"] == "linear":
         raise click.UsageError("--mesh shows finite elements: add --backend fem.")

@@ -151,8 +151,9 @@ class _Transaction:
             if stay and isinstance(error, OutputError):
                 others = [file.target for file in self._files if file.target not in stay]
                 new, old = (", ".join(map(str, paths)) for paths in (stay, others))
-                why = f"New is now: {new}. As before is: {old}."
-                raise OutputError(error.problem, why=why, cure=error.cure) from error
+                raise OutputError(
+                    error.problem, why=f"New is now: {new}. As before is: {old}.", cure=error.cure
+                ) from error
             raise
         for folder in {file.target.parent for file in self._files}:
             _sync_folder(folder)
@@ -213,8 +214,11 @@ def _checked_target(path: FilePath, *, overwrite: bool, inputs: Iterable[FilePat
             cure="Give the name of a file.",
         )
     if not overwrite:
-        cure = "Choose another name, or allow overwriting (--force; overwrite=True in Python)."
-        raise OutputError(f"The output {shown} exists already.", why=_UNTOUCHED, cure=cure)
+        raise OutputError(
+            f"The output {shown} exists already.",
+            why=_UNTOUCHED,
+            cure="Choose another name, or allow overwriting (--force; overwrite=True in Python).",
+        )
     return target
 
 
@@ -332,8 +336,9 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
         descriptor = os.open(shown, os.O_RDONLY | _flags("NONBLOCK", "CLOEXEC", "NOCTTY", "BINARY"))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        problem = f"{shown} cannot be read: {reason}."
-        raise InputError(problem, cure="Check the name and the permissions.") from error
+        raise InputError(
+            f"{shown} cannot be read: {reason}.", cure="Check the name and the permissions."
+        ) from error
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
@@ -350,8 +355,14 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
             if not (piece := os.read(descriptor, 2**20)):
                 return
             total += len(piece)
-        cure = "Check that it is the right file; leave out data that memscal does not need."
-        raise too_large(shown, max(size, total), limit, "bytes", cure=cure, error=UnsafeFileError)
+        raise too_large(
+            shown,
+            max(size, total),
+            limit,
+            "bytes",
+            cure="Check that it is the right file; leave out data that memscal does not need.",
+            error=UnsafeFileError,
+        )
     except OSError as error:
         raise InputError(f"{shown} cannot be read: {error.strerror}.") from error
     finally:

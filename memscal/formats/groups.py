@@ -152,8 +152,10 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
     axes = [axis.removesuffix("_prime") for axis in quantity.axes]
     shape = tuple(map(lengths.setdefault, axes, values.shape))
     if values.shape != shape:
-        problem = f"{file.where(at)} has shape {values.shape}, but its axes give {shape}."
-        raise FormatError(problem, cure="Write the file again.")
+        raise FormatError(
+            f"{file.where(at)} has shape {values.shape}, but its axes give {shape}.",
+            cure="Write the file again.",
+        )
     return values
 
 
@@ -228,8 +230,10 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     """Read the parameters, in SI units."""
     names = tuple(text_list(file, f"{path}/names"))
     if not names or len(set(names)) != len(names):
-        problem = f"{file.where(path)}/names is missing or names a parameter twice."
-        raise FormatError(problem, why="It lists the parameters, in the order of their covariance.")
+        raise FormatError(
+            f"{file.where(path)}/names is missing or names a parameter twice.",
+            why="It lists the parameters, in the order of their covariance.",
+        )
     values = []
     units = []
     scales = []
@@ -439,8 +443,10 @@ def read_field(file: SafeFile, path: str) -> StressField:
     at = f"{path}/{signal}"
     unit = units_of(file, at) or "1"
     if not file.has(at):
-        why = "The file is no memscal-reference, and should hold a field there."
-        raise FormatError(f"{file.where(at)} is missing.", why=why)
+        raise FormatError(
+            f"{file.where(at)} is missing.",
+            why="The file is no memscal-reference, and should hold a field there.",
+        )
     values = file.array(at)
     with suppress(UnitError):
         values = to_si(values, unit, "stress", file.where(at))

@@ -19,8 +19,10 @@ def opened_scan(scan: Any, most: int | None = None, *, accept_altered: bool = Fa
     if isinstance(scan, Scan):
         return scan
     if not isinstance(scan, str | PathLike):
-        cure = "Give a scan, or the path of its file."
-        raise InputError(f"There is a {type(scan).__name__} where a Scan is needed.", cure=cure)
+        raise InputError(
+            f"There is a {type(scan).__name__} where a Scan is needed.",
+            cure="Give a scan, or the path of its file.",
+        )
     with open_hdf5(scan, accept_altered=accept_altered) as file:
         return scan_from(file, most)
 

@@ -76,8 +76,10 @@ def read_reference(
     if os.fspath(path).lower().endswith(_PIXELS):
         return _read_pixels(path, pixel_size).profile()
     if pixel_size is not None:
-        problem = f"A pixel size is given, but {os.fspath(path)} is no array and no image."
-        raise InputError(problem, cure="Leave it out (pixel_size, --pixel-size).")
+        raise InputError(
+            f"A pixel size is given, but {os.fspath(path)} is no array and no image.",
+            cure="Leave it out (pixel_size, --pixel-size).",
+        )
     with open_hdf5(path, accept_altered=accept_altered) as file:
         return profile_from(file)
 
@@ -98,8 +100,10 @@ def length(text: str, what: str) -> float:
     """Read a length with its unit, such as 0.5mm, in m."""
     match = _LENGTH.fullmatch(text)
     if match is None:
-        cure = "Give a number with a unit of length, such as 0.5mm or 200um."
-        raise InputError(f"{what}, {text!r}, is no length.", cure=cure)
+        raise InputError(
+            f"{what}, {text!r}, is no length.",
+            cure="Give a number with a unit of length, such as 0.5mm or 200um.",
+        )
     return float(to_si(float(match[1]), match[2], "length", what))
 
 
@@ -123,8 +127,10 @@ def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
         notes = "Of the image the luminance was taken."
         values = values[..., :3] @ _LUMINANCE if channels > 2 else values[..., 0]
     if values.ndim != 2 or values.dtype.kind not in "biuf":
-        problem = f"{name} holds an array of shape {values.shape} and type {values.dtype}."
-        raise InputError(problem, cure="Give one of numbers, in rows along y and columns along x.")
+        raise InputError(
+            f"{name} holds an array of shape {values.shape} and type {values.dtype}.",
+            cure="Give one of numbers, in rows along y and columns along x.",
+        )
     y, x = (pixel_size * np.arange(count, dtype=np.float64) for count in values.shape)
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with placed(name):
@@ -137,8 +143,13 @@ def _image(data: bytes) -> NDArray[Any]:
     with Image.open(BytesIO(data), formats=("PNG", "TIFF")) as image:
         side = max(image.size)
         if side > MOST_PIXELS:
-            cure = "Cut out the field, or average neighbouring pixels."
-            raise too_large("The image", side, MOST_PIXELS, "pixels along a side", cure=cure)
+            raise too_large(
+                "The image",
+                side,
+                MOST_PIXELS,
+                "pixels along a side",
+                cure="Cut out the field, or average neighbouring pixels.",
+            )
         return np.asarray(image.convert("RGB") if image.mode == "P" else image)
 
 

@@ -50,8 +50,10 @@ def _read_scans(
     stored = json_value(file, "/entry/scans/names", list, None)
     size = max(of) if stored is None else len(stored)
     if max(of) > size:
-        problem = f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}."
-        raise FormatError(problem, cure="Run memscal apply again.")
+        raise FormatError(
+            f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}.",
+            cure="Run memscal apply again.",
+        )
     scans = []
     for i, name in enumerate(stored or [f"scan_{i}" for i in range(1, size + 1)], start=1):
         path = f"/entry/scans/{name}"
@@ -126,8 +128,10 @@ def stress_from(file: SafeFile) -> MeasuredStress:
     values.require_unaltered(file, writer.STRESS_SCHEMA)
     paths = profile_paths(file)
     if not paths:
-        why = "It lists the groups that hold one."
-        raise FormatError(f"{file.where('/entry/profiles')} names no profile.", why=why)
+        raise FormatError(
+            f"{file.where('/entry/profiles')} names no profile.",
+            why="It lists the groups that hold one.",
+        )
     inputs = text_list(file, "/entry/inputs/names")
     sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
@@ -319,8 +323,10 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     budget_path = _part_of_profile(file, "budgets", name, f"{path}/budget")
     budget = groups.read_budget(file, budget_path)
     if not roots or not budget.keys() >= _BUDGET.keys():
-        problem = f"{file.where(path)} states no covariance of its stress, or no budget."
-        raise FormatError(problem, why="Measured stress without uncertainty means little.")
+        raise FormatError(
+            f"{file.where(path)} states no covariance of its stress, or no budget.",
+            why="Measured stress without uncertainty means little.",
+        )
     profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
     profile |= read_record(records.STRESS_NUMBERS.read_in(scan.reading), file, path)
     curve = _part_of_profile(file, "curves", name, f"{path}/curve")

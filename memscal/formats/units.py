@@ -171,16 +171,19 @@ def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
     """Return one of a unit, which pint must know, and whose zero is that of the SI unit."""
     cure = f'Write it like "{DIMENSIONS.get(dimension, DIMENSIONS["voltage"]).stored}".'
     if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
-        problem = f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.'
-        raise UnitError(problem, cure=cure)
+        raise UnitError(
+            f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.',
+            cure=cure,
+        )
     try:
         quantity = _registry().Quantity(1.0, _registry().parse_units(unit))
         return quantity + 0 * quantity  # no sum of degrees above another zero, or of logarithms
     except Exception as error:  # pint raises what its parser happens to meet
-        problem = (
-            f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.'
-        )
-        raise UnitError(problem, why=f"It is a {dimension}.", cure=cure) from error
+        raise UnitError(
+            f'{where} has the unit "{_shown(unit)}", which is unknown, or has a zero of its own.',
+            why=f"It is a {dimension}.",
+            cure=cure,
+        ) from error
 
 
 def dsi_unit(*units: str) -> str:

@@ -42,8 +42,10 @@ def require_schema(file: SafeFile, schema: str) -> str:
             cure="Upgrade memscal.",
         )
     if int(major) < int(newest):
-        problem = f"{file.name} has {schema} version {version}, which is not read any more."
-        raise SchemaVersionError(problem, cure="Write it again with the current memscal.")
+        raise SchemaVersionError(
+            f"{file.name} has {schema} version {version}, which is not read any more.",
+            cure="Write it again with the current memscal.",
+        )
     return version
 
 
@@ -67,8 +69,10 @@ def require_array(
         )
     values = file.array(path)
     if ndim is not None and values.ndim != ndim:
-        problem = f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected."
-        raise FormatError(problem, cure="Check the shape of the array.")
+        raise FormatError(
+            f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected.",
+            cure="Check the shape of the array.",
+        )
     return to_si(values, units_of(file, path), dimension, file.where(path))
 
 
@@ -80,8 +84,9 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
 def only_number(file: SafeFile, path: str, values: FloatArray) -> float:
     """Return the one number that is stored at a path."""
     if values.size != 1:
-        problem = f"{file.where(path)} has {values.size} values, but one number is expected."
-        raise FormatError(problem)
+        raise FormatError(
+            f"{file.where(path)} has {values.size} values, but one number is expected."
+        )
     return values.item()
 
 
@@ -120,8 +125,9 @@ def json_value(
     try:
         value = json.loads(file.text(path), parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError) as error:
-        problem = f"{file.where(path)} is not JSON: {error}."
-        raise InputError(problem, cure="Write the file again.") from error
+        raise InputError(
+            f"{file.where(path)} is not JSON: {error}.", cure="Write the file again."
+        ) from error
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
     if len(value) > _MAX_ITEMS:

@@ -65,9 +65,11 @@ def external_family(
         raise InputError("No table of a calculated stress was given.")
     loadings = {profile.loading for mu, profile in tables if profile.loading and mu > 0}
     if len(loadings) > 1:
-        problem = "Some of the tables are for incremental loading and some for total loading."
-        why = "A family holds one loading."
-        raise InputError(problem, why=why, cure="Give the tables of one loading at a time.")
+        raise InputError(
+            "Some of the tables are for incremental loading and some for total loading.",
+            why="A family holds one loading.",
+            cure="Give the tables of one loading at a time.",
+        )
     loading = "".join(loadings)
     frictions = np.array(sorted({mu for mu, _ in tables}))
     grid = _grid(tables, frictions, nominal)
@@ -154,8 +156,10 @@ def _nearest(tables: Sequence[_Table], mu: float, load: float) -> StressProfile 
 def _checked_friction(profile: StressProfile, reach: float) -> float:
     """Return the friction coefficient of a table; refuse one that is no whole stress."""
     if profile.friction_coefficient is None:
-        problem = f"{_name(profile)} does not say its friction coefficient."
-        raise InputError(problem, cure="State it when the table is imported (--friction).")
+        raise InputError(
+            f"{_name(profile)} does not say its friction coefficient.",
+            cure="State it when the table is imported (--friction).",
+        )
     size = np.abs(profile.sigma_zz)
     tail = float(size[-1] / size.max())
     if profile.r[-1] < reach and tail > _DECAYED:

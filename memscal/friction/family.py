@@ -238,12 +238,13 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
             failure = error
             if isinstance(error, DomainError):
                 break
-    problem = (
+    raise type(failure)(
         f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm with a film of "
         f"{path.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(path.loads):g} N "
-        f"(friction {path.friction:g}, {path.loading} loading): {failure.problem}"
-    )
-    raise type(failure)(problem, why=failure.why, cure=failure.cure) from failure
+        f"(friction {path.friction:g}, {path.loading} loading): {failure.problem}",
+        why=failure.why,
+        cure=failure.cure,
+    ) from failure
 
 
 #: Raised where the same request gives other numbers within one version.
@@ -273,9 +274,11 @@ class FamilySetup:
         """Refuse what is no sphere, no positive load or reach, or no number of workers."""
         require_workers(workers)
         if not isinstance(indenter, Sphere):
-            problem = f"Profiles were asked for under a {indenter.shape}, but a sphere is needed."
-            why = "Friction shows under an indenter whose contact grows with the load."
-            raise InputError(problem, why=why, cure="Give the sphere of the contact scan.")
+            raise InputError(
+                f"Profiles were asked for under a {indenter.shape}, but a sphere is needed.",
+                why="Friction shows under an indenter whose contact grows with the load.",
+                cure="Give the sphere of the contact scan.",
+            )
         self.film = film
         self.indenter = indenter
         require_positive("reach", reach, "m")
@@ -414,8 +417,10 @@ def parameter_values(what: str, values: Sequence[float]) -> FloatArray:
     if checked.ndim != 1 or checked.size == 0 or np.any(np.isnan(checked)) or np.any(checked < 0):
         raise InputError(f"The {what} are {values!r}, but they are a list, none of them negative.")
     if np.any(np.diff(checked) <= 0):
-        problem = f"The {what} {', '.join(f'{value:g}' for value in checked)} do not increase."
-        raise InputError(problem, cure="Sort them, and give each once.")
+        raise InputError(
+            f"The {what} {', '.join(f'{value:g}' for value in checked)} do not increase.",
+            cure="Sort them, and give each once.",
+        )
     return checked
 
 

@@ -97,19 +97,22 @@ def require_line(name: str, x: FloatArray, y: FloatArray) -> None:
     """Refuse a contact that was scanned over a plane, or on a line across x and y."""
     spreads = np.ptp(x), np.ptp(y)
     if min(spreads) > _NARROW * max(spreads):
-        why = "Contacts are compared along lines through their centre."
-        cure = "Give a line scan along x or y; memscal restore takes a plane."
-        raise InputError(f"{name} was scanned over x and y.", why=why, cure=cure)
+        raise InputError(
+            f"{name} was scanned over x and y.",
+            why="Contacts are compared along lines through their centre.",
+            cure="Give a line scan along x or y; memscal restore takes a plane.",
+        )
 
 
 def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     """Return the points of a measured profile, with the noise that is stated, or was estimated."""
     points = profile.points.get(channel)
     if not profile.points:
-        problem = f"{profile.label}: the measured stress holds no measured points."
-        why = "Its file is of version 1.0, which kept the profiles alone."
-        cure = "Make it again with memscal apply, or give the scans."
-        raise InputError(problem, why=why, cure=cure)
+        raise InputError(
+            f"{profile.label}: the measured stress holds no measured points.",
+            why="Its file is of version 1.0, which kept the profiles alone.",
+            cure="Make it again with memscal apply, or give the scans.",
+        )
     require_line(profile.label, profile.x, profile.y)
     if points is None:
         raise InputError(
@@ -119,9 +122,11 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
             cure=f"Give a line scan along {channel[0]} through the sensor, with u_{channel}.",
         )
     if points.noise is None:
-        problem = f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing."
-        why = "Contacts are told apart by a chi-square."
-        raise InputError(problem, why=why, cure=f"State the electronic noise of u_{channel}.")
+        raise InputError(
+            f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing.",
+            why="Contacts are told apart by a chi-square.",
+            cure=f"State the electronic noise of u_{channel}.",
+        )
     position = (points.x, points.y)[profile.axis]
     middle = (position.max() + position.min()) / 2
     drift = (position - middle) / (np.ptp(position) / 2)

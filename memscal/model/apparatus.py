@@ -193,8 +193,9 @@ class ParameterSet(FrozenArrays):
 
     def _index(self, name: str) -> int:
         if name not in self.names:
-            problem = f"There is no parameter {name}."
-            raise InputError(problem, cure=f"There are {', '.join(self.names)}.")
+            raise InputError(
+                f"There is no parameter {name}.", cure=f"There are {', '.join(self.names)}."
+            )
         return self.names.index(name)
 
 

@@ -179,8 +179,10 @@ def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Return a read-only copy of a vector of whole numbers."""
     array = frozen_array(values)
     if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
-        problem = f"{name} has shape {array.shape}, or holds values that are no whole numbers."
-        raise InputError(problem, cure="Give one whole number for each point.")
+        raise InputError(
+            f"{name} has shape {array.shape}, or holds values that are no whole numbers.",
+            cure="Give one whole number for each point.",
+        )
     return frozen_array(array, dtype=np.int64)
 
 

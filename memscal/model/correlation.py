@@ -54,19 +54,24 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
         )
     least = np.linalg.eigvalsh(correlation)[0]
     if least <= _LEAST_EIGENVALUE:
-        problem = f"{_NOT_POSITIVE}: it has the eigenvalue {least:.3g}."
-        raise InputError(problem, why=_WHY, cure=_CURE)
+        raise InputError(
+            f"{_NOT_POSITIVE}: it has the eigenvalue {least:.3g}.", why=_WHY, cure=_CURE
+        )
     return correlation
 
 
 def _require_band(band: FloatArray) -> None:
     if not np.allclose(band[:, 0], 1.0):
-        problem = "u_zz_correlation is not one in its first column, of each point with itself."
-        raise InputError(problem, cure="Divide a covariance by the standard uncertainties.")
+        raise InputError(
+            "u_zz_correlation is not one in its first column, of each point with itself.",
+            cure="Divide a covariance by the standard uncertainties.",
+        )
     last = band[::-1][: band.shape[1]]
     if np.any(np.triu(last, 1)):
-        problem = "u_zz_correlation correlates the last points with points beyond the end."
-        raise InputError(problem, cure="Give zeros there.")
+        raise InputError(
+            "u_zz_correlation correlates the last points with points beyond the end.",
+            cure="Give zeros there.",
+        )
     try:
         root_of(band)
     except np.linalg.LinAlgError:

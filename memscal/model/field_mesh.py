@@ -68,8 +68,10 @@ class FieldMesh:
                 "(corners) or six (corners, then middles of the sides) are needed."
             )
         if triangles.size and not 0 <= triangles.min() <= triangles.max() < count:
-            problem = f"A triangle of the field mesh has a node outside 0 to {count - 1}."
-            raise InputError(problem, cure="Count the nodes from 0, in the order of points.")
+            raise InputError(
+                f"A triangle of the field mesh has a node outside 0 to {count - 1}.",
+                cure="Count the nodes from 0, in the order of points.",
+            )
 
     def __repr__(self) -> str:
         """Return its size in place of thousands of array elements."""

@@ -76,8 +76,10 @@ class ElasticFilm:
             require_non_negative(f"standard uncertainty of film {name}", uncertainty)
         require_non_negative("film roughness_rms", self.roughness_rms)
         if self.law not in ("", *LAWS):
-            cure = f"Give one of {', '.join(LAWS)}, or leave it out where it is not known."
-            raise InputError(f"The film's law is {self.law!r}.", cure=cure)
+            raise InputError(
+                f"The film's law is {self.law!r}.",
+                cure=f"Give one of {', '.join(LAWS)}, or leave it out where it is not known.",
+            )
         if (self.law == MOONEY_RIVLIN) != (self.mooney_rivlin_ratio is not None):
             raise InputError(
                 f"The film's law is {self.law or 'not stated'!r}, and its ratio C2/C1 is "

@@ -86,8 +86,10 @@ class Result:
     def _shown_as(self, form: str) -> Any:
         function = getattr(self._summary_module(), form, None)
         if function is None:
-            problem = f"A {type(self).__name__} has no {_FORMS[form]}."
-            raise InputError(problem, cure="Use summary() or to_dict().")
+            raise InputError(
+                f"A {type(self).__name__} has no {_FORMS[form]}.",
+                cure="Use summary() or to_dict().",
+            )
         try:
             return function(self)
         except ModuleNotFoundError as error:

@@ -60,8 +60,10 @@ class IdealReference:
 
     def __post_init__(self) -> None:
         if self.shape not in IDEAL:
-            cure = f"Give one of {', '.join(IDEAL)}."
-            raise InputError(f"There is no ideal reference {self.shape!r}.", cure=cure)
+            raise InputError(
+                f"There is no ideal reference {self.shape!r}.",
+                cure=f"Give one of {', '.join(IDEAL)}.",
+            )
         if self.shape != "point":
             arrays.require_positive(f"{IDEAL[self.shape]} of the {self.shape}", self.size, "m")
         elif self.size:
@@ -159,8 +161,10 @@ class StressField:
             steps = np.diff(axis)
             if not _FEWEST <= axis.size <= MOST_PIXELS or np.ptp(steps) > _EVEN * steps.mean():
                 problem = f"{name} of the field has {axis.size} values, or uneven ones"
-                cure = "Cut out what is not zero, and interpolate it to even pixels."
-                raise InputError(f"{problem}: not {_FEWEST} to {MOST_PIXELS} even ones.", cure=cure)
+                raise InputError(
+                    f"{problem}: not {_FEWEST} to {MOST_PIXELS} even ones.",
+                    cure="Cut out what is not zero, and interpolate it to even pixels.",
+                )
         shape = np.shape(self.values)
         expected = (self.y.size, self.x.size)
         if shape != expected:
@@ -313,8 +317,9 @@ class StressProfile:
                     raise InputError(f"{name} of the stress profile has {count}.")
         arrays.require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
-            problem = "r of the stress profile is negative."
-            raise InputError(problem, cure="Give radii, not positions.")
+            raise InputError(
+                "r of the stress profile is negative.", cure="Give radii, not positions."
+            )
 
     def __repr__(self) -> str:
         """Return what it is of in place of thousands of array elements."""

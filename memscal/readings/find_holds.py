@@ -78,8 +78,11 @@ def find_holds(
     runs = _steady_rows(runs, u, pressed, lifted=level, share=0.5)
     held = [run for run in runs if run.size >= _FEWEST]
     if not held:
-        why = f"A hold is {_FEWEST} rows or more in which position, load and reading are steady."
-        raise InputError("The log has no hold.", why=why, cure=_CURE)
+        raise InputError(
+            "The log has no hold.",
+            why=f"A hold is {_FEWEST} rows or more in which position, load and reading are steady.",
+            cure=_CURE,
+        )
     before = None
     if baseline:
         before = _before_each(columns, line, held, waiting, dwell)
@@ -237,8 +240,11 @@ def _timed(
     begin = np.quantile(begins, 0.9)
     end = np.quantile(ends, 0.1)
     if end - begin < _PRESSED:
-        why = "The readings rise at other times at each place."
-        raise InputError("The log does not show when the indenter presses.", why=why, cure=_CURE)
+        raise InputError(
+            "The log does not show when the indenter presses.",
+            why="The readings rise at other times at each place.",
+            cure=_CURE,
+        )
     pressed = (time >= begin) & (time <= end) & (size[dwell] >= _FEWEST)
     waiting = time < np.quantile(begins, 0.1)
     press = (end - begin) * usual
@@ -247,9 +253,12 @@ def _timed(
         raised = place[_raised(u[place])]
         which = f"lines {line[place[0]]} to {line[place[-1]]}"
         if not press / 2 <= raised.size <= 2 * press or np.ptp(raised) > 1.1 * raised.size:
-            problem = f"The log does not show when the indenter presses in {which}."
-            why = f"It rests for {place.size} rows there, at other places for {usual:.0f} (median)."
-            raise InputError(problem, why=why, cure=f"{_CURE} Or leave these lines out.")
+            raise InputError(
+                f"The log does not show when the indenter presses in {which}.",
+                why=f"It rests for {place.size} rows there, at other places for {usual:.0f} "
+                "(median).",
+                cure=f"{_CURE} Or leave these lines out.",
+            )
         pressed[place] = (place >= raised[0]) & (place <= raised[-1])
         waiting[place] = place < raised[0]
         notes.append(

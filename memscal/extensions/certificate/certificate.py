@@ -243,16 +243,21 @@ def _conformity(
     factor = decision.get("guard_band", 1.0)
     rule = decision.get("rule")
     if decision and (rule is None or factor < 0):
-        cure = f'Write rule = "{RULES[0]}" or "{RULES[1]}", and a guard_band that is not negative.'
-        raise InputError(f"{name}: [decision] gives no decision rule.", cure=cure)
+        raise InputError(
+            f"{name}: [decision] gives no decision rule.",
+            cure=f'Write rule = "{RULES[0]}" or "{RULES[1]}", and a guard_band that is not '
+            "negative.",
+        )
     known = {value.quantity.name: value for value in values}
     statements = []
     for key, limits in decision.items():
         if isinstance(limits, Mapping):
             where = f"{name}: [decision] {key}"
             if key not in known:
-                cure = f"There are {', '.join(known)}."
-                raise InputError(f"{where} is not certified for this sensor.", cure=cure)
+                raise InputError(
+                    f"{where} is not certified for this sensor.",
+                    cure=f"There are {', '.join(known)}.",
+                )
             certified = known[key]
             ends = (limits.get("lower", -np.inf), limits.get("upper", np.inf))
             dimension = certified.quantity.dimension

@@ -128,8 +128,10 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     try:
         content = tomllib.loads(read_bytes(path, limit=_LONGEST).decode("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        why = "A laboratory's file is TOML, in UTF-8; docs/certificate.md shows one."
-        raise FormatError(f"{name} is no TOML: {error}.", why=why) from error
+        raise FormatError(
+            f"{name} is no TOML: {error}.",
+            why="A laboratory's file is TOML, in UTF-8; docs/certificate.md shows one.",
+        ) from error
     equipment = content.pop("equipment", [])
     if not isinstance(equipment, list):
         raise FormatError(f"{name}: equipment is one table.", cure="Write [[equipment]] over each.")
@@ -172,8 +174,10 @@ def _missing(place: str, section: str, stated: Mapping[str, Any]) -> Iterator[st
 def _section(where: str, section: str, content: Any) -> dict[str, Any]:
     """Return a table with its values as their kinds ask for."""
     if not isinstance(content, dict):
-        cure = f"Write it as a table of {', '.join(SECTIONS[section])}."
-        raise FormatError(f"{where} is {content!r}.", cure=cure)
+        raise FormatError(
+            f"{where} is {content!r}.",
+            cure=f"Write it as a table of {', '.join(SECTIONS[section])}.",
+        )
     for key in content:
         _require_known(where, key, list(SECTIONS[section]))
     return {k: _value(f"{where} {k}", SECTIONS[section][k], v) for k, v in content.items()}
@@ -183,8 +187,11 @@ def _require_known(where: str, key: str, known: list[str]) -> None:
     if key not in known:
         close = get_close_matches(key, known, 1, 0.5)
         cure = f"Did you mean {close[0]}?" if close else f"It may have {', '.join(known)}."
-        why = "What is misspelt would be missing in the certificate."
-        raise FormatError(f"{where} has {key}, which is not known.", why=why, cure=cure)
+        raise FormatError(
+            f"{where} has {key}, which is not known.",
+            why="What is misspelt would be missing in the certificate.",
+            cure=cure,
+        )
 
 
 def _value(where: str, kind: str, value: Any) -> Any:

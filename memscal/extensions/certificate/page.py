@@ -284,9 +284,11 @@ def certificate_pdf(certificate: Certificate, page: str, xml: bytes) -> bytes:
     try:
         import weasyprint
     except (ImportError, OSError) as error:
-        problem = f"WeasyPrint, which makes the PDF, cannot be used: {error}."
         cure = 'Install the extra "certificate" (pip install "memscal[certificate]"), or write'
-        raise MemscalError(problem, cure=f"{cure} .html and print it.") from error
+        raise MemscalError(
+            f"WeasyPrint, which makes the PDF, cannot be used: {error}.",
+            cure=f"{cure} .html and print it.",
+        ) from error
     now = datetime.fromisoformat(timestamp())
     attachment = weasyprint.Attachment(
         string=xml,

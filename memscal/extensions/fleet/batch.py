@@ -114,8 +114,11 @@ class Batch:
         stays = "It may hold results, which are not replaced."
         with suppress(FileNotFoundError, NotADirectoryError):
             if not resume and any(path.is_file() for path in self.results.rglob("*")):
-                cure = "Continue them with --resume, or give another folder."
-                raise OutputError(f"The folder {self.results} exists.", why=stays, cure=cure)
+                raise OutputError(
+                    f"The folder {self.results} exists.",
+                    why=stays,
+                    cure="Continue them with --resume, or give another folder.",
+                )
         begun_with = read_batch(self.results).get("shard_size")
         balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
         size = self.shard_size or begun_with or balanced
@@ -147,8 +150,10 @@ class Batch:
             first = first or scan.path
             there = there or (self.folder / scan.path).exists()
         if not count:
-            cure = "Give a folder with scans (HDF5), or a manifest with a scan a line."
-            raise MemscalError(f"{self.source} holds no scans.", cure=cure)
+            raise MemscalError(
+                f"{self.source} holds no scans.",
+                cure="Give a folder with scans (HDF5), or a manifest with a scan a line.",
+            )
         if not there:
             raise InputError(
                 f"None of the {count} scans that {self.source.name} lists is there; the first is "
@@ -196,8 +201,10 @@ def _sha256_of(value: object) -> str:
 def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
     """Calibrate the scans of a shard, unless its file is there and is of the same work."""
     if batch.version != __version__:
-        problem = f"A worker has memscal {__version__}, the batch {batch.version}."
-        raise MemscalError(problem, cure="Install the same version everywhere.")
+        raise MemscalError(
+            f"A worker has memscal {__version__}, the batch {batch.version}.",
+            cure="Install the same version everywhere.",
+        )
     rows = _kept_rows(batch, shard)
     kept = bool(rows)
     if not kept:

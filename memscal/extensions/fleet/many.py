@@ -126,11 +126,15 @@ def calibrate_many(
     [True, True, True, False]
     """
     if isinstance(scans, Scan | str | PathLike):
-        cure = "Give a list of scans; calibrate one with memscal.calibrate(scan)."
-        raise InputError("calibrate_many() was given one scan.", cure=cure)
+        raise InputError(
+            "calibrate_many() was given one scan.",
+            cure="Give a list of scans; calibrate one with memscal.calibrate(scan).",
+        )
     if not (executor is None or callable(getattr(executor, "submit", None))):
-        problem = f"The executor is a {type(executor).__name__}, which takes no tasks."
-        raise InputError(problem, cure="Give a concurrent.futures.Executor, or leave it out.")
+        raise InputError(
+            f"The executor is a {type(executor).__name__}, which takes no tasks.",
+            cure="Give a concurrent.futures.Executor, or leave it out.",
+        )
     method = options.get("method", "white-noise")
     seed = options.get("seed", 0)
     calibration = signature(calibrate).parameters

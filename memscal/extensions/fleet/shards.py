@@ -48,16 +48,19 @@ def manifest_scans(source: Path) -> Iterator[FleetScan]:
         yield from _folder_scans(source)
         return
     if not source.is_file():
-        cure = "Give a folder of scans, or a text file that lists one scan a line."
-        raise InputError(f"{source} is neither a folder nor a regular file.", cure=cure)
+        raise InputError(
+            f"{source} is neither a folder nor a regular file.",
+            cure="Give a folder of scans, or a text file that lists one scan a line.",
+        )
     try:
         with source.open(encoding="utf-8-sig", newline="") as lines:
             yield from _listed_scans(source.name, lines)
     except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"{source} is not a table of text: {error}.") from error
     except OSError as error:
-        cure = "Give a manifest that you may read."
-        raise InputError(f"{source} cannot be read: {error.strerror}.", cure=cure) from error
+        raise InputError(
+            f"{source} cannot be read: {error.strerror}.", cure="Give a manifest that you may read."
+        ) from error
 
 
 def _folder_scans(folder: Path) -> Iterator[FleetScan]:
@@ -86,8 +89,10 @@ def _listed_scans(name: str, lines: Iterator[str]) -> Iterator[FleetScan]:
         try:
             place = [float(row[key]) if row.get(key) else None for key in ("wafer_x", "wafer_y")]
         except ValueError as error:
-            cure = "Give the place on the wafer in mm, or leave it empty."
-            raise FormatError(f"{name}, line {number}: {error}.", cure=cure) from error
+            raise FormatError(
+                f"{name}, line {number}: {error}.",
+                cure="Give the place on the wafer in mm, or leave it empty.",
+            ) from error
         if not row.get("path"):
             raise FormatError(f"{name}, line {number} has no path.", cure="Add it.")
         yield FleetScan(row["path"], *place)
@@ -97,8 +102,10 @@ def _require_places(name: str, head: Sequence[str]) -> None:
     for place in ("wafer_x", "wafer_y"):
         other = next((cell for cell in head if cell.startswith(place) and cell != place), None)
         if other is not None:
-            cure = f"Give places on the wafer in mm, in a column {place}."
-            raise FormatError(f"{name} has a column {other!r}, which is not read.", cure=cure)
+            raise FormatError(
+                f"{name} has a column {other!r}, which is not read.",
+                cure=f"Give places on the wafer in mm, in a column {place}.",
+            )
 
 
 #: Those that a calibration may estimate, with columns of their own.
@@ -128,8 +135,10 @@ def arrow() -> Any:
     try:
         import pyarrow.parquet
     except ModuleNotFoundError as error:
-        cure = 'Install it with the extra "fleet": pip install "memscal[fleet]".'
-        raise MemscalError("pyarrow, which writes Parquet, is not installed.", cure=cure) from error
+        raise MemscalError(
+            "pyarrow, which writes Parquet, is not installed.",
+            cure='Install it with the extra "fleet": pip install "memscal[fleet]".',
+        ) from error
     return pyarrow
 
 
@@ -256,8 +265,9 @@ def read_shard(path: Path, columns: Sequence[str] | None = None) -> Any:
         return file.read(columns)
     except (pa.ArrowException, OSError) as error:
         reason = " ".join(str(error).split())[:200]
-        cure = "Remove it, and run memscal batch --resume."
-        raise FormatError(f"{path} is damaged: {reason}", cure=cure) from error
+        raise FormatError(
+            f"{path} is damaged: {reason}", cure="Remove it, and run memscal batch --resume."
+        ) from error
 
 
 def shard_paths(results: Path) -> list[Path]:
@@ -372,8 +382,10 @@ def read_fleet(results: Path) -> FleetResults:
     """Read what a summary needs of the tables of a batch, one after the other."""
     shards = shard_paths(results)
     if not shards:
-        cure = "Give the folder that memscal batch -o wrote."
-        raise InputError(f"{results} holds no results of a batch.", cure=cure)
+        raise InputError(
+            f"{results} holds no results of a batch.",
+            cure="Give the folder that memscal batch -o wrote.",
+        )
     statements = _Statements()
     numbers = []
     for shard in shards:

@@ -178,8 +178,11 @@ def check_type(where: str, kind: Any, *, text: bool) -> None:
             raise refuse(where, "does not hold text", "Text is expected here.")
         return
     if type_class not in (h5py.h5t.INTEGER, h5py.h5t.FLOAT):
-        why = "Objects, references, compounds and strings are not read where numbers belong."
-        raise refuse(where, "holds neither integers nor floating-point numbers", why)
+        raise refuse(
+            where,
+            "holds neither integers nor floating-point numbers",
+            "Objects, references, compounds and strings are not read where numbers belong.",
+        )
     if kind.get_size() > _MAX_NUMBER_BYTES:
         raise refuse(where, f"has numbers of {kind.get_size()} bytes", "No number is that long.")
 
@@ -218,8 +221,11 @@ def check_layout(where: str, dataset: Any, data: bytes, *, text: bool) -> Layout
     limit = MAX_TEXT_BYTES if text else MOST_ARRAY_BYTES
     size = claimed if text else max(claimed, of.held)
     if size > limit:
-        why = f"More than {limit:,} bytes are not read, however small the file is."
-        raise refuse(where, f"claims {size:,} bytes", why)
+        raise refuse(
+            where,
+            f"claims {size:,} bytes",
+            f"More than {limit:,} bytes are not read, however small the file is.",
+        )
     plist = dataset.get_create_plist()
     layout = plist.get_layout()
     if layout == h5py.h5d.VIRTUAL:
@@ -245,11 +251,17 @@ def _check_filters(where: str, plist: Any) -> list[int]:
     codes = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
     for code in codes:
         if code not in filters:
-            why = "Only gzip, shuffle and fletcher32 are read: others may load foreign code."
-            raise refuse(where, f"uses the HDF5 filter {code}", why)
+            raise refuse(
+                where,
+                f"uses the HDF5 filter {code}",
+                "Only gzip, shuffle and fletcher32 are read: others may load foreign code.",
+            )
         if codes.count(code) > 1:
-            why = "Filters on filters can blow a small file up without limit."
-            raise refuse(where, f"uses the filter {filters[code]} more than once", why)
+            raise refuse(
+                where,
+                f"uses the filter {filters[code]} more than once",
+                "Filters on filters can blow a small file up without limit.",
+            )
     return codes
 
 
@@ -257,12 +269,18 @@ def _check_chunks(where: str, dataset: Any, chunk: tuple[int, ...], of: Layout) 
     """Refuse chunks much larger than the data, too many or unwritten ones; return their size."""
     size = math.prod(chunk) * int(of.kind.get_size())
     if size > max(_MIN_CHUNK_LIMIT, 2 * of.size) or size > MOST_ARRAY_BYTES:
-        problem = f"has chunks of {size:,} bytes for {of.size:,} bytes of data"
-        raise refuse(where, problem, "A whole chunk is held in memory to read one number.")
+        raise refuse(
+            where,
+            f"has chunks of {size:,} bytes for {of.size:,} bytes of data",
+            "A whole chunk is held in memory to read one number.",
+        )
     number = math.prod(-(-n // c) for n, c in zip(of.shape, chunk, strict=True))
     if number * size > max(_MIN_CHUNK_LIMIT, _MAX_MARGIN * of.size):
-        problem = f"is cut into chunks of {number * size:,} bytes for {of.size:,} bytes of data"
-        raise refuse(where, problem, "Each is unpacked as a whole.")
+        raise refuse(
+            where,
+            f"is cut into chunks of {number * size:,} bytes for {of.size:,} bytes of data",
+            "Each is unpacked as a whole.",
+        )
     if number > _MAX_CHUNKS:
         raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")
     if number and dataset.get_num_chunks() < number:
@@ -281,7 +299,10 @@ def _check_inflation(where: str, dataset: Any, codes: list[int], size: int, data
         if not chunk.filter_mask & 1 << place:
             packed = whole[chunk.byte_offset :][: chunk.size]
             if len(zlib.decompressobj().decompress(packed, size + 1)) != size:
-                problem = f"has a chunk that does not unpack to {size:,} bytes"
-                raise refuse(where, problem, "A few bytes can stand for any number of them.")
+                raise refuse(
+                    where,
+                    f"has a chunk that does not unpack to {size:,} bytes",
+                    "A few bytes can stand for any number of them.",
+                )
 
     dataset.chunk_iter(check)

@@ -245,13 +245,19 @@ class SafeFile:
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size
         if self._budget < 0:
-            why = f"At most {self._most:,} bytes, as they are held, are read from it."
-            raise refuse(self.where(path), "brings the data of this file over the limit", why)
+            raise refuse(
+                self.where(path),
+                "brings the data of this file over the limit",
+                f"At most {self._most:,} bytes, as they are held, are read from it.",
+            )
 
     def _check_length(self, path: str, length: int) -> None:
         if length > MAX_TEXT_BYTES:
-            why = f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is."
-            raise refuse(self.where(path), f"claims a text of {length:,} bytes", why)
+            raise refuse(
+                self.where(path),
+                f"claims a text of {length:,} bytes",
+                f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is.",
+            )
         self._spend(path, length)
 
     def _check_texts(self, path: str, item: Any, key: bytes, number: int) -> None:

@@ -108,8 +108,10 @@ def _json_value(subject: str, value: Any) -> Any:
         return {str(key): _json_value(subject, item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_json_value(subject, item) for item in value]
-    problem = f"{subject} holds a {type(value).__name__}, which JSON cannot hold."
-    raise InputError(problem, cure="Give numbers, text, truth values, lists and mappings.")
+    raise InputError(
+        f"{subject} holds a {type(value).__name__}, which JSON cannot hold.",
+        cure="Give numbers, text, truth values, lists and mappings.",
+    )
 
 
 def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
@@ -229,8 +231,10 @@ def _write_group(group: Any, node: Group) -> None:
     for name, child in node.children.items():
         if not _NAME.fullmatch(name):
             problem = f"{name!r} cannot be written into {group.name}"
-            cure = "Use the letters a to z, digits and underscores."
-            raise InputError(f"{problem}: a name is lower-case ASCII.", cure=cure)
+            raise InputError(
+                f"{problem}: a name is lower-case ASCII.",
+                cure="Use the letters a to z, digits and underscores.",
+            )
         if isinstance(child, Group):
             _write_group(group.create_group(name), child)
         else:
