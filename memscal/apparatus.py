@@ -212,11 +212,11 @@ class ApparatusFunction(Result, ApparatusData):
         reach = radii[-1] + profile.r[-1]
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
-        kernel = j0(np.multiply.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
+        kernel = j0(np.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
         transform = hankel_transform(radii, stress, wavenumbers.k, order=self.order)
         bessel = j1 if self.order else j0
         field = wavenumbers.weights * transform
-        operator = (bessel(np.multiply.outer(radii, wavenumbers.k)) * field) @ kernel
+        operator = (bessel(np.outer(radii, wavenumbers.k)) * field) @ kernel
         return operator, operator @ profile.g
 
     def _convolved_field(self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:

@@ -41,7 +41,7 @@ class EvenGrid:
     @property
     def axes(self) -> tuple[FloatArray, FloatArray]:
         """Positions along x and along y of the whole plane, shape (2 count - 1,), in m."""
-        whole = np.concatenate([-self.axis[:0:-1], self.axis])
+        whole = np.append(-self.axis[:0:-1], self.axis)
         return whole, whole
 
     @property
@@ -215,8 +215,8 @@ class Lattice:
 
         r = self.x[self.x.size // 2 :]
         angle = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-        rows = (np.multiply.outer(r, np.sin(angle)) - self.y[0]) / (self.y[1] - self.y[0])
-        columns = (np.multiply.outer(r, np.cos(angle)) - self.x[0]) / (self.x[1] - self.x[0])
+        rows = (np.outer(r, np.sin(angle)) - self.y[0]) / (self.y[1] - self.y[0])
+        columns = (np.outer(r, np.cos(angle)) - self.x[0]) / (self.x[1] - self.x[0])
         samples = map_coordinates(field, [rows, columns], order=3, mode="nearest")
         return r, samples.mean(axis=1)
 

@@ -218,8 +218,8 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> Fl
     peak = voltage.max(keepdims=True)
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
-    x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
-    curve = np.concatenate([voltage[::-1], voltage])
+    x = _centre(data) + np.append(-reference.r[::-1], reference.r)
+    curve = np.append(voltage[::-1], voltage)
     if not net:
         curve = _turned(data, x) * curve + _background(data, x)
     axes.plot(

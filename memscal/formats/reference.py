@@ -131,7 +131,7 @@ def _read_pixels(path: FilePath, pixel_size: float | None) -> StressField:
             f"{name} holds an array of shape {values.shape} and type {values.dtype}.",
             cure="Give one of numbers, in rows along y and columns along x.",
         )
-    y, x = (pixel_size * np.arange(count, dtype=np.float64) for count in values.shape)
+    y, x = (pixel_size * np.arange(count) for count in values.shape)
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
     with placed(name):
         return StressField(x=x, y=y, values=values, unit="1", notes=notes, source=source)

@@ -405,7 +405,7 @@ class FamilySetup:
 
 def require_loads(loads: ArrayLike) -> FloatArray:
     """Return loads (N) as an array; refuse none, and what is not finite and positive."""
-    checked = finite_vector("loads", np.atleast_1d(np.asarray(loads, dtype=np.float64)))
+    checked = finite_vector("loads", np.atleast_1d(loads))
     for load in checked:
         require_positive("load", float(load), "N")
     return checked

@@ -252,7 +252,7 @@ def sensor_of(
         # Any rotation of independent changes is another set of them: in this one few matter.
         bessel = j1 if family.order else j0
         radii = np.linspace(0.0, reach, _RADII)
-        kernel = bessel(np.multiply.outer(radii, nodes.k)) * nodes.weights
+        kernel = bessel(np.outer(radii, nodes.k)) * nodes.weights
         middle = family.spectra[family.values.size // 2]
         largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
         signals = [(kernel * shape) @ changes for shape in middle / largest[:, None]]
@@ -288,7 +288,7 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     weights = sensor.wavenumbers.weights
     # Repeats share the transforms at their distance from the centre.
     radius, place = np.unique(points.radius, return_inverse=True)
-    phase = np.multiply.outer(radius, k)
+    phase = np.outer(radius, k)
     if sensor.order:
         # The component of a vector along the scan changes its sign with the side of the centre.
         sign = np.sign(points.offset)

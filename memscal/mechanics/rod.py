@@ -275,4 +275,4 @@ def _largest_change(fine: RodSolution, coarse: RodSolution, ratio: float, nu: fl
 def _term_scale(count: int) -> FloatArray:
     """Return sqrt(pi) n! / Gamma(n + 1/2) for n below ``count``."""
     n = np.arange(1, count)
-    return np.concatenate([[1.0], np.cumprod(n / (n - 0.5))])
+    return np.append(1.0, np.cumprod(n / (n - 0.5)))

@@ -48,9 +48,9 @@ class ApparatusField(FrozenArrays):
         """Return a round G on the lattice of its radii, by a cubic spline; zero beyond them."""
         from scipy.interpolate import CubicSpline
 
-        axis = np.concatenate([-profile.r[:0:-1], profile.r])
+        axis = np.append(-profile.r[:0:-1], profile.r)
         radius = np.hypot.outer(axis, axis)
-        g = CubicSpline(axis, np.concatenate([profile.g[:0:-1], profile.g]))(radius)
+        g = CubicSpline(axis, np.append(profile.g[:0:-1], profile.g))(radius)
         errors = np.interp(radius, profile.r, profile.g_errors)
         return cls(axis, axis, np.where(radius <= profile.r[-1], g, 0.0), errors)
 

@@ -353,6 +353,6 @@ class StressProfile:
         # Three mirrored radii make the axis an inner point of the spline.
         inner = slice(1, 4) if self.r[0] == 0 else slice(0, 3)
         density = self.sigma_zz * self.r
-        radii, values = (np.concatenate([-v[inner][::-1], v]) for v in (self.r, density))
+        radii, values = (np.append(-v[inner][::-1], v) for v in (self.r, density))
         spline, _ = arrays.table_spline(radii, values)
         return float(2 * np.pi * spline.integrate(0.0, self.r[-1]))

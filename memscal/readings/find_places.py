@@ -69,7 +69,7 @@ def _even_axis(positions: FloatArray) -> EvenAxis | None:
     if candidates.size > _CANDIDATES:
         candidates = candidates[np.geomspace(1, candidates.size, _CANDIDATES).astype(int) - 1]
     for candidate in candidates:
-        number = np.concatenate([[0], np.cumsum(np.rint(gaps / candidate))])
+        number = np.append(0, np.cumsum(np.rint(gaps / candidate)))
         centred = number - number.mean()
         step = centred @ (ordered - ordered.mean()) / max(centred @ centred, 1.0)
         start = ordered.mean() - step * number.mean()
@@ -128,7 +128,7 @@ def _clusters(values: FloatArray, gap: float) -> tuple[IndexArray, float]:
     """Number groups of values, in order, that no gap wider than ``gap`` parts; and their step."""
     order = np.argsort(values, kind="stable")
     index = np.empty(values.size, dtype=np.intp)
-    index[order] = np.concatenate([[0], np.cumsum(np.diff(values[order]) > gap)])
+    index[order] = np.append(0, np.cumsum(np.diff(values[order]) > gap))
     means = np.bincount(index, values) / np.bincount(index)
     return index, float(np.median(np.diff(means))) if means.size > 1 else 0.0
 

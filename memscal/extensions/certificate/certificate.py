@@ -278,9 +278,9 @@ def _profile(apparatus: ApparatusFunction) -> CertifiedProfile:
     profile = apparatus.radial_profile
     shown = profile.g_gaussian > _SHOWN_SHARE * profile.g_gaussian[0]
     reach = profile.r[shown][-1]
-    sizes = (MM * np.multiply.outer(10.0 ** np.arange(-4, 3), [1, 2, 5])).ravel()
+    sizes = (MM * np.outer(10.0 ** np.arange(-4, 3), [1, 2, 5])).ravel()
     step = sizes[np.searchsorted(sizes, reach / _MOST_RADII)]
-    r = step * np.arange(int(reach / step) + 1, dtype=np.float64)
+    r = step * np.arange(int(reach / step) + 1)
     # A spline is linear in the values that it goes through.
     weights = radial_spline(profile.r, np.eye(profile.r.size))(r)
     return CertifiedProfile(r, weights @ profile.g, weights @ profile.g_covariance @ weights.T)

@@ -189,7 +189,7 @@ def _values(certificate: Certificate) -> Tree:
         ", ".join(quantity.words for quantity in quantities),
         np.array([value.value for value in values]) / scale,
         [quantity.unit for quantity in quantities],
-        certificate.covariance / np.multiply.outer(scale, scale),
+        certificate.covariance / np.outer(scale, scale),
         [quantity.name for quantity in quantities],
         np.array([value.factor for value in values]),
     )

@@ -187,7 +187,7 @@ def _tensor(even: FloatArray, side: float, reach: float, size: FilmSize) -> Any:
     depth = graded(0.0, thickness, side / grow, grow, lambda _: near)
     heights = thickness - depth[::-1]
     heights[0] = 0.0
-    return skfem.MeshTri.init_tensor(np.concatenate([even, r[1:]]), heights)
+    return skfem.MeshTri.init_tensor(np.append(even, r[1:]), heights)
 
 
 # Exact for the square of a quadratic, times its radius and its Jacobian.

@@ -139,7 +139,7 @@ def _pressed(
     """Return one contact at each load (N), or three where loads scatter, and their step in ln P."""
     spread = max(_SPREAD * scatter, _LEAST_SPREAD) if scatter > 0 else 0.0
     around = np.exp(spread * np.arange(-1, 2)) if scatter > 0 else np.ones(1)
-    path, place = np.unique(np.multiply.outer(loads, around), return_inverse=True)
+    path, place = np.unique(np.outer(loads, around), return_inverse=True)
     # Of an uncertain Poisson's ratio that ends at 1/2 the true one is the mean.
     solved = indent(film.expected, sphere, load=path, strain="linear", **law)
     rows = np.reshape(place, (loads.size, around.size))

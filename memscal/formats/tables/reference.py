@@ -117,7 +117,7 @@ def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, Any]:
     if samples.kind == "table" and np.any(np.diff(order) < 0):  # nodes of a mesh have no order
         notes += import_notes([f"The {samples.plural} were sorted by radius."])
     r = columns["r"]
-    index = np.concatenate([[0], np.cumsum(np.diff(r) > samples.spacing)])
+    index = np.append(0, np.cumsum(np.diff(r) > samples.spacing))
     if index[-1] == r.size - 1:
         return columns
     number = np.bincount(index)

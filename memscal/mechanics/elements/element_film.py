@@ -105,7 +105,7 @@ def smooth(
     knots = np.concatenate([line.r[2:-1:2], np.full(_SMOOTH_DEGREE + 1, line.r[-1])])
 
     def mirrored(half: FloatArray, sign: int) -> FloatArray:
-        return np.concatenate([sign * half[::-1], half])
+        return np.append(sign * half[::-1], half)
 
     # Mirrored about the axis, so that what is fitted has the right symmetry.
     table = mirrored(r, -1), mirrored(quartic, parity), mirrored(knots, -1)
@@ -336,7 +336,7 @@ class ElementFilm:
         hats = line.loads_of_hats(self.r / self.film.thickness)
         modulus = self.film.shear_modulus
         loads = np.concatenate([hats @ (pressure / modulus), hats @ (shear / modulus)])
-        solution = self.system.solve(np.concatenate([inward, outward]), loads[:, None])
+        solution = self.system.solve(np.append(inward, outward), loads[:, None])
         return ElementField(self.film, self.radius, self.system, solution[:, 0])
 
 
@@ -366,7 +366,7 @@ class ElementField:
         from scipy.sparse.linalg import spsolve
 
         line, outward, inward = self.system.side(1.0)
-        forces = self.system.matrix[np.concatenate([inward, outward])] @ self.solution
+        forces = self.system.matrix[np.append(inward, outward)] @ self.solution
         pushed, held = forces.reshape(2, -1) * self.film.shear_modulus
         mass = csc_array(line.mass)
         # On the axis there is no shear.
