@@ -116,11 +116,8 @@ class ApparatusFunction(Result, ApparatusData):
         """
         if y is not None:
             return self._convolved_field(r, y, sigma_zz)
-        radii, stress = self._checked(r, sigma_zz)
+        radii, stress, wavenumbers = self._checked(r, sigma_zz)
         profile = self.radial_profile
-        # G is zero beyond the last wavenumber of its grid.
-        reach = radii[-1] + profile.r[-1]
-        wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
         blurred = kernel * hankel_transform(radii, stress, wavenumbers.k, order=self.order)
         return wavenumbers.synthesise(blurred, radii, order=self.order)
@@ -207,10 +204,8 @@ class ApparatusFunction(Result, ApparatusData):
 
     def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""
-        radii, stress = self._checked(r, sigma_zz)
+        radii, stress, wavenumbers = self._checked(r, sigma_zz)
         profile = self.radial_profile
-        reach = radii[-1] + profile.r[-1]
-        wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
         kernel = j0(np.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
         transform = hankel_transform(radii, stress, wavenumbers.k, order=self.order)
@@ -296,7 +291,10 @@ class ApparatusFunction(Result, ApparatusData):
         spline = radial_spline(support, values)
         return np.where(radii <= support[-1], spline(np.minimum(radii, support[-1])), 0.0)
 
-    def _checked(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def _checked(
+        self, r: ArrayLike, sigma_zz: ArrayLike
+    ) -> tuple[FloatArray, FloatArray, Wavenumbers]:
+        """Return radii and stress, if G can be convolved with it, and the wavenumbers for that."""
         radii = finite_vector("r", r)
         stress = finite_vector("sigma_zz", sigma_zz)
         if radii.shape != stress.shape:
@@ -320,7 +318,9 @@ class ApparatusFunction(Result, ApparatusData):
         self._require_fine(coarse)
         end = f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
         self._require_decayed(float(abs(stress[-1])), peak, end)
-        return radii, stress
+        # G is zero beyond the last wavenumber of its grid.
+        reach = radii[-1] + self.radial_profile.r[-1]
+        return radii, stress, Wavenumbers.covering(float(self.transfer.k[-1]), reach)
 
 
 def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -> ApparatusFunction:
