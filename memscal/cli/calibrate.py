@@ -333,10 +333,7 @@ def _read_reference(path: Path, pixel_size: str | None, accepted: bool) -> Stres
 
 
 def _rehearse(
-    scans: list[Scan],
-    settings: dict[str, Any],
-    outputs: Sequence[Path],
-    as_json: bool,
+    scans: list[Scan], settings: dict[str, Any], outputs: Sequence[Path], as_json: bool
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.prepare import Request, prepare

@@ -16,7 +16,7 @@ import click
 
 from memscal.errors import OutputError
 from memscal.figures import FIGURE_SUFFIXES
-from memscal.formats.files import atomic_write_bytes, ensure_writable, together
+from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, ensure_writable, together
 from memscal.model.checks import Message
 from memscal.summaries.table import WIDTH, Table, as_it_is, folded, readable, text_of
 
@@ -216,9 +216,6 @@ def _in_bold(text: str, failed: bool) -> str:
     return click.style(text, bold=True, fg="red" if failed else None)
 
 
-_HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
-
-
 class FigurePath(click.Path):
     """The name of a figure's file, or of another of which the suffix chooses the format."""
 
@@ -245,7 +242,7 @@ class FigurePath(click.Path):
 
 def default_name(path: Path, suffix: str) -> Path:
     """Return the name of a result beside its input."""
-    stem = path.stem if path.suffix.lower() in _HDF5_SUFFIXES else path.name
+    stem = path.stem if path.suffix.lower() in HDF5_SUFFIXES else path.name
     return path.parent / f"{stem}{suffix}"
 
 

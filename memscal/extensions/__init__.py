@@ -37,10 +37,7 @@ COMMANDS = {
     "import": ("cli.import_", "Convert a table or a mesh to a scan or a reference."),
     "inspect": ("cli.inspect", "Show what a file holds."),
     "check": ("cli.check", "Check a file's safety, schema, digest and content."),
-    "explain": (
-        "cli.explain",
-        "Explain what a quality check tests, and what to do if it fails.",
-    ),
+    "explain": ("cli.explain", "Explain what a quality check tests, and what to do if it fails."),
     "completion": ("cli.completion", "Print the shell's completion script."),
 }
 """Command: its module, and what it does."""

@@ -186,11 +186,7 @@ def draw_measured(
 
 
 def draw_band(
-    axes: Axes,
-    x: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    label: str | None = None,
+    axes: Axes, x: FloatArray, low: FloatArray, high: FloatArray, label: str | None = None
 ) -> None:
     """Draw the band of a curve's expanded uncertainty."""
     axes.fill_between(x, low, high, color=COLOURS["deconvolved"], alpha=0.25, lw=0, label=label)

@@ -9,14 +9,7 @@ from memscal.formats import groups
 from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import (
-    ARTIFACT_SCHEMA,
-    Group,
-    file_tree,
-    si,
-    to_json,
-    write_tree,
-)
+from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, file_tree, si, to_json, write_tree
 from memscal.formats.units import reading_of
 from memscal.formats.values import require_schema, require_unaltered, text_list, units_of
 from memscal.model import apparatus, records

@@ -21,6 +21,9 @@ from memscal.model.sizes import MOST_FILE_BYTES, too_large
 FilePath = str | os.PathLike[str]
 """The path of a file."""
 
+HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
+"""Endings of HDF5 files."""
+
 fcntl: Any
 try:
     import fcntl
@@ -42,10 +45,7 @@ _NO_HARD_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, er
 
 
 def ensure_writable(
-    path: FilePath,
-    *,
-    overwrite: bool = False,
-    inputs: Iterable[FilePath] = (),
+    path: FilePath, *, overwrite: bool = False, inputs: Iterable[FilePath] = ()
 ) -> None:
     """Prove that an output can be written, by writing beside it: permissions show no full disk."""
     with _Transaction() as proof:

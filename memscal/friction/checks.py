@@ -71,8 +71,7 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
 
 
 def frictionless_check(
-    by_loading: Mapping[str, BoundedEstimate],
-    beside: Sequence[Mapping[str, BoundedEstimate]],
+    by_loading: Mapping[str, BoundedEstimate], beside: Sequence[Mapping[str, BoundedEstimate]]
 ) -> QualityCheck:
     """Return the check that the lubricated loads have no friction that moves others ``beside``."""
     # The first of the values is no friction.
@@ -171,8 +170,7 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
             difference = f" by {ends:.2g}, more than one standard uncertainty: its middle is given"
         if disagree:
             yield Message(
-                "loading",
-                f"The definitions of the loading disagree for the {loads}{difference}.",
+                "loading", f"The definitions of the loading disagree for the {loads}{difference}."
             )
 
 

@@ -102,8 +102,7 @@ def _compressed(loads: Sequence[Statistics]) -> list[Statistics]:
     basis = vectors[:, values > _NEGLIGIBLE**2]
     return [
         load._replace(
-            projection=load.projection @ basis,
-            information=basis.T @ load.information @ basis,
+            projection=load.projection @ basis, information=basis.T @ load.information @ basis
         )
         for load in loads
     ]

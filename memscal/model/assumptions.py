@@ -141,11 +141,7 @@ class Assumption:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON holds; a size that no error reaches is null."""
-        values: dict[str, Any] = {
-            "name": self.name,
-            "sentence": self.sentence,
-            "state": self.state,
-        }
+        values: dict[str, Any] = {"name": self.name, "sentence": self.sentence, "state": self.state}
         for parameter, key in SIZE_KEYS.items():
             size = self.size(parameter)
             values[key] = {"value": size if size < float("inf") else None, "unit": self.unit}

@@ -148,8 +148,7 @@ TAKEN_FOR_GRANTED = record(
 )
 """What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(
-    "NXcollection",
-    Quantity("description", "text", "what is synthetic", origin="synthetic"),
+    "NXcollection", Quantity("description", "text", "what is synthetic", origin="synthetic")
 )
 
 PROFILE = record(
@@ -191,8 +190,7 @@ CONTACT = record(
     Quantity("loading", "text", "incremental or total loading"),
 )
 SOLVER = record(
-    "NXprocess",
-    Quantity("solver", "text", "program", stored="program", origin="program"),
+    "NXprocess", Quantity("solver", "text", "program", stored="program", origin="program")
 )
 NUMERICS = record(
     "NXparameters",
@@ -454,11 +452,7 @@ ESTIMATE_FIT = (
     Quantity("least", _COUNT, "least chi-square", "χ²", label="chi2"),
     *FIT[1:],
 )
-COMPARED_LOAD = (
-    _LUBRICATION,
-    _LOAD[0],
-    *measured(Quantity("force", "force", "force", "F")),
-)
+COMPARED_LOAD = (_LUBRICATION, _LOAD[0], *measured(Quantity("force", "force", "force", "F")))
 COMPARED_MAXIMA = (
     *measured(Quantity("s_max", _P, "S_max", label="S_max")),
     *measured(Quantity("p0_max", _P, "p0_max", label="p0_max")),

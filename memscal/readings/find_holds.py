@@ -279,12 +279,7 @@ def _noise(values: FloatArray) -> float:
 
 
 def _steady_rows(
-    runs: list[IndexArray],
-    values: FloatArray,
-    pressed: BoolArray,
-    *,
-    lifted: float,
-    share: float,
+    runs: list[IndexArray], values: FloatArray, pressed: BoolArray, *, lifted: float, share: float
 ) -> list[IndexArray]:
     """Cut each run to the rows from the first to the last that is close to its quantile."""
     noise = _NOISE * _noise(values[pressed])

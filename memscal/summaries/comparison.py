@@ -110,13 +110,7 @@ def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, fl
 
 
 #: Sources of uncertainty that scans of one sensor on one film do not share.
-_SCAN_SOURCES = {
-    "noise",
-    "load_scatter",
-    "position",
-    "between_scan_gain",
-    "lubricated_friction",
-}
+_SCAN_SOURCES = {"noise", "load_scatter", "position", "between_scan_gain", "lubricated_friction"}
 
 
 def correlated(comparison: FrictionComparison) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from memscal.errors import FormatError, InputError, MemscalError
 from memscal.extensions.fleet.results import FleetResults
-from memscal.formats.files import atomic_write_bytes, read_bytes
+from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, read_bytes
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray, value_record
 from memscal.model.checks import OVERRIDE, Message
@@ -28,7 +28,6 @@ DIGEST = "memscal_shard_sha256"
 _BATCH = "batch.json"
 _MOST_STATED = 10_000
 _NAMED = 5
-_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
 #: What memscal writes beside scans.
 _RESULTS = (".apparatus", ".stress")
 
@@ -67,7 +66,7 @@ def _folder_scans(folder: Path) -> Iterator[FleetScan]:
     for place, folders, files in os.walk(folder):
         folders.sort()
         for path in (Path(place, name) for name in sorted(files)):
-            if path.suffix.lower() in _SUFFIXES and not path.stem.endswith(_RESULTS):
+            if path.suffix.lower() in HDF5_SUFFIXES and not path.stem.endswith(_RESULTS):
                 yield FleetScan(path.relative_to(folder).as_posix())
 
 

@@ -285,10 +285,7 @@ def _checked(
 
 
 def _cells(
-    blocks: list[dict[str, Any]],
-    arrays: list[NDArray[Any]],
-    points: int,
-    source: SourceFile,
+    blocks: list[dict[str, Any]], arrays: list[NDArray[Any]], points: int, source: SourceFile
 ) -> Iterator[Cells]:
     """Yield the blocks that have cells, with their nodes as whole numbers below ``points``."""
     for block in blocks:

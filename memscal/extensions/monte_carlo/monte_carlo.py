@@ -408,10 +408,7 @@ def monte_carlo(
 
 
 def _compared(
-    calibration: Calibration,
-    name: str,
-    expected: float,
-    column: FloatArray,
+    calibration: Calibration, name: str, expected: float, column: FloatArray
 ) -> BudgetComparison:
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters = calibration.apparatus.parameters

@@ -58,11 +58,7 @@ def simulate_contacts(
     _require_row(loads, points, spacing, repeats, seed)
     require_positive("load_scale", load_scale)
     sensor = simulated_sensor(kernel, conversion_constant, shear)
-    law = {
-        "friction": friction,
-        "loading": loading,
-        "interface": interface or Interface(),
-    }
+    law = {"friction": friction, "loading": loading, "interface": interface or Interface()}
     states, spread = _pressed(film, sphere, load_scale * loads, law, disturbances.load_scatter)
 
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
