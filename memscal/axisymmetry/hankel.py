@@ -145,7 +145,7 @@ def _mirrored(r: FloatArray, f: FloatArray, order: int) -> tuple[FloatArray, Flo
         )
     inner = slice(3, 0, -1) if r[0] == 0 else slice(2, None, -1)
     sign = -1 if order else 1
-    return np.append(-r[inner], r), np.append(sign * f[inner], f)
+    return np.append(-r[inner], r), np.concatenate([sign * f[inner], f])
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:

@@ -105,7 +105,7 @@ def smooth(
     knots = np.concatenate([line.r[2:-1:2], np.full(_SMOOTH_DEGREE + 1, line.r[-1])])
 
     def mirrored(half: FloatArray, sign: int) -> FloatArray:
-        return np.append(sign * half[::-1], half)
+        return np.concatenate([sign * half[::-1], half])
 
     # Mirrored about the axis, so that what is fitted has the right symmetry.
     table = mirrored(r, -1), mirrored(quartic, parity), mirrored(knots, -1)
