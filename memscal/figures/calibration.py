@@ -3,7 +3,6 @@
 import math
 import textwrap
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -38,7 +37,7 @@ from memscal.figures.style import (
     panel_letters,
 )
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, Reconvolution
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import ESTIMATED, KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.readings.find_places import even_lattice
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_name
@@ -195,7 +194,7 @@ def _draw_points(
     axes: Axes, scan: Reconvolution, values: FloatArray, colours: str, span: tuple[float, float]
 ) -> ScalarMappable:
     """Draw values at the points of a raster; on a lattice nodes that are missing are grey."""
-    look: dict[str, Any] = {"cmap": colours, "rasterized": True, "vmin": span[0], "vmax": span[1]}
+    look: Values = {"cmap": colours, "rasterized": True, "vmin": span[0], "vmax": span[1]}
     x = np.asarray(scan.offset_x)
     y = np.asarray(scan.offset_y)
     lattice = even_lattice(x, y, x.size)

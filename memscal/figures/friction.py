@@ -35,7 +35,7 @@ from memscal.figures.style import (
     panels_of,
 )
 from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 
 RISE = r"$-2\,\ln(p/p_{max})$"
 _INTERVALS = "95 % by profile likelihood, about k = 2"
@@ -105,7 +105,7 @@ def _name_curves(axes: Axes, loads: list[float], curves: Mapping[float, FloatArr
     x = loads[end]
     # Room for the names; a load is never negative.
     room = _ROOM * max(loads[-1] - loads[0], 0.2 * loads[-1])
-    look: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 6.5}
+    look: Values = {"textcoords": "offset points", "va": "center", "fontsize": 6.5}
     if end:
         axes.set_xlim(0.0, x + room)
         look |= {"xytext": (7, 0), "ha": "left"}
@@ -237,9 +237,7 @@ def _draw_macroscopic(axes: Axes, value: float, u: float | None) -> None:
         axes.axhspan(low, high, color=grey, alpha=0.15, lw=0)
 
 
-def _draw_reading(
-    axes: Axes, reading: BoundedEstimate, x: float, label: str, look: dict[str, Any]
-) -> None:
+def _draw_reading(axes: Axes, reading: BoundedEstimate, x: float, label: str, look: Values) -> None:
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
     colour = look["color"]
     low, high = interval_ends(reading)
@@ -290,7 +288,7 @@ def _panels(
 
 def _one_legend(figure: Figure, panels: Iterable[Axes], first: Sequence[str]) -> None:
     """Put the entries of all panels above them, each label once, in order after the first."""
-    entries: dict[str, Any] = {}
+    entries: Values = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,7 +27,7 @@ from memscal.figures.style import (
 )
 from memscal.measurement.restoration import Restoration
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import BoolArray
+from memscal.model.arrays import BoolArray, Values
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
@@ -203,7 +202,7 @@ def _draw_loads(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str])
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
     r = np.linspace(0.0, 1.15 * max(contact.contact_radius for contact in contacts), _RADII)
     highest = 0.0
-    stick: dict[str, Any] = {"marker": "o", "ms": 3, "mfc": "none"}
+    stick: Values = {"marker": "o", "ms": 3, "mfc": "none"}
     slipping = False
     for i, (contact, colour) in enumerate(zip(contacts, colours, strict=True)):
         pressure = contact.interface_pressure(r)

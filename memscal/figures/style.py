@@ -22,7 +22,7 @@ from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.model.apparatus import ApparatusData
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 
 
 def channel_indices(data: ApparatusData) -> str:
@@ -166,7 +166,7 @@ def load_looks(loads: Iterable[float]) -> dict[float, tuple[str, str]]:
     return looks
 
 
-def mark(lubrication: str, colour: str) -> dict[str, Any]:
+def mark(lubrication: str, colour: str) -> Values:
     """Return marker and colours of points by their lubrication, distinct in grey print."""
     marker, filled = _LUBRICATIONS.get(lubrication, _LUBRICATIONS[""])
     return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}

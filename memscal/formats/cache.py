@@ -16,7 +16,7 @@ from typing import Any
 from memscal.errors import MemscalError, OutputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_bytes
+from memscal.formats.hdf5.writer import Group, Nodes, Number, file_tree, tree_to_bytes
 from memscal.formats.values import require_schema, require_unaltered
 from memscal.model.arrays import FloatArray
 
@@ -50,11 +50,11 @@ def table_key(content: Mapping[str, Any]) -> str:
 def keep_contact_table(folder: FilePath, key: str, arrays: Mapping[str, FloatArray]) -> bool:
     """Write arrays under their key, remove the oldest; return whether the disk took them."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
-    children: dict[str, Node] = {
+    children: Nodes = {
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
     }
     contacts = Group("NXdata", children, {"signal": "spectra", "axes": _TRANSFORM[1]})
-    stored: dict[str, Node] = {"contacts": contacts, "key": key, "arrays": " ".join(arrays)}
+    stored: Nodes = {"contacts": contacts, "key": key, "arrays": " ".join(arrays)}
     entry = Group("NXentry", stored, {"default": "contacts"})
     data = tree_to_bytes(file_tree(CONTACT_TABLE_SCHEMA, entry))
     try:

@@ -12,7 +12,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError, UnitError, placed
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Attribute, Group, Node, Number, si, to_json
+from memscal.formats.hdf5.writer import Attribute, Group, Node, Nodes, Number, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.formats.values import (
     any_scalar,
@@ -25,6 +25,7 @@ from memscal.formats.values import (
 )
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.arrays import Values
 from memscal.model.assumptions import Assumption
 from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
@@ -90,7 +91,7 @@ KINDS = {
 
 def write_record(record: Record, stated: object, **others: Node) -> Group:
     """Return the group of an object or a mapping; an axis that is no quantity counts from 0."""
-    children: dict[str, Node] = {}
+    children: Nodes = {}
     keys = {quantity.key for quantity in record.quantities}
     for quantity in record.quantities:
         name = quantity.name
@@ -159,10 +160,10 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
     return values
 
 
-def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
+def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> Values:
     """Return the origin of a file as its quantities state it, by their names; JSON notes last."""
-    texts: dict[str, Any] = {}
-    notes: dict[str, Any] = {}
+    texts: Values = {}
+    notes: Values = {}
     for at, quantity in paths:
         value = KINDS[quantity.dimension].read(file, at)
         name = quantity.origin
@@ -213,7 +214,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
             why="The group of the parameters holds something else of that name.",
             cure="Give it another name.",
         )
-    children: dict[str, Node] = {"names": to_json(parameters.names)}
+    children: Nodes = {"names": to_json(parameters.names)}
     for name, dimension in dimensions.items():
         children[name] = si(parameters[name], dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
@@ -330,7 +331,7 @@ def indenter_group(
     rod_friction: float | None = None,
 ) -> Group:
     """Return an indenter as an NXcollection, with its nominal load, and a rod's friction."""
-    children: dict[str, Node] = {} if indenter is None else {"shape": indenter.shape}
+    children: Nodes = {} if indenter is None else {"shape": indenter.shape}
     if isinstance(indenter, Profile):
         children["face"] = write_record(records.INDENTER_FACE, indenter)
     elif indenter is not None:
@@ -380,7 +381,7 @@ def instrument_group(
     return Group("NXinstrument", children)
 
 
-def read_instrument(file: SafeFile, path: str = "/entry") -> dict[str, Any]:
+def read_instrument(file: SafeFile, path: str = "/entry") -> Values:
     """Read sensor, load cell and stage, by these names; what is not stated stays empty."""
     return {
         "sensor": StressSensor(
@@ -393,14 +394,14 @@ def read_instrument(file: SafeFile, path: str = "/entry") -> dict[str, Any]:
     }
 
 
-def circumstances(of: Scan | ApparatusData) -> dict[str, Node]:
+def circumstances(of: Scan | ApparatusData) -> Nodes:
     """Return when and by whom a scan was made, for the entry of a scan or an artifact."""
     user = write_record(records.USER, of.user)
     stated = {"user": user} if user.children else {}
     return {**write_record(records.TIMES, of).children, **stated}
 
 
-def read_circumstances(file: SafeFile) -> dict[str, Any]:
+def read_circumstances(file: SafeFile) -> Values:
     """Read when, by whom and with which instruments a scan was made."""
     user = read_record(records.USER, file, "/entry/user")
     times = read_record(records.TIMES, file, "/entry")
@@ -411,13 +412,13 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
     film = profile.film
     indenter = profile.indenter
-    contact: dict[str, Node] = {}
+    contact: Nodes = {}
     if film:
         contact["film"] = write_record(records.FILM, film)
     if indenter:
         contact["indenter"] = indenter_group(indenter)
     numerics = write_record(records.NUMERICS, profile)
-    solution: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
+    solution: Nodes = {"numerics": numerics} if numerics.children else {}
     solution |= write_record(records.PROFILE_NOTES, profile).children
     data = write_record(records.PROFILE, profile) if profile.form is None else _form(profile.form)
     parameters = write_record(records.CONTACT, profile, **contact)
@@ -460,7 +461,7 @@ def read_field(file: SafeFile, path: str) -> StressField:
         )
 
 
-def reference_groups(profile: StressProfile) -> dict[str, Node]:
+def reference_groups(profile: StressProfile) -> Nodes:
     """Return the groups of a stress profile within the entry of a scan or an artifact."""
     names = ("reference", "reference_parameters", "reference_process")
     return dict(zip(names, profile_groups(profile), strict=True))

@@ -25,6 +25,7 @@ from memscal.formats.values import (
     units_of,
 )
 from memscal.model import records
+from memscal.model.arrays import Values
 from memscal.model.quantities import Record, record
 
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
@@ -94,13 +95,13 @@ class Finding:
     meaning: str
 
 
-def describe(path: FilePath, *, accept_altered: bool = False) -> dict[str, Any]:
+def describe(path: FilePath, *, accept_altered: bool = False) -> Values:
     """Return what a file of memscal holds, in its units and in plain values for JSON."""
     with open_hdf5(path, accept_altered=accept_altered) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
-        content: dict[str, Any] = {"file": file.name, "sha256": file.source.sha256}
+        content: Values = {"file": file.name, "sha256": file.source.sha256}
         if file.source.altered:
             content["altered"] = file.source.altered
         content["schema"] = schema
@@ -189,8 +190,8 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
         yield path, records.STRESS_PROFILE
 
 
-def _quantity_row(file: SafeFile, path: str) -> dict[str, Any]:
-    row: dict[str, Any] = {"path": path, "name": path.rpartition("/")[2]}
+def _quantity_row(file: SafeFile, path: str) -> Values:
+    row: Values = {"path": path, "name": path.rpartition("/")[2]}
     if file.is_text(path):
         row["value"] = file.text(path)
     else:
@@ -216,7 +217,7 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     return _plain(spread)
 
 
-def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
+def _array_row(file: SafeFile, path: str) -> Values:
     values = file.array(path)
     finite = values[np.isfinite(values)]
     return {

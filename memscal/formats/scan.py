@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from memscal.errors import FormatError, placed
 from memscal.formats import groups, values
@@ -10,11 +9,11 @@ from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, si
+from memscal.formats.hdf5.writer import Group, Nodes, si
 from memscal.formats.units import reading_of
 from memscal.formats.values import any_scalar, optional_text, text_list, units_of
 from memscal.model import records
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
@@ -128,7 +127,7 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
     )
 
 
-def _read_arrays(file: SafeFile, along: str, reading: Reading) -> dict[str, Any]:
+def _read_arrays(file: SafeFile, along: str, reading: Reading) -> Values:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
     arrays = read_record(records.TAKEN_FOR_GRANTED, file, _DATA)
@@ -170,7 +169,7 @@ def write_scan(scan: Scan, path: FilePath, *, overwrite: bool = False) -> None:
 
 
 def _entry(scan: Scan) -> Group:
-    children: dict[str, Node] = {"title": scan.title} if scan.title else {}
+    children: Nodes = {"title": scan.title} if scan.title else {}
     children |= groups.circumstances(scan)
     children["data"] = _data_group(scan)
     children["indenter"] = groups.indenter_group(
@@ -190,7 +189,7 @@ def _entry(scan: Scan) -> Group:
 def _data_group(scan: Scan) -> Group:
     along = scan.direction
     points = scan.kind == "points"
-    data: dict[str, Node] = {}
+    data: Nodes = {}
     axes: tuple[str, ...] = _POINTS
     if points:
         data["point"] = writer.index_axis("point", scan.x.size)
@@ -219,9 +218,7 @@ def _data_group(scan: Scan) -> Group:
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
-def _nodes(
-    scan: Scan, arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]
-) -> dict[str, Node]:
+def _nodes(scan: Scan, arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]) -> Nodes:
     return {
         name: si(array, _DECLARED[name].read_in(scan.reading).dimension, axes)
         for name, array in arrays.items()
@@ -278,7 +275,7 @@ def _stated_axes(file: SafeFile, rank: int) -> Iterator[tuple[int, str]]:
 
 
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
-    children: dict[str, Node] = {"description": _SYNTHETIC}
+    children: Nodes = {"description": _SYNTHETIC}
     children |= {
         name: value if isinstance(value, str) else si(value, groups.parameter_dimension(name))
         for name, value in truth.items()
@@ -287,7 +284,7 @@ def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
     return Group("NXcollection", children)
 
 
-def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
+def _read_synthetic(file: SafeFile) -> Values | None:
     path = "/entry/synthetic"
     if not file.is_group(path):
         return None

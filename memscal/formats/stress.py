@@ -13,7 +13,7 @@ from memscal.formats.files import FilePath
 from memscal.formats.groups import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, si, to_json
+from memscal.formats.hdf5.writer import Group, Nodes, si, to_json
 from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
 from memscal.model.arrays import FloatArray
@@ -166,13 +166,13 @@ def profile_paths(file: SafeFile) -> list[str]:
 
 
 def _entry(measured: MeasuredStress) -> Group:
-    profiles: dict[str, Node] = {}
+    profiles: Nodes = {}
     for i, profile in enumerate(measured.profiles, 1):
         profiles[f"profile_{i}"] = _profile_group(profile, measured.scans)
-    scans: dict[str, Node] = {}
+    scans: Nodes = {}
     sources = {"artifact": measured.artifact}
     for i, scan in enumerate(measured.scans, 1):
-        parts: dict[str, Node] = {
+        parts: Nodes = {
             "sample": groups.sample_group(scan.film, scan.lubrication),
             "indenter": groups.indenter_group(scan.indenter),
             "instrument": groups.instrument_group(scan.sensor, scan.load_cell, scan.stage),
@@ -180,12 +180,12 @@ def _entry(measured: MeasuredStress) -> Group:
         }
         scans[f"scan_{i}"] = Group("NXcollection", parts)
         sources[f"scan_{i}"] = scan.source
-    inputs: dict[str, Node] = {name: write_source(s) for name, s in sources.items() if s}
+    inputs: Nodes = {name: write_source(s) for name, s in sources.items() if s}
     first = measured.scans[0]
     sensor = first.sensor.name
     digest = measured.artifact_digest
     digests = {"content_sha256": digest} if digest else {}
-    children: dict[str, Node] = {
+    children: Nodes = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json(list(profiles)),
         **profiles,
@@ -234,7 +234,7 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
 def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
     """Return roots of covariances, budgets, fitted curves and points of all profiles."""
     # Apart from the profiles: programs that read NeXus take a NXdata within another for its signal.
-    parts: dict[str, dict[str, Node]] = defaultdict(dict)
+    parts: dict[str, Nodes] = defaultdict(dict)
     for i, profile in enumerate(profiles, 1):
         name = f"profile_{i}"
         budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
@@ -249,7 +249,7 @@ def _parts_of_profiles(profiles: Sequence[MeasuredProfile]) -> dict[str, Group]:
 
 
 def _roots_group(profile: MeasuredProfile) -> Group:
-    children: dict[str, Node] = {
+    children: Nodes = {
         "sources": to_json(list(profile.roots)),
         "r": si(profile.r, "length", ("r",)),
     }

@@ -11,7 +11,7 @@ from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import CONTENTS_PATH, SCHEMA_VERSION, VERSION_ATTRIBUTE
 from memscal.formats.units import dimension_of, to_si
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import DIMENSIONS
 
 _MAX_ITEMS = 10_000
@@ -116,9 +116,7 @@ def _finite(text: str) -> float:
     return number
 
 
-def json_value(
-    file: SafeFile, path: str, kind: type[list[Any] | dict[str, Any]], default: Any
-) -> Any:
+def json_value(file: SafeFile, path: str, kind: type[list[Any] | Values], default: Any) -> Any:
     """Return JSON of a given type (``list`` or ``dict``), or the default where there is none."""
     if not file.has(path):
         return default
@@ -175,7 +173,7 @@ def altered(file: SafeFile) -> str:
     return ""
 
 
-def stored_items(file: SafeFile, contents: dict[str, Any]) -> Iterator[writer.DigestItem]:
+def stored_items(file: SafeFile, contents: Values) -> Iterator[writer.DigestItem]:
     """Yield what the list of contents names, as it stands in the file."""
     for path, names in sorted(contents.items()):
         if not isinstance(names, list):

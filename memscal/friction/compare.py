@@ -32,7 +32,7 @@ from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadCo
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.measurement.posterior import common_inputs
 from memscal.measurement.restore import accept_other_sensor, load_of, single_loads
-from memscal.model.arrays import require_non_negative
+from memscal.model.arrays import Values, require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
@@ -360,7 +360,7 @@ def _measured(
     return joined_stress(stresses)
 
 
-def _setting(measured: MeasuredStress, cache: CacheFolder, workers: int) -> dict[str, Any]:
+def _setting(measured: MeasuredStress, cache: CacheFolder, workers: int) -> Values:
     """Return film, sphere, loads and reach (whole millimetres) of the contacts to calculate."""
     scan = measured.scans[0]
     widest = max(scan.width for scan in measured.scans)

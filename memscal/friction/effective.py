@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc, erf
@@ -19,7 +18,7 @@ from memscal.friction.likelihood import (
     predict,
 )
 from memscal.friction.results import BoundedEstimate, LoadComparison
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import FloatArray, Values, array_record
 from memscal.model.measured_stress import MeasuredProfile
 
 EXPANDED = 1.96
@@ -207,7 +206,7 @@ def with_loading(by_loading: Mapping[str, BoundedEstimate]) -> dict[str, Bounded
         highs.append(middle + math.hypot(estimate.interval.upper - value, EXPANDED * apart))
     widest = max(estimates, key=lambda estimate: estimate.standard_uncertainty or math.inf)
     u = widest.standard_uncertainty
-    counted: dict[str, Any] = {
+    counted: Values = {
         "value": middle,
         "standard_uncertainty": None if u is None else math.hypot(u, apart),
         "interval": replace(widest.interval, low=min(lows), high=max(highs)),

@@ -28,6 +28,7 @@ from memscal.mechanics.interface import Interface
 from memscal.model.arrays import (
     FloatArray,
     FrozenArrays,
+    Values,
     array_record,
     finite_vector,
     keyword_value_record,
@@ -113,7 +114,7 @@ class ProfileFamily(FrozenArrays):
         t = np.clip(t, nodes[0], nodes[-1])
         arrays = self._interpolant(t)
         changes = {source: arrays[:, 2 + i] for i, source in enumerate(self.changes)}
-        numbers: dict[str, Any] = {}
+        numbers: Values = {}
         for name in _NUMBERS:
             columns = getattr(self, name).T
             interpolated = [np.interp(t, nodes, column) for column in columns]

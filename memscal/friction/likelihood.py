@@ -29,7 +29,7 @@ from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
 from memscal.measurement.posterior import input_changes, sensor_changes, shared_changes
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, Values, array_record
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
@@ -343,7 +343,7 @@ def stacked(
     points = (normal[0], shear[0])
     predicted = (normal[1], shear[1])
 
-    def joined(pair: Sequence[Any], names: Sequence[str], axis: int) -> dict[str, Any]:
+    def joined(pair: Sequence[Any], names: Sequence[str], axis: int) -> Values:
         """Arrays of both channels, one after the other."""
         arrays = {}
         for name in names:

@@ -15,6 +15,9 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
+Values = dict[str, Any]
+"""Values by their names."""
+
 _Class = TypeVar("_Class")
 
 

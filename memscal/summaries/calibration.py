@@ -12,6 +12,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.arrays import Values
 from memscal.model.assumptions import MOVED
 from memscal.model.checks import REPEAT_CENTRES, Message
 from memscal.model.quantities import (
@@ -114,7 +115,7 @@ def _method(apparatus: ApparatusData) -> str:
     return str(apparatus.process.configuration.get("method") or "")
 
 
-def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
+def _estimates_json(apparatus: ApparatusData) -> Values:
     parameters = apparatus.parameters
     other = apparatus.other
     names = [name for name in _BY_METHOD if name in parameters]
@@ -128,7 +129,7 @@ def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
     return estimates
 
 
-def mapping(result: Calibrated) -> dict[str, Any]:
+def mapping(result: Calibrated) -> Values:
     """Return the object of ``calibrate --json``; its form is part of the contract."""
     apparatus = apparatus_of(result)
     parameters = apparatus.parameters
@@ -205,7 +206,7 @@ def dataset(result: Calibrated) -> Dataset:
     )
 
 
-def correlated(result: Calibrated) -> dict[str, Any]:
+def correlated(result: Calibrated) -> Values:
     """Return the parameters as numbers of the package uncertainties, with their covariance."""
     return correlated_parameters(apparatus_of(result).parameters)
 
@@ -253,9 +254,7 @@ def _misfit(misfit: Misfit) -> str:
     return f"rms {misfit.relative_rms:.2%} of the largest signal, χ²/ν = {misfit.chi2_reduced:.3g}"
 
 
-def rehearsal_json(
-    stress: StressProfile | Contact, method: str, outputs: Sequence[Path]
-) -> dict[str, Any]:
+def rehearsal_json(stress: StressProfile | Contact, method: str, outputs: Sequence[Path]) -> Values:
     """Return the object that ``calibrate --dry-run --json`` prints."""
     return {
         "schema_version": "1",

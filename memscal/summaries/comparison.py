@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from memscal.friction.results import (
     percent,
 )
 from memscal.model import records
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
@@ -39,10 +38,10 @@ from memscal.summaries.table import (
 )
 
 
-def mapping(comparison: FrictionComparison) -> dict[str, Any]:
+def mapping(comparison: FrictionComparison) -> Values:
     """Return what ``compare --json`` prints but for the files that it was given and wrote."""
     tested = comparison.measured.noise_stated
-    whole: dict[str, Any] = {"schema_version": "1"}
+    whole: Values = {"schema_version": "1"}
     whole["scans"] = [
         file_json(scan.source) | {"lubrication": scan.lubrication}
         for scan in comparison.measured.scans
@@ -113,7 +112,7 @@ def _columns(name: str, estimate: BoundedEstimate, tested: bool) -> dict[str, fl
 _SCAN_SOURCES = {"noise", "load_scatter", "position", "between_scan_gain", "lubricated_friction"}
 
 
-def correlated(comparison: FrictionComparison) -> dict[str, Any]:
+def correlated(comparison: FrictionComparison) -> Values:
     """Return the coefficients of all loads that have a standard uncertainty, by their names."""
     # Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
     # is common to them; each source moves all coefficients to the same side.
@@ -151,12 +150,12 @@ def _joint(comparison: FrictionComparison) -> Iterator[tuple[str, str, BoundedEs
             yield lubrication, loading, estimate
 
 
-def file_json(source: SourceFile | None) -> dict[str, Any]:
+def file_json(source: SourceFile | None) -> Values:
     """Return a file's name and digest as the JSON output holds them."""
     return {name: getattr(source, name, None) for name in ("file_name", "sha256")}
 
 
-def _load(comparison: FrictionComparison, index: int) -> dict[str, Any]:
+def _load(comparison: FrictionComparison, index: int) -> Values:
     """Return what is compared of one load, by the loading."""
     tested = comparison.measured.noise_stated
     profile = comparison.measured.profiles[index]
@@ -179,7 +178,7 @@ def _load(comparison: FrictionComparison, index: int) -> dict[str, Any]:
     }
 
 
-def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
+def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> Values:
     """Return what one load says of each coefficient, by one loading."""
     tested = comparison.measured.noise_stated
     profiles = []
@@ -204,7 +203,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
     }
 
 
-def _estimate(estimate: BoundedEstimate, tested: bool) -> dict[str, Any]:
+def _estimate(estimate: BoundedEstimate, tested: bool) -> Values:
     """Return an estimate with its fit and its profile likelihood."""
     # An estimated noise is as large as the misfit: a chi-square by it tests nothing.
     fit = {} if tested else {"least": None, "p_value": None}
@@ -488,7 +487,7 @@ def friction_name(friction: float) -> str:
     return "inf" if math.isinf(friction) else f"{friction:.4g}"
 
 
-def bounded_json(quantity: Quantity, estimate: BoundedEstimate) -> dict[str, Any]:
+def bounded_json(quantity: Quantity, estimate: BoundedEstimate) -> Values:
     """Return an estimate with its interval; without a value there is a reason."""
     interval = estimate.interval
     scale = quantity.scale

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import changes_by_inputs
 from memscal.mechanics.press_rod import is_tabulated, press_rod
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.checks import Message
 from memscal.model.film import NEO_HOOKEAN
 from memscal.model.indenter import Cone, Rod, RoundIndenter
@@ -33,7 +32,7 @@ _PROFILE = (
 )
 
 
-def mapping(contact: Contact) -> dict[str, Any]:
+def mapping(contact: Contact) -> Values:
     """Return one solution of ``reference --json``; the contract fixes its form."""
     law = contact.film_of_law.law
     return declared.members(SOLUTION, contact, sticking=math.isinf(contact.friction), film_law=law)
@@ -150,7 +149,7 @@ def frame(contact: Contact) -> declared.DataFrame:
     return declared.data_frame(_PROFILE, _arrays(contact))
 
 
-def correlated(contact: Contact) -> dict[str, Any]:
+def correlated(contact: Contact) -> Values:
     """Return depth, radii and largest base stress at the exact load, as correlated numbers."""
     # They vary with the stated uncertainties of film and indenter; the change under refinement is
     # taken as a further standard uncertainty of each.

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.notation import format_measured
 from memscal.model.quantities import DIMENSIONS, Quantity, Record, by_name, parameter_quantity
 from memscal.summaries.table import finite
@@ -34,7 +34,7 @@ _COMPANIONS = {
 }
 
 
-def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
+def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> Values:
     """Return an object's quantities as JSON holds them; ``values`` stand in for attributes."""
     # In the units in which they are shown: a number or an array stands with its unit and, where
     # they are declared, its standard uncertainty and the budget of it; counts, statistics and
@@ -76,7 +76,7 @@ def power_of_ten(values: FloatArray) -> int:
     return int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
 
 
-def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
+def parameter_json(parameters: ParameterSet, name: str) -> Values:
     """Return a parameter's value and standard uncertainty in the unit in which it is shown."""
     quantity = parameter_quantity(parameters, name)
     return {
@@ -88,7 +88,7 @@ def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
 
 def parameters_json(
     parameters: ParameterSet, names: Iterable[str] | None = None
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, Values]:
     """Return parameters as JSON by their names, by default all."""
     chosen = parameters.names if names is None else names
     return {name: parameter_json(parameters, name) for name in chosen}
@@ -102,7 +102,7 @@ def cell(quantity: Quantity, holder: object, /, *, unit: str | None = None, **va
     return format_measured(value, spread, quantity.unit if unit is None else unit)
 
 
-def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
+def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> Values:
     """Return the quantities of an object by the names of their columns in a data frame."""
     held = {}
     for quantity in quantities:
@@ -157,13 +157,13 @@ def record_arrays(
 
 def correlated_numbers(
     names: Sequence[str], values: Sequence[float] | FloatArray, covariance: FloatArray
-) -> dict[str, Any]:
+) -> Values:
     """Return numbers of the package uncertainties by name."""
     from uncertainties import correlated_values
 
     return dict(zip(names, correlated_values(list(values), covariance), strict=True))
 
 
-def correlated_parameters(parameters: ParameterSet) -> dict[str, Any]:
+def correlated_parameters(parameters: ParameterSet) -> Values:
     """Return parameters as numbers of the package uncertainties, with their covariance."""
     return correlated_numbers(parameters.names, parameters.values, parameters.covariance)

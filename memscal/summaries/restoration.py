@@ -1,11 +1,10 @@
 """Restored stress as tables, mapping and arrays, as ``memscal restore`` prints it."""
 
-from typing import Any
-
 import numpy as np
 
 from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
+from memscal.model.arrays import Values
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
 from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
@@ -36,7 +35,7 @@ _FRICTIONLESS = "calculated without friction"
 _NUMBERS = ("force", "stress_on_axis", "centre", "centre_y", "baseline")
 
 
-def _values(restored: Restoration) -> dict[str, Any]:
+def _values(restored: Restoration) -> Values:
     """Return what the numbers of a restoration are, where they are no attributes of it."""
     values = {
         "load": restored.scan.load,
@@ -58,7 +57,7 @@ def _determined(restored: Restoration) -> dict[str, Quantity]:
     return shown
 
 
-def mapping(restored: Restoration) -> dict[str, Any]:
+def mapping(restored: Restoration) -> Values:
     """Return the object of ``restore --json`` without its file; the contract fixes its form."""
     comparison = restored.comparison
     calculated = None
@@ -144,7 +143,7 @@ def _origin(comparison: StressComparison) -> str:
     return "expected stress" if source is None else f"expected stress ({source.file_name})"
 
 
-def _arrays(restored: Restoration) -> dict[str, Any]:
+def _arrays(restored: Restoration) -> Values:
     values = {
         "r": restored.r,
         "sigma_zz": restored.sigma_zz,
@@ -167,7 +166,7 @@ def frame(restored: Restoration) -> DataFrame:
     return data_frame(_QUANTITIES, columns)
 
 
-def correlated(restored: Restoration) -> dict[str, Any]:
+def correlated(restored: Restoration) -> Values:
     """Return force, stress on the axis, centre and baseline with their joint covariance."""
     values = _values(restored) | {"force": restored.force, "baseline": restored.baseline}
     names = [name for name in _determined(restored) if name in _NUMBERS]

@@ -1,11 +1,10 @@
 """Measured stress as tables, mapping and arrays, as ``memscal apply`` prints it."""
 
-from typing import Any
-
 import numpy as np
 
 from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
 from memscal.model import records
+from memscal.model.arrays import Values
 from memscal.model.indenter import RoundIndenter
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.quantities import MM, Quantity, by_name
@@ -22,7 +21,7 @@ _IN_JSON += [records.FORCE_BUDGET, records.MAXIMUM_BUDGET]
 _POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors")]
 
 
-def mapping(stress: MeasuredStress) -> dict[str, Any]:
+def mapping(stress: MeasuredStress) -> Values:
     """Return the object of ``apply --json`` without its files; the contract fixes its form."""
     applied = [quantity.read_in(stress.scans[0].reading) for quantity in records.APPLIED]
     profiles = []
@@ -44,12 +43,12 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
     }
 
 
-def _force_over_load(stress: MeasuredStress) -> dict[str, Any]:
+def _force_over_load(stress: MeasuredStress) -> Values:
     ratio, u = pooled_force(stress.profiles)
     return {"force_over_load": ratio, "force_over_load_uncertainty": u}
 
 
-def _centre(profile: MeasuredProfile) -> dict[str, Any]:
+def _centre(profile: MeasuredProfile) -> Values:
     """Return the centre along the scan, in m."""
     u = profile.centre_uncertainty[profile.axis]
     return {"centre": profile.centre[profile.axis], "centre_uncertainty": u}
@@ -129,7 +128,7 @@ def dataset(stress: MeasuredStress) -> declared.Dataset:
     """Return the points as (profile, point), NaN beyond the last of a profile, and its numbers."""
     profiles = stress.profiles
     shape = (len(profiles), max(profile.r.size for profile in profiles))
-    values: dict[str, Any] = {name: [getattr(p, name) for p in profiles] for name in _SCALARS}
+    values: Values = {name: [getattr(p, name) for p in profiles] for name in _SCALARS}
     for name in _POINTS:
         values[name] = np.full(shape, np.nan)
         for row, profile in zip(values[name], profiles, strict=True):
@@ -144,7 +143,7 @@ def dataset(stress: MeasuredStress) -> declared.Dataset:
 def frame(stress: MeasuredStress) -> declared.DataFrame:
     """Return one row for each point, with the number, load and lubrication of its profile."""
     sizes = [profile.r.size for profile in stress.profiles]
-    values: dict[str, Any] = {"profile": np.repeat(np.arange(1, len(sizes) + 1), sizes)}
+    values: Values = {"profile": np.repeat(np.arange(1, len(sizes) + 1), sizes)}
     for name in _POINTS:
         values[name] = np.concatenate([getattr(profile, name) for profile in stress.profiles])
     for name in ("load", "lubrication"):
@@ -154,7 +153,7 @@ def frame(stress: MeasuredStress) -> declared.DataFrame:
     return declared.data_frame((number, *columns), values)
 
 
-def correlated(stress: MeasuredStress) -> dict[str, Any]:
+def correlated(stress: MeasuredStress) -> Values:
     """Return force, maximum, centre and baseline of each profile, numbered from one."""
     # Forces are correlated by the sources that profiles share; no other covariance is known.
     names = []

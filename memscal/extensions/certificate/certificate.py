@@ -21,7 +21,7 @@ from memscal.extensions.certificate.laboratory import (
 from memscal.formats.artifact import artifact_tree
 from memscal.formats.hdf5.writer import tree_to_bytes
 from memscal.formats.units import to_si
-from memscal.model.arrays import FloatArray, keyword_value_record, value_record
+from memscal.model.arrays import FloatArray, Values, keyword_value_record, value_record
 from memscal.model.checks import OVERRIDE
 from memscal.model.provenance import timestamp
 from memscal.model.quantities import MM, Quantity, parameter_quantity
@@ -207,7 +207,7 @@ def certify(apparatus: ApparatusFunction, laboratory: LaboratoryFile) -> Certifi
 
 def _completed(
     apparatus: ApparatusFunction, laboratory: LaboratoryFile
-) -> tuple[dict[str, dict[str, Any]], tuple[dict[str, Any], ...]]:
+) -> tuple[dict[str, Values], tuple[Values, ...]]:
     """Return sections and equipment of the laboratory's file, with what the artifact states."""
     held = laboratory.additions(apparatus)
     sections = {name: dict(section) for name, section in laboratory.sections.items()}

@@ -18,7 +18,7 @@ from memscal.extensions.certificate.certificate import (
 )
 from memscal.extensions.certificate.laboratory import SECTIONS, ZERO_CELSIUS
 from memscal.formats.units import dsi_unit
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import DIMENSIONS, PER_MM
 from memscal.version import __version__
 
@@ -142,7 +142,7 @@ def _listed(
     factors: float | FloatArray = COVERAGE_FACTOR,
 ) -> Tree:
     """Return a quantity of several values, with expanded uncertainties and covariance if given."""
-    stated: dict[str, Any] = {
+    stated: Values = {
         "si:labelXMLList": " ".join(labels),
         "si:valueXMLList": _numbers(values),
         "si:unitXMLList": " ".join(map(dsi_unit, units)),

@@ -14,6 +14,7 @@ from memscal.errors import FormatError, InputError
 from memscal.formats.files import FilePath, read_bytes
 from memscal.formats.units import to_si
 from memscal.model.apparatus import ApparatusData
+from memscal.model.arrays import Values
 from memscal.model.quantities import ESTIMATED
 from memscal.model.scan import STATED_ERRORS, Scan
 
@@ -79,7 +80,7 @@ class LaboratoryFile:
         """Return the value of a key, ``None`` where it is not stated."""
         return self.sections.get(section, {}).get(key)
 
-    def additions(self, holder: Scan | ApparatusData) -> dict[str, Any]:
+    def additions(self, holder: Scan | ApparatusData) -> Values:
         """Return instruments, user and times with what the file adds; a contradiction is refused.
 
         The customer, and who authorises, stay in the file.
@@ -104,7 +105,7 @@ class LaboratoryFile:
             added[name] = replace(part, **self._added(part, stated, name))
         return added
 
-    def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> dict[str, Any]:
+    def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> Values:
         """Return what a part does not hold; what it holds must be the same."""
         added = {}
         for key, value in stated.items():
@@ -171,7 +172,7 @@ def _missing(place: str, section: str, stated: Mapping[str, Any]) -> Iterator[st
             yield f"{place} {key}.uncertainty"
 
 
-def _section(where: str, section: str, content: Any) -> dict[str, Any]:
+def _section(where: str, section: str, content: Any) -> Values:
     """Return a table with its values as their kinds ask for."""
     if not isinstance(content, dict):
         raise FormatError(

@@ -29,6 +29,7 @@ from memscal.extensions.fleet.shards import (
 )
 from memscal.formats.files import ensure_writable, read_bytes
 from memscal.formats.scan import read_scan
+from memscal.model.arrays import Values
 from memscal.model.provenance import timestamp
 from memscal.model.stress import StressProfile
 from memscal.version import __version__
@@ -218,7 +219,7 @@ def run_shard(batch: Batch, shard: Shard) -> ShardOutcome:
     return ShardOutcome(len(rows), errors, failed, kept)
 
 
-def _kept_rows(batch: Batch, shard: Shard) -> list[dict[str, Any]]:
+def _kept_rows(batch: Batch, shard: Shard) -> list[Values]:
     """Return what a shard's file says, if it opens whole and its digest is that of this work."""
     if batch.table(shard).exists():
         with suppress(MemscalError):
@@ -226,7 +227,7 @@ def _kept_rows(batch: Batch, shard: Shard) -> list[dict[str, Any]]:
             inputs = [_sha256_of_file(batch.folder / scan.path) for scan in shard.scans]
             if table.schema.metadata.get(DIGEST.encode()) == _digest(batch, shard, inputs).encode():
                 names = ["passed", "error", "artifact"]
-                rows: list[dict[str, Any]] = table.select(names).to_pylist()
+                rows: list[Values] = table.select(names).to_pylist()
                 written = (batch.results / row["artifact"] for row in rows if row["artifact"])
                 if all(path.exists() for path in written):
                     return rows
@@ -246,7 +247,7 @@ def _sha256_of_file(path: Path) -> str | None:
     return None
 
 
-def _row(batch: Batch, shard: Shard, i: int) -> dict[str, Any]:
+def _row(batch: Batch, shard: Shard, i: int) -> Values:
     """Calibrate a scan and return its row; an error is a row, too."""
     item = shard.scans[i]
     path = batch.folder / item.path

@@ -1,7 +1,5 @@
 """Figure of a fleet of sensors: distributions, failures, and the map of the wafer."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,7 +9,7 @@ from memscal.extensions.fleet.results import FleetResults, robust_limit, robust_
 from memscal.extensions.fleet.results_summary import error_classes, failures, verdict
 from memscal.figures.report import Picture, Report
 from memscal.figures.style import COLOURS, drawable, legend_above, panels_of
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.summaries.declared import power_of_ten
 
 _MOST_BINS = 60
@@ -96,7 +94,7 @@ def _places(figure: Figure, axes: Axes, fleet: FleetResults) -> None:
     x = fleet.wafer_x
     y = fleet.wafer_y
     placed = np.isfinite(x) & np.isfinite(y)
-    shown: dict[str, Any] = {"rasterized": a.size > _MANY, "linewidths": 0}
+    shown: Values = {"rasterized": a.size > _MANY, "linewidths": 0}
     size = np.clip(4e3 / max(a.size, 1), 1, 40)
     if placed.any():
         some = placed & finite

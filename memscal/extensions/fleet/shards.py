@@ -15,7 +15,7 @@ from memscal.errors import FormatError, InputError, MemscalError
 from memscal.extensions.fleet.results import FleetResults
 from memscal.formats.files import HDF5_SUFFIXES, atomic_write_bytes, read_bytes
 from memscal.model.apparatus import ApparatusData
-from memscal.model.arrays import FloatArray, value_record
+from memscal.model.arrays import FloatArray, Values, value_record
 from memscal.model.checks import OVERRIDE, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.quantities import ESTIMATED, MM, PER_MM, PER_MM2, parameter_quantity
@@ -183,7 +183,7 @@ def _schema(readings: Iterable[Reading]) -> Any:
     return pa.schema(fields)
 
 
-def fleet_row(data: ApparatusData) -> dict[str, Any]:
+def fleet_row(data: ApparatusData) -> Values:
     """Return an apparatus function as a row, in the units of files."""
     parameters = data.parameters
     radial = data.radial_profile
@@ -280,7 +280,7 @@ def write_batch(results: Path, stated: Mapping[str, Any]) -> None:
     atomic_write_bytes(results / _BATCH, f"{text}\n".encode(), overwrite=True)
 
 
-def read_batch(results: Path) -> dict[str, Any]:
+def read_batch(results: Path) -> Values:
     """Return what the batch of some results states of itself; nothing where that is not known."""
     with suppress(MemscalError, ValueError, RecursionError):
         stated = json.loads(read_bytes(results / _BATCH, limit=_MOST_STATED))

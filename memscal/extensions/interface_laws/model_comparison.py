@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp
@@ -43,7 +42,7 @@ from memscal.friction.marginal_likelihood import (
     log_uniform_prior,
 )
 from memscal.friction.results import BoundedEstimate, Interval
-from memscal.model.arrays import BoolArray, FloatArray, array_record, require_positive
+from memscal.model.arrays import BoolArray, FloatArray, Values, array_record, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
@@ -157,7 +156,7 @@ def compare_interface(
     lubricated = [profile for profile in profiles if profile.lubrication == "lubricated"]
     dry = [profile for profile in profiles if profile.lubrication != "lubricated"]
     scan = profiles[0].scan
-    contacts: dict[str, Any] = {
+    contacts: Values = {
         "film": scan.film,
         "indenter": scan.indenter,
         "reach": _REACH * max(float(profile.r[-1]) for profile in profiles),

@@ -1,10 +1,8 @@
 """Laws of the interface and their evidence, as tables and as JSON."""
 
-from typing import Any
-
 from memscal.extensions.interface_laws import results
 from memscal.friction.results import INTERVAL, VALUE, percent
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import KPA, Quantity
 from memscal.model.records import ESTIMATE_FIT, SLIP_LENGTH
 from memscal.summaries.comparison import bounded_json, friction_name
@@ -107,7 +105,7 @@ def _between(ends_about_best: FloatArray) -> str:
     return f"{friction_name(best)} [{low}, {high}]"
 
 
-def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
+def mapping(comparison: results.InterfaceComparison) -> Values:
     """Return laws, evidence and lengths as JSON holds them."""
     whole = {}
     for direction, compared in comparison.by_direction.items():
@@ -121,11 +119,11 @@ def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
     return whole | {"warnings": texts_of(comparison.messages)}
 
 
-def _held(names: tuple[str, ...], record: object) -> dict[str, Any]:
+def _held(names: tuple[str, ...], record: object) -> Values:
     return {name: plain(getattr(record, name)) for name in names}
 
 
-def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:
+def _implied_json(implied: results.ImpliedFriction) -> list[Values]:
     names = [quantity.name for quantity in IMPLIED]
     rows = zip(*vars(implied).values(), strict=True)
     return [members(IMPLIED, implied, **dict(zip(names, row, strict=True))) for row in rows]

@@ -26,7 +26,7 @@ from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.units import from_si
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, Values, array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
@@ -96,7 +96,7 @@ def heavy_arrays(data: bytes, path: str) -> tuple[dict[str, NDArray[Any]], list[
 
 def run_meshio(
     data: bytes, kind: str, name: str, heavy: Mapping[str, NDArray[Any]]
-) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+) -> tuple[Values, list[NDArray[Any]]]:
     """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
     seconds = _SECONDS + size / _BYTES_PER_SECOND
@@ -257,7 +257,7 @@ def _require_meshio() -> None:
 
 
 def _checked(
-    header: dict[str, Any],
+    header: Values,
     arrays: list[NDArray[Any]],
     sources: tuple[SourceFile, ...],
     *,
@@ -285,7 +285,7 @@ def _checked(
 
 
 def _cells(
-    blocks: list[dict[str, Any]], arrays: list[NDArray[Any]], points: int, source: SourceFile
+    blocks: list[Values], arrays: list[NDArray[Any]], points: int, source: SourceFile
 ) -> Iterator[Cells]:
     """Yield the blocks that have cells, with their nodes as whole numbers below ``points``."""
     for block in blocks:

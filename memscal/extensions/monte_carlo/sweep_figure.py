@@ -1,14 +1,12 @@
 """Figure of a sweep: results of a calibration against the amplitude of the noise."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.extensions.monte_carlo.sweep import Sweep
 from memscal.figures.style import COLOURS, panels_of
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import ESTIMATED, MM
 from memscal.summaries.declared import power_of_ten
 
@@ -66,7 +64,7 @@ def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: Float
 def _draw_seeds(
     axes: Axes, amplitude: FloatArray, draws: FloatArray, limits: tuple[float, float]
 ) -> None:
-    look: dict[str, Any] = {"color": COLOURS["gaussian"], "ms": 4}
+    look: Values = {"color": COLOURS["gaussian"], "ms": 4}
     drawn = np.any(np.isfinite(draws), axis=1)
     x = amplitude[drawn]
     lower, median, upper = np.nanquantile(draws[drawn], (_INNER[0], 0.5, _INNER[1]), axis=1)

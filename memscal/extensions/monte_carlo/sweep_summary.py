@@ -1,11 +1,9 @@
 """A sweep over the noise amplitude as a table, a mapping and arrays."""
 
-from typing import Any
-
 import numpy as np
 
 from memscal.extensions.monte_carlo.sweep import Sweep
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, Values
 from memscal.model.quantities import ESTIMATED, MM, Quantity
 from memscal.summaries.declared import Dataset, plain, power_of_ten
 from memscal.summaries.table import Table
@@ -41,7 +39,7 @@ def tables(result: Sweep) -> list[Table]:
     return [Table(title, (*head, "A, draws", "σ(G), draws", "rms, draws"), rows)]
 
 
-def mapping(result: Sweep) -> dict[str, Any]:
+def mapping(result: Sweep) -> Values:
     """Return the whole sweep: lists over amplitudes, and lists of draws within them."""
     values = {"amplitude": {"value": plain(result.amplitude), "unit": "1"}}
     for declared, draws in _RESULTS:
@@ -59,7 +57,7 @@ def dataset(result: Sweep) -> Dataset:
     import xarray
 
     axes = ("amplitude", "draw")
-    variables: dict[str, Any] = {"amplitude": (axes[:1], result.amplitude, {"units": "1"})}
+    variables: Values = {"amplitude": (axes[:1], result.amplitude, {"units": "1"})}
     for quantity, draws in _RESULTS:
         attributes = {"units": quantity.read_in(result.reading).si_unit}
         variables[quantity.name] = (axes[:1], getattr(result, quantity.name), attributes)

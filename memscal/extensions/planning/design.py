@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import (
     FloatArray,
     FrozenArrays,
+    Values,
     array_record,
     keyword_value_record,
     require_non_negative,
@@ -573,7 +573,7 @@ def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[
     """Return the designs with one number of the plan (SI) replaced; unusable plans are left out."""
     designs = []
     for value in Task("plans", len(values)).counted(values):
-        changes: dict[str, Any] = {vary: value}
+        changes: Values = {vary: value}
         with suppress(FitError), reporting(nobody):
             designs.append(evaluate(replace(planned.plan, **changes), planned.method))
     return designs

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from memscal.extensions.simulation.sensor import (
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import FloatArray, require_positive, require_range
+from memscal.model.arrays import FloatArray, Values, require_positive, require_range
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
 from memscal.model.scan import Scan
@@ -130,7 +129,7 @@ def _require_row(loads: FloatArray, points: int, spacing: float, repeats: int, s
 
 
 def _pressed(
-    film: ElasticFilm, sphere: Sphere, loads: FloatArray, law: dict[str, Any], scatter: float
+    film: ElasticFilm, sphere: Sphere, loads: FloatArray, law: Values, scatter: float
 ) -> tuple[list[list[Contact]], float]:
     """Return one contact at each load (N), or three where loads scatter, and their step in ln P."""
     spread = max(_SPREAD * scatter, _LEAST_SPREAD) if scatter > 0 else 0.0
@@ -162,7 +161,7 @@ def described_film(film: ElasticFilm) -> dict[str, float]:
 def _truth(
     film: ElasticFilm,
     sphere: Sphere,
-    law: dict[str, Any],
+    law: Values,
     load_scale: float,
     loads: FloatArray,
     disturbances: Disturbances,

@@ -2,7 +2,6 @@
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.model.arrays import (
     FloatArray,
+    Values,
     keyword_value_record,
     require_non_negative,
     require_positive,
@@ -119,7 +119,7 @@ Shear = tuple[RadialKernel, float] | None
 
 
 def with_old_arguments(
-    function: str, old: dict[str, Any], disturbances: Disturbances, shear: Shear
+    function: str, old: Values, disturbances: Disturbances, shear: Shear
 ) -> tuple[Disturbances, Shear]:
     """Put the keywords of an earlier version where they are now."""
     channels = old.pop("channels", ("zz",))

@@ -10,7 +10,7 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import Disturbances, Shear
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray, require_positive, value_record
+from memscal.model.arrays import FloatArray, Values, require_positive, value_record
 from memscal.model.instrument import StressSensor
 from memscal.model.scan import Scan
 
@@ -118,7 +118,7 @@ def simulated_scan(
     constant = sensor.conversion_constant
     signal = constant * stresses["zz"].reshape(draws.shape)
     largest_signal = constant * largest
-    normal: dict[str, Any] = _read("u_zz", signal, largest_signal, draws, x, disturbances)
+    normal: Values = _read("u_zz", signal, largest_signal, draws, x, disturbances)
     tangential: dict[str, FloatArray] = {}
     tangential_truth: dict[str, float | str] = {}
     if sensor.shear is not None:

@@ -17,7 +17,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.limits import most_held
 from memscal.formats.units import from_si
-from memscal.model.arrays import array_record
+from memscal.model.arrays import Values, array_record
 from memscal.model.notation import printable
 from memscal.model.sizes import too_large
 
@@ -67,6 +67,9 @@ class Group:
 
 
 Node = Group | Number | Text | str
+
+Nodes = dict[str, Node]
+"""Nodes of a group by their names."""
 
 
 def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
@@ -141,7 +144,7 @@ def content_digest(items: Iterable[DigestItem]) -> str:
     return total.hexdigest()
 
 
-def _attributes(node: Node) -> dict[str, Any]:
+def _attributes(node: Node) -> Values:
     """Return the attributes; a group's begin with its class, an NXdata's end with its axes."""
     if isinstance(node, str):
         return {}

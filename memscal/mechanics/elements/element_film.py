@@ -32,7 +32,7 @@ from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import DomainError
 from memscal.mechanics.elements.mesh import TriangleMesh, film_triangles
 from memscal.mechanics.surface import SurfaceCompliance, anticlockwise
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import FloatArray, IndexArray, Values, array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.progress import Task
@@ -123,7 +123,7 @@ class MixedSystem:
     mesh: TriangleMesh
     poisson_ratio: float
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Values:
         """Return what it is made of; the factorisation cannot be copied, and is soon remade."""
         return {"mesh": self.mesh, "poisson_ratio": self.poisson_ratio}
 
