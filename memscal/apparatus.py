@@ -15,7 +15,13 @@ from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.extensions import hook
 from memscal.model.apparatus import ApparatusData, ApparatusField
-from memscal.model.arrays import FloatArray, finite_vector, keyword_array_record, require_increasing
+from memscal.model.arrays import (
+    ArrayPair,
+    FloatArray,
+    finite_vector,
+    keyword_array_record,
+    require_increasing,
+)
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Result
 
@@ -202,7 +208,7 @@ class ApparatusFunction(Result, ApparatusData):
         """
         hook("write_artifact")(self, path, overwrite=overwrite)
 
-    def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> ArrayPair:
         """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""
         radii, stress, wavenumbers = self._checked(r, sigma_zz)
         profile = self.radial_profile

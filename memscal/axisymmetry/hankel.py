@@ -25,16 +25,16 @@ import numpy as np
 from scipy.special import j0, j1, jv
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, array_record, table_spline
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, table_spline
 
 
-def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
+def gauss_panels(upper: float, longest: float, order: int = 16) -> ArrayPair:
     """Nodes and weights on [0, upper], in panels up to ``longest`` with ``order`` nodes each."""
     # To rounding 16 nodes integrate up to 16 rad of phase, 64 up to 100 rad.
     return gauss_between(np.linspace(0.0, upper, max(1, math.ceil(upper / longest)) + 1), order)
 
 
-def gauss_between(edges: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
+def gauss_between(edges: FloatArray, order: int) -> ArrayPair:
     """Return nodes and weights of Gauss-Legendre rules between increasing edges."""
     nodes, weights = _legendre(order)
     half = np.diff(edges)[:, None] / 2
@@ -137,7 +137,7 @@ def radial_spline(
     return CubicSpline(*_mirrored(r, f, order))
 
 
-def _mirrored(r: FloatArray, f: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
+def _mirrored(r: FloatArray, f: FloatArray, order: int) -> ArrayPair:
     """Continue a table beyond the axis by three radii."""
     if r.size < 4:
         raise InputError(

@@ -184,8 +184,11 @@ FILM = {"young_modulus": 6, "poisson_ratio": 0, "thickness": -3}
 LAW = ("film_law", "mooney_rivlin_ratio")
 """What describes its law."""
 
+Defaults = Mapping[str, float | str | None]
+"""Values of options that are not given, by their names without dashes."""
+
 #: The paper's film, in the units of the command line.
-PAPER_FILM: Mapping[str, float | str | None] = {
+PAPER_FILM: Defaults = {
     "young-modulus": 2.2,
     "poisson-ratio": 0.5,
     "thickness": 2.0,
@@ -198,9 +201,7 @@ PAPER_FILM: Mapping[str, float | str | None] = {
 _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 
-def film_options(
-    *, defaults: Mapping[str, float | str | None] | None = None, uncertainties: bool = True
-) -> _Adder:
+def film_options(*, defaults: Defaults | None = None, uncertainties: bool = True) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
     ratio = NonNegative("ratio", high=0.5)
     modulus_text = "Young's modulus of the film, in MPa."
@@ -244,7 +245,7 @@ def radius_options(
 
 def _measured(
     entries: Sequence[tuple[str, Quantity, str, str]],
-    defaults: Mapping[str, float | str | None],
+    defaults: Defaults,
     uncertainties: bool,
 ) -> _Adder:
     """Return the options of quantities, then those of their uncertainties (the last texts)."""

@@ -23,7 +23,7 @@ from memscal.figures.style import (
     shades,
 )
 from memscal.model.apparatus import ApparatusData, Reconvolution
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import ArrayPair, FloatArray
 from memscal.model.checks import REPEAT_CENTRES
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
@@ -123,7 +123,7 @@ def _label_log(axes: Axes, data: ApparatusData) -> None:
     axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} ({unit})")
 
 
-def _signal_and_limit(data: ApparatusData) -> tuple[FloatArray, FloatArray]:
+def _signal_and_limit(data: ApparatusData) -> ArrayPair:
     """Return voltages less baseline, and of those below 2u the upper limit; else NaN, each."""
     scan = data.reconvolution
     signal = _turned(data, scan.x) * (scan.u_zz - _background(data, scan.x))
@@ -186,7 +186,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             line.set_markersize(1.2 if x.size > SCATTER_THRESHOLD else 2.5)
 
 
-def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _as_curve(x: FloatArray, u: FloatArray) -> ArrayPair:
     """Return positions in order with one value for each, where repeats agree; else as given."""
     places, inverse = np.unique(x, return_inverse=True)
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.figures.friction_profiles import (
+    Loads,
     chosen,
     comparison_looks,
     draw_profiles,
@@ -34,7 +35,7 @@ from memscal.figures.style import (
     mark,
     panels_of,
 )
-from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
+from memscal.friction.results import BoundedEstimate, FrictionComparison
 from memscal.model.arrays import FloatArray, Values
 
 RISE = r"$-2\,\ln(p/p_{max})$"
@@ -206,9 +207,7 @@ def effective_friction_figure(comparison: FrictionComparison) -> Figure:
     return _panels(comparison, _draw_effective, 2.7, _BOTH_NOTE)
 
 
-def _draw_effective(
-    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
-) -> None:
+def _draw_effective(axes: Axes, comparison: FrictionComparison, loads: Loads) -> None:
     """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
@@ -264,7 +263,7 @@ def interval_ends(reading: BoundedEstimate) -> FloatArray:
 
 def _panels(
     comparison: FrictionComparison,
-    draw: Callable[[Axes, FrictionComparison, Sequence[LoadComparison]], None],
+    draw: Callable[[Axes, FrictionComparison, Loads], None],
     height: float,
     note: str,
 ) -> Figure:
@@ -303,9 +302,7 @@ def likelihood_figure(comparison: FrictionComparison) -> Figure:
     return _panels(comparison, _draw_likelihood, 2.4, INTERVAL_NOTE)
 
 
-def _draw_likelihood(
-    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
-) -> None:
+def _draw_likelihood(axes: Axes, comparison: FrictionComparison, loads: Loads) -> None:
     looks = comparison_looks(comparison)
     for at_load in loads:
         colour, name = looks[at_load.load]

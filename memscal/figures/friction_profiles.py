@@ -15,6 +15,7 @@ from memscal.figures.style import (
     COLOURS,
     EXPANDED,
     SCATTER_THRESHOLD,
+    Looks,
     draw_measured,
     draw_residual_band,
     draw_zero,
@@ -28,6 +29,9 @@ from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
+
+Loads = Sequence[LoadComparison]
+"""Loads of one loading and lubrication, in their order."""
 
 _TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
 
@@ -85,14 +89,12 @@ def chosen(
     return sorted(loads, key=lambda at_load: at_load.load)
 
 
-def joint_estimate(
-    comparison: FrictionComparison, loads: Sequence[LoadComparison]
-) -> BoundedEstimate:
+def joint_estimate(comparison: FrictionComparison, loads: Loads) -> BoundedEstimate:
     """Return the coefficient of all loads together, of the lubrication and loading of some."""
     return comparison.joint[loads[0].lubrication][loads[0].loading]
 
 
-def comparison_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
+def comparison_looks(comparison: FrictionComparison) -> Looks:
     """Return colour and name of each load of a comparison, lubricated or not."""
     return load_looks(profile.load for profile in comparison.measured.profiles)
 
@@ -166,7 +168,7 @@ def profile_figure(
 def draw_profiles(
     axes: Axes,
     comparison: FrictionComparison,
-    loads: Sequence[LoadComparison],
+    loads: Loads,
     *,
     logarithmic: bool = False,
 ) -> None:
@@ -195,9 +197,7 @@ def draw_profiles(
         _finish_linear(axes, loads, styles)
 
 
-def _finish_logarithmic(
-    axes: Axes, loads: Sequence[LoadComparison], styles: Mapping[str, str]
-) -> None:
+def _finish_logarithmic(axes: Axes, loads: Loads, styles: Mapping[str, str]) -> None:
     top = max(at_load.profile.s_zz.max() for at_load in loads) / KPA
     axes.set_yscale("log")
     axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
@@ -208,7 +208,7 @@ def _finish_logarithmic(
     legend_above(axes)
 
 
-def _finish_linear(axes: Axes, loads: Sequence[LoadComparison], styles: Mapping[str, str]) -> None:
+def _finish_linear(axes: Axes, loads: Loads, styles: Mapping[str, str]) -> None:
     draw_zero(axes)
     axes.set_xlim(0, max(at_load.profile.r[-1] for at_load in loads) / MM)
     lines = [lubricated_words(loads[0].lubrication)]
@@ -226,7 +226,7 @@ def _note(axes: Axes, text: str, corner: tuple[float, float]) -> None:
 
 
 def draw_residuals(
-    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], friction: float
+    axes: Axes, comparison: FrictionComparison, loads: Loads, friction: float
 ) -> float:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
     looks = comparison_looks(comparison)

@@ -53,6 +53,9 @@ COLOURS = {
 }
 """Okabe and Ito's colours, for colour-blind readers; line styles differ, too, for grey print."""
 
+Looks = dict[float, tuple[str, str]]
+"""Colour and name of each load."""
+
 SCATTER_THRESHOLD = 400
 """Above this many points dots are drawn in place of error bars."""
 
@@ -151,7 +154,7 @@ def shades(count: int, first: float) -> list[str]:
     return [mpl.colors.to_hex(colour) for colour in colours]
 
 
-def load_looks(loads: Iterable[float]) -> dict[float, tuple[str, str]]:
+def load_looks(loads: Iterable[float]) -> Looks:
     """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
     groups: list[list[float]] = []
     for load in sorted(set(loads)):
@@ -159,7 +162,7 @@ def load_looks(loads: Iterable[float]) -> dict[float, tuple[str, str]]:
             groups[-1].append(load)
         else:
             groups.append([load])
-    looks: dict[float, tuple[str, str]] = {}
+    looks: Looks = {}
     for group, colour in zip(groups, shades(len(groups), 0.2), strict=True):
         name = f"{np.mean(group):.3g} N"
         looks |= dict.fromkeys(group, (colour, name))

@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 from memscal.friction.effective import EXPANDED, HALF_NORMAL_MEAN
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import LUBRICATED_FRICTION
-from memscal.friction.results import BoundedEstimate, LoadComparison
+from memscal.friction.results import BoundedEstimate, ByLoading, Joint, LoadComparison
 from memscal.model import checks as quality
 from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.measured_stress import MeasuredStress
@@ -20,7 +20,7 @@ _OUTSIDE = 0.15
 
 def comparison_checks(
     loads: Mapping[str, Sequence[LoadComparison]],
-    joint: Mapping[str, Mapping[str, BoundedEstimate]],
+    joint: Joint,
     *,
     noise_stated: bool = True,
 ) -> tuple[QualityCheck, ...]:
@@ -70,9 +70,7 @@ def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> Q
     return check(name, best.least / best.degrees, limit, meaning, best.p_value)
 
 
-def frictionless_check(
-    by_loading: Mapping[str, BoundedEstimate], beside: Sequence[Mapping[str, BoundedEstimate]]
-) -> QualityCheck:
+def frictionless_check(by_loading: ByLoading, beside: Sequence[ByLoading]) -> QualityCheck:
     """Return the check that the lubricated loads have no friction that moves others ``beside``."""
     # The first of the values is no friction.
     rises = (float(joint.deviance[0]) - joint.least for joint in by_loading.values())
@@ -106,7 +104,7 @@ _COARSE = 2e-3
 def comparison_messages(
     measured: MeasuredStress,
     families: Mapping[str, ProfileFamily],
-    joint: Mapping[str, Mapping[str, BoundedEstimate]],
+    joint: Joint,
     checks: tuple[QualityCheck, ...],
     macroscopic: tuple[float, float | None] | None,
 ) -> tuple[Message, ...]:
@@ -149,7 +147,7 @@ def synthetic_messages(measured: MeasuredStress) -> Iterator[Message]:
 _LARGE_SHARE = 1 / math.sqrt(13)
 
 
-def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Message]:
+def _loadings(joint: Joint) -> Iterator[Message]:
     """Say where the definitions of the loading disagree."""
     for lubrication, by_loading in joint.items():
         if not {"incremental", "total"} <= by_loading.keys():
@@ -175,7 +173,7 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
 
 
 def _against_macroscopic(
-    joint: Mapping[str, Mapping[str, BoundedEstimate]],
+    joint: Joint,
     macroscopic: tuple[float, float | None] | None,
 ) -> Iterator[Message]:
     """Say how the effective coefficients stand against the macroscopic one."""

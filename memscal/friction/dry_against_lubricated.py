@@ -19,7 +19,7 @@ from memscal.friction.likelihood import (
 )
 from memscal.friction.marginal_likelihood import log_likelihood
 from memscal.friction.results import DryAgainstLubricated
-from memscal.model.arrays import FloatArray, IndexArray
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 #: Loads that differ by less than this share are one.
@@ -157,7 +157,7 @@ def _common_places(dry: FloatArray, lubricated: FloatArray) -> tuple[IndexArray,
     return close[first], matched
 
 
-def _stress_at(profile: MeasuredProfile, places: IndexArray) -> tuple[FloatArray, FloatArray]:
+def _stress_at(profile: MeasuredProfile, places: IndexArray) -> ArrayPair:
     """Return the stress at places of the sorted line, and its variance without that of A."""
     order = np.argsort((profile.x, profile.y)[profile.axis])[places]
     sources = [source for source in profile.roots if source != "conversion_constant"]

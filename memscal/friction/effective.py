@@ -17,7 +17,7 @@ from memscal.friction.likelihood import (
     points_at,
     predict,
 )
-from memscal.friction.results import BoundedEstimate, LoadComparison
+from memscal.friction.results import BoundedEstimate, ByLoading, LoadComparison
 from memscal.model.arrays import FloatArray, Values, array_record
 from memscal.model.measured_stress import MeasuredProfile
 
@@ -189,7 +189,7 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
     return math.hypot(*parts)
 
 
-def with_loading(by_loading: Mapping[str, BoundedEstimate]) -> dict[str, BoundedEstimate]:
+def with_loading(by_loading: ByLoading) -> dict[str, BoundedEstimate]:
     """Take the middle of both loadings; a rectangle between them, width / sqrt(12), is left."""
     estimates = list(by_loading.values())
     values = [estimate.value for estimate in estimates if estimate.value is not None]

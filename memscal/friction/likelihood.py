@@ -29,7 +29,7 @@ from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
 from memscal.measurement.posterior import input_changes, sensor_changes, shared_changes
-from memscal.model.arrays import FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, Values, array_record
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
@@ -551,7 +551,7 @@ class Likelihood:
         # Chi-square alone would prefer the value with the larger error bars.
         return -2 * log_likelihood(self.statistics)[0]
 
-    def slope_fit(self) -> tuple[FloatArray, FloatArray]:
+    def slope_fit(self) -> ArrayPair:
         """Fit the slopes by the systematic columns: what is left, squared, and coefficients."""
         # What is left, (V,), is the inverse variance of the bounded coordinate.  By Woodbury's
         # identity, C^-1 = 1 - D (1 + D^T D)^-1 D^T.

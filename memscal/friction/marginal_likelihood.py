@@ -22,7 +22,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from memscal.friction.family import bounded
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import ArrayPair, FloatArray
 
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
 _PATHS = 256
@@ -44,7 +44,7 @@ def added(several: Sequence[Statistics]) -> Statistics:
     return Statistics(*(sum(arrays) for arrays in zip(*several, strict=True)))
 
 
-def log_likelihood(statistics: Statistics) -> tuple[FloatArray, FloatArray]:
+def log_likelihood(statistics: Statistics) -> ArrayPair:
     """Return the logarithm of the likelihood, and chi-square, at each value."""
     q = statistics.projection.shape[-1]
     # One factorisation gives both: the last pivot of M bordered by g is chi-square (plus one, so

@@ -142,6 +142,11 @@ class BoundedEstimate:
         return f"<{type(self).__name__}: {self}>"
 
 
+ByLoading = Mapping[str, BoundedEstimate]
+Joint = Mapping[str, ByLoading]
+"""Coefficients of all loads together, by lubrication and loading."""
+
+
 def _rounded(value: float, low: float, high: float) -> str:
     """Return a value and its interval, with the digits that follow from its closer end."""
     # Two digits of the distance to it if that begins with 1 or 2, one otherwise; zero is no end.
@@ -247,7 +252,7 @@ class DryAgainstLubricated:
     relative_uncertainty: float
 
 
-def joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
+def joint_text(joint: Joint) -> str:
     """Return the coefficients of all loads together, by lubrication and loading."""
     texts = []
     for lubrication, by_loading in joint.items():

@@ -48,7 +48,7 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
 from memscal.mechanics import surface
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record
 from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
@@ -73,7 +73,7 @@ def corrections(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatA
     return normal, coupling, radial
 
 
-def base_normal(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
+def base_normal(x: ArrayLike, nu: float) -> ArrayPair:
     r"""Base stress by a pressure, and tension by an outward traction: T (1 at x = 0) and N.
 
     :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D` and :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`.
@@ -85,7 +85,7 @@ def base_normal(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
     return scale * by_pressure / denominator, scale * by_shear / denominator
 
 
-def base_shear(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray]:
+def base_shear(x: ArrayLike, nu: float) -> ArrayPair:
     r"""Shear stress at the base by a pressure, and by a radial traction: S and R.
 
     :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D` and :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`.
@@ -316,7 +316,7 @@ class HankelField:
         return (by_pressure + by_shear).reshape(np.shape(r))
 
 
-_Pair = tuple[FloatArray, FloatArray]
+_Pair = ArrayPair
 
 
 def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:

@@ -25,7 +25,7 @@ from typing import Protocol
 import numpy as np
 from scipy.special import ellipe, ellipkm1
 
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record
+from memscal.model.arrays import ArrayPair, BoolArray, FloatArray, IndexArray, array_record
 
 
 @array_record
@@ -93,7 +93,7 @@ _NEAR_ORDER = 24
 _CROWDING = 5
 
 
-def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
+def singular_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     r"""Return :math:`\int L_{nn}(x_i, s)\,\phi_j\,s\,ds`, n = 0 and 1, shapes (x, rings), in m."""
     starts = rings[:-1]
     ends = rings[1:]
@@ -118,7 +118,7 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     return integrals[0], integrals[1]
 
 
-def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
+def coupling_integrals(x: FloatArray, rings: FloatArray) -> ArrayPair:
     r"""Return :math:`\int_{x_i}^\infty\phi_j\,ds` and :math:`\int_0^{x_i}\phi_j\,s\,ds/x_i`."""
     starts = rings[:-1]
     ends = rings[1:]
@@ -139,7 +139,7 @@ def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.append(left, nothing, axis=-1) + np.append(nothing, right, axis=-1)
 
 
-def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> ArrayPair:
     """Return L00 and L11; free of cancellation, also where x and s are close or far apart."""
     larger = np.maximum(x, s)
     smaller = np.minimum(x, s)
@@ -155,7 +155,7 @@ def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatA
 
 def _near_integrals(
     x: FloatArray, starts: FloatArray, ends: FloatArray, near: BoolArray
-) -> list[tuple[FloatArray, FloatArray]]:
+) -> list[ArrayPair]:
     """Integrate falling and rising hats over near elements, cut at the point; for each kernel."""
     point, element = np.nonzero(near)
     start = starts[element]

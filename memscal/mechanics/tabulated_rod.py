@@ -18,7 +18,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
@@ -35,7 +35,7 @@ class TabulatedField:
     """Base stress of a rod by its transforms (N) at wavenumbers (rad/m), and nothing else."""
 
     k: FloatArray
-    transforms: tuple[FloatArray, FloatArray]  # of the normal stress, and of order one of the shear
+    transforms: ArrayPair  # of the normal stress, and of order one of the shear
     radius: float
 
     def spectrum(self, k: FloatArray, order: int) -> FloatArray:

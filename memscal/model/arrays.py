@@ -14,6 +14,7 @@ from memscal.errors import InputError, UnitWarning
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
+ArrayPair = tuple[FloatArray, FloatArray]
 
 Values = dict[str, Any]
 """Values by their names."""

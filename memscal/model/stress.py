@@ -9,7 +9,7 @@ from scipy.special import j0, j1
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray, keyword_array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, keyword_array_record, value_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -191,7 +191,7 @@ class StressField:
         return f"field of {wide:.4g} mm x {high:.4g} mm{name}"
 
     @cached_property
-    def _offsets(self) -> tuple[FloatArray, FloatArray]:
+    def _offsets(self) -> ArrayPair:
         """Positions along y and x from the axis of the field, in m."""
         share = np.abs(self.values) / np.abs(self.values).sum()
         return self.y - share.sum(axis=1) @ self.y, self.x - share.sum(axis=0) @ self.x

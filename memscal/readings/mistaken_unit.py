@@ -76,6 +76,9 @@ def mistaken_unit(factor: float) -> str:
     return next(near, "")
 
 
+Lengths = dict[str, float]
+"""Lengths of a scan, in m, by their names."""
+
 _SHORT = "So short a scan shows neither the flanks of the stress nor the baseline."
 _WIDE = "The stress at the base of a film is little wider than the film is thick: "
 _LONG = f"{_WIDE}no scan of it is longer than {_LONGEST_SPAN:g} thicknesses."
@@ -173,7 +176,7 @@ def require_plausible(scan: Scan) -> None:
             raise _implausible(scan, h, lengths, words, length, why)
 
 
-def _lengths(scan: Scan, h: float) -> dict[str, float]:
+def _lengths(scan: Scan, h: float) -> Lengths:
     """Return the span of a scan and the radius of a rod, in m; too short a span is refused."""
     span = max(float(np.ptp(axis)) for axis in (scan.x, scan.y) if axis is not None)
     lengths = {"span": span}
@@ -185,7 +188,7 @@ def _lengths(scan: Scan, h: float) -> dict[str, float]:
 
 
 def _implausible(
-    scan: Scan, h: float, lengths: dict[str, float], words: str, length: float, why: str
+    scan: Scan, h: float, lengths: Lengths, words: str, length: float, why: str
 ) -> InputError:
     """Return the error of a length in m that no set-up has, with the units to check."""
     place = f"{scan.source.file_name}: " if scan.source else ""
@@ -220,7 +223,7 @@ def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
     return 2 * half if above[distance <= half].mean() > _CROWDED else 0.0
 
 
-def _cure(lengths: dict[str, float], thickness: float) -> str:
+def _cure(lengths: Lengths, thickness: float) -> str:
     """Name the units to check, and the values of each input that make all lengths usual ones."""
     inputs = [
         ("positions", "data/x", ("span", "step", "width"), 0.0),
@@ -243,7 +246,7 @@ def _cure(lengths: dict[str, float], thickness: float) -> str:
 
 
 def _usual_factors(
-    lengths: dict[str, float], thickness: float, scaled: tuple[str, ...]
+    lengths: Lengths, thickness: float, scaled: tuple[str, ...]
 ) -> tuple[float, float]:
     """Range of the factor on some of the lengths, or on the thickness, that makes all usual."""
     low = 0.0

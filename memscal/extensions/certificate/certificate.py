@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from datetime import date
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
@@ -16,6 +16,7 @@ from memscal.extensions.certificate.laboratory import (
     RULES,
     LaboratoryFile,
     Measured,
+    Section,
     missing_keys,
 )
 from memscal.formats.artifact import artifact_tree
@@ -115,8 +116,8 @@ class Certificate:
 
     number: str
     issued: str
-    sections: Mapping[str, Mapping[str, Any]]  # of the laboratory's file, with the artifact's
-    equipment: tuple[Mapping[str, Any], ...]
+    sections: Mapping[str, Section]  # of the laboratory's file, with the artifact's
+    equipment: tuple[Section, ...]
     apparatus: ApparatusFunction
     values: tuple[CertifiedValue, ...]
     covariance: FloatArray  # of the values, in SI units
@@ -237,9 +238,7 @@ def _completed(
     return sections, tuple(listed)
 
 
-def _conformity(
-    values: Iterable[CertifiedValue], decision: Mapping[str, Any], name: str
-) -> list[Conformity]:
+def _conformity(values: Iterable[CertifiedValue], decision: Section, name: str) -> list[Conformity]:
     factor = decision.get("guard_band", 1.0)
     rule = decision.get("rule")
     if decision and (rule is None or factor < 0):

@@ -22,6 +22,9 @@ _LONGEST = 1 << 20
 _CELSIUS = ("degC", "°C")
 ZERO_CELSIUS = 273.15
 
+Section = Mapping[str, Any]
+"""What a section of the file states, by key."""
+
 RULES = ("simple acceptance", "guarded acceptance")
 """Decision rules: whether a value must lie within its tolerance, or clear of its limits."""
 KINDS = {"load cell": "load_cell", "stage": "stage"}
@@ -73,8 +76,8 @@ class LaboratoryFile:
     """What a laboratory's file states, by section and key; of equipment a list of such."""
 
     name: str
-    sections: Mapping[str, Mapping[str, Any]]
-    equipment: tuple[Mapping[str, Any], ...] = ()
+    sections: Mapping[str, Section]
+    equipment: tuple[Section, ...] = ()
 
     def stated(self, section: str, key: str) -> Any:
         """Return the value of a key, ``None`` where it is not stated."""
@@ -105,7 +108,7 @@ class LaboratoryFile:
             added[name] = replace(part, **self._added(part, stated, name))
         return added
 
-    def _added(self, part: object, stated: Mapping[str, Any], subject: str) -> Values:
+    def _added(self, part: object, stated: Section, subject: str) -> Values:
         """Return what a part does not hold; what it holds must be the same."""
         added = {}
         for key, value in stated.items():
@@ -150,9 +153,7 @@ def read_laboratory(path: FilePath) -> LaboratoryFile:
     return LaboratoryFile(name, sections, listed)
 
 
-def missing_keys(
-    sections: Mapping[str, Mapping[str, Any]], equipment: Sequence[Mapping[str, Any]]
-) -> Iterator[str]:
+def missing_keys(sections: Mapping[str, Section], equipment: Sequence[Section]) -> Iterator[str]:
     """Yield each key that a certificate needs and that is not stated, with its section."""
     for section in NEEDED:
         if section != "equipment":
@@ -163,7 +164,7 @@ def missing_keys(
         yield '[[equipment]] of kind = "load cell" (what gave the load)'
 
 
-def _missing(place: str, section: str, stated: Mapping[str, Any]) -> Iterator[str]:
+def _missing(place: str, section: str, stated: Section) -> Iterator[str]:
     for key in NEEDED[section]:
         value = stated.get(key)
         if value in (None, ""):

@@ -25,7 +25,14 @@ import numpy as np
 from scipy import sparse
 
 from memscal.mechanics.elements.mesh import graded
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import (
+    ArrayPair,
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    array_record,
+    value_record,
+)
 from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
@@ -260,7 +267,7 @@ class FilmElements:
         moving = np.concatenate([dofs, dofs + self.n], axis=1)
         return gradients, pressures, volumes, moving, pressure.element_dofs.T + 2 * self.n
 
-    def _state(self, x: FloatArray, shapes: Any = None) -> tuple[FloatArray, FloatArray]:
+    def _state(self, x: FloatArray, shapes: Any = None) -> ArrayPair:
         """Return the deformation gradient (cells, points, 5) and the pressure (cells, points)."""
         gradients, pressures = shapes or self._shape[:2]
         moving, pressing = self._shape[3:]
@@ -348,7 +355,7 @@ class FilmElements:
         return np.stack(sums, axis=-1) / np.bincount(dofs)[:, None]
 
 
-def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> ArrayPair:
     """Return the gradients (cells, points, 5, 12) and pressures of the shape functions."""
     gradients = np.zeros((*radius.shape, 5, 12))
     on_axis = radius < 1e-12

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 from memscal.errors import ConvergenceError
 from memscal.extensions.finite_strain.film_elements import FilmElements
 from memscal.mechanics.solver.step import Load, Target
-from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, value_record
 
 
 @value_record
@@ -46,7 +46,7 @@ class RodFace:
         bend = np.where((angle > 0) & (angle < np.pi / 2), 1 / self.edge, 0.0)
         return points, np.stack([cosine, sine]), np.stack([-sine * bend, cosine * bend])
 
-    def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def nearest(self, r: FloatArray, z: FloatArray) -> ArrayPair:
         """Return the arc length of the nearest point, and the distance outside it."""
         x = r - self.flat
         y = self.edge - z  # outward and downward from the rounding's centre
@@ -71,7 +71,7 @@ class SphereFace:
         points = np.stack([self.radius * sine, height])
         return points, np.stack([cosine, sine]), np.stack([-sine, cosine]) / self.radius
 
-    def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def nearest(self, r: FloatArray, z: FloatArray) -> ArrayPair:
         """Return the arc length of the nearest point, and the distance outside it."""
         away = np.hypot(r, self.radius - z)
         # The difference to the radius, without cancellation.
@@ -229,7 +229,7 @@ class Pressing:
 
     def nearest(
         self, state: Pressed, to: Pressed | None = None, share: FloatArray | float = 0.0
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> ArrayPair:
         """Return arc length and distance of the surface's nodes, on the way to another state."""
         n = self.elements.n
         nodes = self.elements.surface

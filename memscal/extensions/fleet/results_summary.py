@@ -9,11 +9,14 @@ from memscal.extensions.fleet.results import FleetResults, robust_limit, robust_
 from memscal.model.notation import format_measured
 from memscal.summaries.table import Table, finite, texts_of
 
+Counts = dict[str, int]
+"""Numbers of sensors, by what they are counted by."""
+
 _MOST_ROWS = 50
 _VALUES = {"conversion_constant": "A", "gaussian_sigma": "sigma"}
 
 
-def counts(fleet: FleetResults) -> dict[str, int]:
+def counts(fleet: FleetResults) -> Counts:
     """Return how many sensors there are, passed, failed a check, and were not calibrated."""
     errors = len(fleet.errors)
     return {
@@ -31,12 +34,12 @@ def verdict(fleet: FleetResults) -> str:
     return f"{number['passed']} of {number['sensors']} sensors passed every check, {failed}."
 
 
-def failures(fleet: FleetResults) -> dict[str, int]:
+def failures(fleet: FleetResults) -> Counts:
     """Return how many sensors failed each check."""
     return dict(Counter(c for checks in fleet.failed.values() for c in checks).most_common())
 
 
-def error_classes(fleet: FleetResults) -> dict[str, int]:
+def error_classes(fleet: FleetResults) -> Counts:
     """Return how many scans were not calibrated, by the class of the error."""
     return dict(Counter(kind for kind, _ in fleet.errors.values()).most_common())
 
@@ -96,7 +99,7 @@ def tables(fleet: FleetResults) -> list[Table]:
     ]
 
 
-def _shares(fleet: FleetResults, numbers: dict[str, int]) -> list[tuple[str, str, str]]:
+def _shares(fleet: FleetResults, numbers: Counts) -> list[tuple[str, str, str]]:
     """Return numbers of sensors, each with its share of all."""
     total = len(fleet.paths)
     return [(name.replace("_", " "), str(n), f"{n / total:.2%}") for name, n in numbers.items()]

@@ -10,7 +10,7 @@ from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
 from memscal.formats.files import FilePath
 from memscal.formats.tables import reference
 from memscal.formats.units import to_si
-from memscal.model.arrays import FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, value_record
 from memscal.model.checks import Message, import_notes
 from memscal.model.notation import printable
 
@@ -378,9 +378,7 @@ def _require_order(mesh: Mesh, frame: Frame, base: Base, shear: Component, zero:
             )
 
 
-def _at_base(
-    mesh: Mesh, frame: Frame, base: Base, component: Component
-) -> tuple[FloatArray, FloatArray]:
+def _at_base(mesh: Mesh, frame: Frame, base: Base, component: Component) -> ArrayPair:
     """Return places in the base and the values there: at nodes, or at the middles of sides."""
     radial = list(frame.radial)
     if component.at_points:

@@ -48,6 +48,9 @@ from memscal.parallel import single_threaded
 from memscal.progress import Task, nobody, reporting
 from memscal.readings.mistaken_unit import require_plausible
 
+Targets = Mapping[str, float]
+"""What is wanted of a plan, by name."""
+
 #: As many as a simulated scan may have.
 MOST_POSITIONS = 4096
 #: A range that is a whole number of steps but for rounding is one.
@@ -236,7 +239,7 @@ class Design(Result, FrozenArrays):
     transfer: FloatArray
     transfer_errors: FloatArray
     resolved_wavenumber: float
-    want: Mapping[str, float] = field(default_factory=dict)
+    want: Targets = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the plan and its main numbers in place of arrays."""
@@ -313,7 +316,7 @@ _CURES = {
 }
 
 
-def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
+def require_targets(want: Targets, vary: str | None) -> dict[str, float]:
     """Return the targets by their full names; refuse unknown ones, and those without ``vary``."""
     named = {}
     for name, value in want.items():
@@ -345,7 +348,7 @@ def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, fl
 
 
 def least_design(
-    plan: Plan, targets: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
+    plan: Plan, targets: Targets, vary: str, evaluate: Callable[[Plan], Design]
 ) -> Design:
     """Find the coarsest step, the shortest range or the fewest repeats that reach the targets."""
     what, fewest, most, plan_of = _search(plan, vary)
@@ -419,7 +422,7 @@ def _in_words(name: str, value: float) -> str:
     return f"a standard uncertainty of {short} of {value * 100:.3g} %"
 
 
-def _out_of_reach(what: str, targets: Mapping[str, float], tried: list[Design]) -> FitError:
+def _out_of_reach(what: str, targets: Targets, tried: list[Design]) -> FitError:
     if not tried:
         return FitError(
             f"No {what} makes a scan that can be calibrated with.",
@@ -483,7 +486,7 @@ def design(
     roundness_uncertainty: float | None = None,
     method: str | Regulariser = "bayesian",
     seed: int = 0,
-    want: Mapping[str, float] | None = None,
+    want: Targets | None = None,
     vary: str | None = None,
 ) -> Design:
     r"""Predict the uncertainties of a calibration from a line scan that is not made yet.

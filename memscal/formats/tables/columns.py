@@ -44,6 +44,8 @@ _CAUSES = (
 _SPARE = 250
 
 Lines = range | list[int] | NDArray[np.int32]
+Parts = Iterator[tuple[Lines, list[FloatArray]]]
+"""Lines and columns of one part after another."""
 
 
 class Wanted(NamedTuple):
@@ -194,7 +196,7 @@ class NamedColumns:
         """Return how many rows there are, or may be."""
         raise NotImplementedError
 
-    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
+    def _parts(self, wanted: list[Wanted]) -> Parts:
         """Yield the lines and the columns of one part after another."""
         raise NotImplementedError
 

@@ -8,7 +8,7 @@ import hashlib
 import io
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import PurePath
@@ -20,7 +20,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError, UnsafeFileError, placed
 from memscal.extensions import hook
 from memscal.formats.files import damage_named, read_bytes
-from memscal.formats.tables.columns import Lines, NamedColumns, Wanted
+from memscal.formats.tables.columns import Lines, NamedColumns, Parts, Wanted
 from memscal.formats.tables.dialect import find_decimal
 from memscal.formats.tables.text_table import Sheet, TextTable
 from memscal.model.arrays import FloatArray, unmasked
@@ -207,7 +207,7 @@ class FrameTable(NamedColumns):
     def _count(self) -> int:
         return self._rows
 
-    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
+    def _parts(self, wanted: list[Wanted]) -> Parts:
         lines = range(1, self._rows + 1)
         yield lines, [self._converted(item, lines) for item in wanted]
 

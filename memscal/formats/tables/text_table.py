@@ -14,7 +14,7 @@ import numpy as np
 
 from memscal.errors import FormatError, placed
 from memscal.formats.files import FilePath, read_pieces
-from memscal.formats.tables.columns import MAX_NAME, Lines, NamedColumns, Wanted
+from memscal.formats.tables.columns import MAX_NAME, NamedColumns, Parts, Wanted
 from memscal.formats.tables.dialect import (
     DELIMITERS,
     Rows,
@@ -311,7 +311,7 @@ class TextTable(NamedColumns):
         if rest:
             yield rest
 
-    def _parts(self, wanted: list[Wanted]) -> Iterator[tuple[Lines, list[FloatArray]]]:
+    def _parts(self, wanted: list[Wanted]) -> Parts:
         indices = [self._index(item.column) for item in wanted]
         count = len(wanted)
         rows, places = self._first

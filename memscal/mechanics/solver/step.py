@@ -32,7 +32,14 @@ import numpy as np
 from memscal.errors import ConvergenceError
 from memscal.mechanics.interface import Interface, NormalLaw
 from memscal.mechanics.surface import SurfaceCompliance
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import (
+    ArrayPair,
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    array_record,
+    value_record,
+)
 from memscal.model.film import ElasticFilm
 
 
@@ -46,7 +53,7 @@ class ContactProblem:
     friction: float
     interface: Interface
 
-    def displacements(self, p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def displacements(self, p: FloatArray, q: FloatArray) -> ArrayPair:
         """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
         both = self.compliance.whole @ np.concatenate([p, q])
         return both[: p.size], both[p.size :]
