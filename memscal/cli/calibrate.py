@@ -6,7 +6,7 @@ import contextlib
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -89,7 +89,7 @@ def _option(text: str) -> tuple[str, Any]:
     return name, value
 
 
-def _check_kinds(values: dict[str, Any], usual: Method) -> None:
+def _check_kinds(values: common.Options, usual: Method) -> None:
     """Refuse text where the method's default is a number, or a fraction where it is a count."""
     for name, value in values.items():
         default = getattr(usual, name, None)
@@ -299,9 +299,7 @@ def command(
     return exit_code_of(apparatus.checks, then=then)
 
 
-def _read(
-    paths: tuple[Path, ...], reference: Path | None, settings: Mapping[str, Any]
-) -> list[Scan]:
+def _read(paths: tuple[Path, ...], reference: Path | None, settings: common.Options) -> list[Scan]:
     from memscal.estimation.set_up import require_calibration_rod
     from memscal.formats.opened import opened_scans
     from memscal.model.sizes import MOST_OF_LINES
@@ -333,7 +331,7 @@ def _read_reference(path: Path, pixel_size: str | None, accepted: bool) -> Stres
 
 
 def _rehearse(
-    scans: list[Scan], settings: dict[str, Any], outputs: Sequence[Path], as_json: bool
+    scans: list[Scan], settings: common.Options, outputs: Sequence[Path], as_json: bool
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.prepare import Request, prepare

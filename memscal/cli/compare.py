@@ -14,6 +14,7 @@ from memscal.cli import output as out
 from memscal.cli.options import (
     FILE,
     NonNegative,
+    Options,
     artifact_argument,
     figure_option,
     option,
@@ -217,7 +218,7 @@ def _require_channel(apparatus: ApparatusFunction, path: Path, channel: str) -> 
         )
 
 
-def _named_figures(options: Mapping[str, Any], lubrications: Iterable[str]) -> dict[str, Path]:
+def _named_figures(options: Options, lubrications: Iterable[str]) -> dict[str, Path]:
     """Return the files of --figures by their stems."""
     folder = options["folder"]
     if folder is None:
@@ -259,7 +260,7 @@ _NORMAL_STRESS_ONLY = {
 }
 
 
-def _check_usage(options: Mapping[str, Any], scans: Sequence[Path]) -> None:
+def _check_usage(options: Options, scans: Sequence[Path]) -> None:
     channel = options["channel"]
     if channel != "zz":
         if len(scans) > 1:

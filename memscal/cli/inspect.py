@@ -12,6 +12,9 @@ from memscal.cli.output import emit_json, emit_tables
 from memscal.model.notation import format_measured
 from memscal.summaries.table import Table, stated_text
 
+Item = Mapping[str, Any]
+"""An object of JSON, as the description of a file has it."""
+
 EXAMPLES = """\b
 Examples:
   memscal inspect scan.apparatus.h5
@@ -41,7 +44,7 @@ def command(file: Path, accept_altered: bool, as_json: bool) -> int:
     return DONE
 
 
-def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
+def _tables(contents: Item) -> Iterator[Table]:
     rows = [("schema", f"{contents['schema']} {contents['schema_version']}")]
     named = [name for name in ("title", "sha256", "altered") if contents.get(name)]
     rows += [(name, contents[name]) for name in named]
@@ -65,7 +68,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     yield from _provenance(contents["provenance"])
 
 
-def _arrays(arrays: Sequence[Mapping[str, Any]]) -> Table:
+def _arrays(arrays: Sequence[Item]) -> Table:
     """Return paths, shapes, ranges and units; the number of missing values where there are any."""
     head = ["path", "shape", "from", "to", "unit"]
     missing = any(item["missing"] for item in arrays)
@@ -82,11 +85,11 @@ def _arrays(arrays: Sequence[Mapping[str, Any]]) -> Table:
     return Table("Arrays", head, rows)
 
 
-def _words(item: Mapping[str, Any]) -> str:
+def _words(item: Item) -> str:
     return str(item["name"]).replace("_", " ")
 
 
-def _value(item: Mapping[str, Any]) -> str:
+def _value(item: Item) -> str:
     if item["value"] is None:
         return "not a number"
     if isinstance(item["value"], str):
@@ -99,7 +102,7 @@ def _value(item: Mapping[str, Any]) -> str:
     return format_measured(value, spread * factor, unit)
 
 
-def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
+def _unit_to_show(item: Item) -> tuple[float, str]:
     """Return the unit in which the command line asks for such a quantity, and the factor to it."""
     from memscal.formats.units import dimension_of, to_si
 
@@ -117,7 +120,7 @@ def _number(value: float | None, form: str) -> str:
     return "-" if value is None else f"{value:{form}}"
 
 
-def _provenance(provenance: Mapping[str, Any]) -> Iterator[Table]:
+def _provenance(provenance: Item) -> Iterator[Table]:
     """Yield a table of what stands alone, then one for each group of options or versions."""
     rows = []
     groups = []

@@ -29,6 +29,9 @@ else:  # generic since click 8.2 only
 _Command = Callable[..., Any]
 _Adder = Callable[[_Command], _Command]
 
+Options = dict[str, Any]
+"""Values of a command's options, by their names."""
+
 
 class _FileName(click.Path):
     """A file's name; the library checks whether it can be read or written."""
@@ -267,7 +270,7 @@ def si(value: float | None, power: int) -> Any:
     return float(Decimal(repr(value)).scaleb(power))
 
 
-def film_from(options: Mapping[str, Any]) -> ElasticFilm:
+def film_from(options: Options) -> ElasticFilm:
     """Return the film that the options describe."""
     _require("The film", options, FILM)
     law = options["film_law"] or ""
@@ -286,7 +289,7 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
     return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 
-def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
+def indenter_from(shape: str, options: Options) -> RoundIndenter:
     """Return the indenter that the options describe."""
     _require("The indenter", options, ("radius",))
     from memscal.model.indenter import Rod, Sphere
@@ -301,7 +304,7 @@ def named(names: Iterable[str]) -> str:
     return ", ".join("--" + name.replace("_", "-") for name in names)
 
 
-def _require(subject: str, options: Mapping[str, Any], names: Iterable[str]) -> None:
+def _require(subject: str, options: Options, names: Iterable[str]) -> None:
     missing = [name for name in names if options[name] is None]
     if missing:
         raise click.UsageError(f"{subject} is not fully given: add {named(missing)}.")
@@ -324,7 +327,7 @@ kernel_options = options_of(
 """The apparatus function and the conversion constant."""
 
 
-def kernel_from(options: Mapping[str, Any]) -> RadialKernel:
+def kernel_from(options: Options) -> RadialKernel:
     """Return the apparatus function that the options describe; refuse those of none, or of two."""
     from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
 

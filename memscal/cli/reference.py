@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +61,7 @@ interface_options = options_of(
 """The options of a rough interface."""
 
 
-def _indenter(shape: str, options: Mapping[str, Any]) -> Indenter:
+def _indenter(shape: str, options: common.Options) -> Indenter:
     """Return the indenter that the options describe."""
     needed = _DESCRIBED_BY[shape]
     for name in sorted(set(_DESCRIBED_BY.values()) - {needed}):
@@ -83,7 +82,7 @@ def _indenter(shape: str, options: Mapping[str, Any]) -> Indenter:
     )
 
 
-def interface_of(options: Mapping[str, Any]) -> Interface:
+def interface_of(options: common.Options) -> Interface:
     """Return the interface that the options describe."""
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
@@ -179,7 +178,7 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
     return DONE
 
 
-def _check_usage(options: dict[str, Any]) -> None:
+def _check_usage(options: common.Options) -> None:
     """Refuse options that do not go together, and choose the film's law."""
     loads = options["loads"]
     depths = options["depths"]
@@ -198,7 +197,7 @@ def _check_usage(options: dict[str, Any]) -> None:
         raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
 
 
-def _choose_law(options: dict[str, Any]) -> None:
+def _choose_law(options: common.Options) -> None:
     """Choose the film's law by --strain where it is not given."""
     law = options["film_law"]
     strain = options["strain"]
@@ -210,7 +209,7 @@ def _choose_law(options: dict[str, Any]) -> None:
         options["film_law"] = law or ("neo-hookean" if strain else "linear")
 
 
-def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
+def _pressed(indenter: str, options: common.Options) -> list[Contact]:
     from memscal.mechanics.indent import indent
 
     film = common.film_from(options)
@@ -238,7 +237,7 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
         )
 
 
-def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) -> None:
+def _write(contacts: list[Contact], options: common.Options, *, force: bool) -> None:
     """Write the files."""
     from memscal.formats.reference import write_reference
 
@@ -252,7 +251,7 @@ def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) 
     out.write_files(figures, force=force)
 
 
-def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> list[Message]:
+def _print(contacts: list[Contact], options: common.Options, *, as_json: bool) -> list[Message]:
     from memscal.summaries.contact import contacts_table, depth_messages
 
     messages, warnings = depth_messages(contacts)

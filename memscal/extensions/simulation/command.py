@@ -17,6 +17,7 @@ from memscal.cli.options import (
     FREE_OR_STUCK,
     PAPER_FILM,
     NonNegative,
+    Options,
     Quantity,
     film_from,
     film_options,
@@ -107,7 +108,7 @@ _AS_GIVEN = (
 )
 
 
-def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
+def _shared_settings(options: Options) -> dict[str, Any]:
     """Return what describes a rod scan and an experiment alike."""
     from memscal.extensions.simulation.disturbances import Disturbances
 
@@ -297,7 +298,7 @@ def command(
     return DONE
 
 
-def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
+def _check_usage(experiment: str, options: Options) -> None:
     context = click.get_current_context()
     typed = ParameterSource.COMMANDLINE
     others = _SPHERE_NAMES if experiment == "rod" else _ROD_NAMES
@@ -335,7 +336,7 @@ def _require_writable_folder(target: Path, *, overwrite: bool) -> None:
         ensure_writable(target / name, overwrite=overwrite)
 
 
-def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
+def _sphere(folder: Path, options: Options, as_json: bool, force: bool) -> int:
     from memscal.extensions.simulation.experiment import simulate_experiment
     from memscal.formats.scan import write_scan
 
