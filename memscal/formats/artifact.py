@@ -14,7 +14,7 @@ from memscal.formats.units import reading_of
 from memscal.formats.values import require_schema, require_unaltered, text_list, units_of
 from memscal.model import apparatus, records
 from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import Arrays
 from memscal.model.notation import Reading
 
 #: A compact artifact has none.
@@ -107,7 +107,7 @@ def artifact_tree(data: ApparatusData) -> Group:
     return file_tree(ARTIFACT_SCHEMA, Group("NXentry", children, {"default": default}))
 
 
-def _read_changes(file: SafeFile) -> dict[str, FloatArray]:
+def _read_changes(file: SafeFile) -> Arrays:
     if not file.has(f"{_CHANGES}/names"):
         return {}
     names = text_list(file, f"{_CHANGES}/names")

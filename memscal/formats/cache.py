@@ -18,7 +18,7 @@ from memscal.formats.files import FilePath, atomic_write_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, Number, file_tree, tree_to_bytes
 from memscal.formats.values import require_schema, require_unaltered
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import Arrays
 
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"
 
@@ -47,7 +47,7 @@ def table_key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def keep_contact_table(folder: FilePath, key: str, arrays: Mapping[str, FloatArray]) -> bool:
+def keep_contact_table(folder: FilePath, key: str, arrays: Arrays) -> bool:
     """Write arrays under their key, remove the oldest; return whether the disk took them."""
     # value (M,), load (L,), k (K,), transforms (M, L, K) in N, all others (M, L).
     children: Nodes = {
@@ -66,7 +66,7 @@ def keep_contact_table(folder: FilePath, key: str, arrays: Mapping[str, FloatArr
     return True
 
 
-def find_contact_table(folder: FilePath, key: str) -> dict[str, FloatArray] | None:
+def find_contact_table(folder: FilePath, key: str) -> Arrays | None:
     """Return the arrays that were kept under a key; ``None`` where none of them are sound."""
     path = _path(folder, key)
     try:

@@ -16,7 +16,7 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Nodes, si, to_json
 from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import Arrays, FloatArray
 from memscal.model.checks import override_messages
 from memscal.model.measured_stress import (
     MeasuredPoints,
@@ -294,7 +294,7 @@ def _root_of(covariance: FloatArray, where: str) -> FloatArray:
     raise FormatError(f"{where} is no covariance: some combination has less than no variance.")
 
 
-def _read_roots(file: SafeFile, name: str, path: str, n: int) -> dict[str, FloatArray]:
+def _read_roots(file: SafeFile, name: str, path: str, n: int) -> Arrays:
     """Read the roots of a profile's covariance; of a file before them, those of its matrices."""
     where = f"/entry/roots/{name}"
     prefix = "root_"

@@ -9,7 +9,7 @@ friction at which the contact sticks wholly nothing changes, and an interpolant 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, field, replace
 from functools import cached_property
@@ -26,6 +26,7 @@ from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
 from memscal.model.arrays import (
+    Arrays,
     FloatArray,
     FrozenArrays,
     Values,
@@ -77,7 +78,7 @@ class ProfileFamily(FrozenArrays):
     scale: float  # theta_0, of the values
     spectra: FloatArray  # (M, L, K), in N: those of Contact.base_spectrum, or base_shear_spectrum
     by_load: FloatArray  # their derivatives by the logarithm of the load
-    changes: Mapping[str, FloatArray]  # by one standard uncertainty of each source that states one
+    changes: Arrays  # by one standard uncertainty of each source that states one
     depths: FloatArray  # (M, L), in m; NaN where unknown, as the next two
     contact_radii: FloatArray  # (M, L), in m
     convergence: FloatArray  # (M, L): largest relative change under refinement
@@ -182,7 +183,7 @@ class LoadingPath:
     order: int = 0  # one for the shear at the base
 
 
-def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
+def _solve(path: LoadingPath, k: FloatArray) -> Arrays:
     """Return spectra (L, K) in N, derivatives by logarithms (zero where not needed), numbers."""
     loads = np.array(path.loads)
     visited = [loads]
@@ -343,7 +344,7 @@ class FamilySetup:
 
     def _calculated(
         self, paths: Sequence[LoadingPath], lengths: tuple[FloatArray, float] | None
-    ) -> dict[str, FloatArray]:
+    ) -> Arrays:
         """Solve the paths and derive what follows from them: the arrays that are kept."""
         film = self.film
         nu = film.poisson_ratio
@@ -385,7 +386,7 @@ class FamilySetup:
             nominal["spectra"] = spectra + slope * (expected.poisson_ratio - nu)
         return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
 
-    def _solved(self, groups: Sequence[Sequence[LoadingPath]]) -> list[dict[str, FloatArray]]:
+    def _solved(self, groups: Sequence[Sequence[LoadingPath]]) -> list[Arrays]:
         """Solve groups of paths, each path once, in one or more processes; stack each group."""
         distinct = list(dict.fromkeys(chain.from_iterable(groups)))
         processes = min(self.workers, len(distinct))

@@ -29,7 +29,7 @@ from memscal.errors import InputError
 from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Statistics, added, log_likelihood
 from memscal.measurement.posterior import input_changes, sensor_changes, shared_changes
-from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import ArrayPair, Arrays, FloatArray, IndexArray, Values, array_record
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
@@ -64,7 +64,7 @@ class LoadPoints:
         """Distance from the centre, in m."""
         return np.abs(self.offset)
 
-    def shared_noise(self) -> tuple[IndexArray, dict[str, FloatArray]]:
+    def shared_noise(self) -> tuple[IndexArray, Arrays]:
         """Order of the readings, and correlations (m, m) of kinds of noise in m that follow."""
         order = np.arange(self.u.size)
         shared = {}
@@ -219,7 +219,7 @@ class Sensor:
     conversion_constant: float  # A, in V/Pa
     order: int = 0  # one of a tangential channel
     # (K,): its changes by one uncertainty of what the contacts share, film and load, by source.
-    shared: Mapping[str, FloatArray] = field(default_factory=dict)
+    shared: Arrays = field(default_factory=dict)
 
     def with_exact_constant(self) -> Sensor:
         """Return the sensor as if A were exact: with the changes of G alone."""
@@ -279,7 +279,7 @@ class Predicted:
     by_load: FloatArray  # its derivative by the logarithm of the load
     by_coordinate: FloatArray  # by the bounded coordinate
     slope: FloatArray  # by the distance from the centre, in V/m
-    columns: Mapping[str, FloatArray]  # (V, n, q): changes by each systematic source's uncertainty
+    columns: Arrays  # (V, n, q): changes by each systematic source's uncertainty
 
 
 def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: int) -> Predicted:
@@ -390,9 +390,9 @@ def stacked(
 class Noise:
     """Independent kinds of noise of the n readings of one load, at V values of the parameter."""
 
-    kinds: Mapping[str, FloatArray]  # (V, n): standard deviations in V
+    kinds: Arrays  # (V, n): standard deviations in V
     # (m, m): correlation of kinds within each m readings that follow each other, if there is any.
-    shared: Mapping[str, FloatArray] = field(default_factory=dict)
+    shared: Arrays = field(default_factory=dict)
 
     def inverse_root(self) -> FloatArray:
         """Return W, with W N W^T = 1, in B blocks of readings that share noise: (V, B, m, m)."""

@@ -18,7 +18,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import ArrayPair, FloatArray, array_record
+from memscal.model.arrays import ArrayPair, Arrays, FloatArray, array_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
@@ -121,7 +121,7 @@ def _load(rows: _Rows, depth: Any) -> Any:
 
 
 @lru_cache(maxsize=1)
-def _table() -> dict[str, FloatArray]:
+def _table() -> Arrays:
     with np.load(FILE) as file:
         table = {name: file[name].astype(np.float64) for name in file.files}
     table["table"][..., 0] = np.log(table["table"][..., 0])

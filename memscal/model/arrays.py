@@ -16,8 +16,9 @@ IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 ArrayPair = tuple[FloatArray, FloatArray]
 
+Arrays = dict[str, FloatArray]
 Values = dict[str, Any]
-"""Values by their names."""
+"""Arrays, and any values, by their names."""
 
 _Class = TypeVar("_Class")
 

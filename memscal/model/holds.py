@@ -1,11 +1,10 @@
 """Holds that were found in the log of an instrument."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from numpy.typing import NDArray
 
-from memscal.model.arrays import FloatArray, IndexArray, array_record
+from memscal.model.arrays import Arrays, FloatArray, IndexArray, array_record
 from memscal.model.notation import Reading
 from memscal.model.result import Result
 
@@ -14,11 +13,11 @@ from memscal.model.result import Result
 class Holds(Result):
     """Holds that were found in a log of n rows, m of them, in SI units."""
 
-    log: Mapping[str, FloatArray]  # (n,) each: x, u_zz, and y and normal_load where they are logged
+    log: Arrays  # (n,) each: x, u_zz, and y and normal_load where they are logged
     line: NDArray[Any]  # (n,): line of the file
     first: IndexArray  # (m,): row of the log
     stop: IndexArray  # (m,): row after the last one
-    mean: Mapping[str, FloatArray]  # (m,) each: every column, averaged over each hold
+    mean: Arrays  # (m,) each: every column, averaged over each hold
     u_errors: FloatArray  # (m,): standard uncertainty of the mean reading
     reading: Reading
     notes: tuple[str, ...]

@@ -1,13 +1,12 @@
 """Holds in the log of an instrument: rows in which the indenter presses at rest, averaged."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import BoolArray, FloatArray, IndexArray
+from memscal.model.arrays import Arrays, BoolArray, FloatArray, IndexArray
 from memscal.model.holds import Holds
 from memscal.model.notation import Reading
 
@@ -35,7 +34,7 @@ _CURE = (
 
 
 def find_holds(
-    columns: Mapping[str, FloatArray],
+    columns: Arrays,
     line: NDArray[Any],
     reading: Reading,
     *,
@@ -91,7 +90,7 @@ def find_holds(
 
 
 def _averaged(
-    columns: Mapping[str, FloatArray],
+    columns: Arrays,
     line: NDArray[Any],
     held: list[IndexArray],
     before: FloatArray | None,
@@ -191,7 +190,7 @@ def _lowered(
 
 
 def _before_each(
-    columns: Mapping[str, FloatArray],
+    columns: Arrays,
     line: NDArray[Any],
     held: list[IndexArray],
     waiting: BoolArray,

@@ -9,7 +9,7 @@ import numpy as np
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import changes_by_inputs
 from memscal.mechanics.press_rod import is_tabulated, press_rod
-from memscal.model.arrays import FloatArray, Values
+from memscal.model.arrays import Arrays, FloatArray, Values
 from memscal.model.checks import Message
 from memscal.model.film import NEO_HOOKEAN
 from memscal.model.indenter import Cone, Rod, RoundIndenter
@@ -127,7 +127,7 @@ def _name(contact: Contact) -> str:
     return f"A profile to {body.extent / MM:.4g} mm"
 
 
-def _arrays(contact: Contact) -> dict[str, FloatArray]:
+def _arrays(contact: Contact) -> Arrays:
     profile = contact.profile()
     shear = contact.base_shear(profile.r) if profile.sigma_rz is None else profile.sigma_rz
     return {

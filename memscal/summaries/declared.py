@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray, Values
+from memscal.model.arrays import Arrays, FloatArray, Values
 from memscal.model.notation import format_measured
 from memscal.model.quantities import DIMENSIONS, Quantity, Record, by_name, parameter_quantity
 from memscal.summaries.table import finite
@@ -112,7 +112,7 @@ def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) ->
     return held
 
 
-def data_frame(quantities: Iterable[Quantity], values: Mapping[str, FloatArray]) -> DataFrame:
+def data_frame(quantities: Iterable[Quantity], values: Arrays) -> DataFrame:
     """Return columns of the values (SI) in the units in which they are shown."""
     import pandas as pd
 

@@ -26,7 +26,7 @@ from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.units import from_si
-from memscal.model.arrays import FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import Arrays, FloatArray, IndexArray, Values, array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
@@ -191,7 +191,7 @@ class Cells:
 
     dimension: int
     nodes: IndexArray
-    data: dict[str, FloatArray]
+    data: Arrays
 
 
 @array_record
@@ -200,7 +200,7 @@ class Mesh:
 
     points: FloatArray  # (n, 3)
     cells: tuple[Cells, ...]
-    point_data: dict[str, FloatArray]  # (n, components)
+    point_data: Arrays  # (n, components)
     sources: tuple[SourceFile, ...]
     notes: tuple[str, ...]
     tensor_order: bool  # whether six components are known to be a tensor's in VTK's order
@@ -304,7 +304,7 @@ def _cells(
         yield Cells(block["dimension"], nodes, _fields(fields, len(nodes)))
 
 
-def _fields(fields: dict[str, NDArray[Any]], count: int) -> dict[str, FloatArray]:
+def _fields(fields: dict[str, NDArray[Any]], count: int) -> Arrays:
     """Return fields of numbers with one row each; a name is stripped of what does not print."""
     return {
         printable(name, _MAX_NAME): numbers.reshape(count, -1).astype(np.float64)

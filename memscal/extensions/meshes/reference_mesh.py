@@ -10,7 +10,14 @@ from memscal.extensions.meshes.mesh_files import Cells, Mesh, read_mesh
 from memscal.formats.files import FilePath
 from memscal.formats.tables import reference
 from memscal.formats.units import to_si
-from memscal.model.arrays import ArrayPair, FloatArray, IndexArray, array_record, value_record
+from memscal.model.arrays import (
+    ArrayPair,
+    Arrays,
+    FloatArray,
+    IndexArray,
+    array_record,
+    value_record,
+)
 from memscal.model.checks import Message, import_notes
 from memscal.model.notation import printable
 
@@ -123,9 +130,7 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
     return Base(base_nodes, tuple(sides), outward, note)
 
 
-def average_over_circles(
-    places: FloatArray, columns: dict[str, FloatArray]
-) -> tuple[dict[str, FloatArray], str]:
+def average_over_circles(places: FloatArray, columns: Arrays) -> tuple[Arrays, str]:
     """Interpolate between places (n, 2), in m from the axis, and average over circles."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError

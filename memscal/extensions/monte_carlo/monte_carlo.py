@@ -27,7 +27,7 @@ from memscal.deconvolution.division import require_count
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.points import measured_mask
 from memscal.estimation.reference_spectra import RECTANGLE, law_at_once, rod_spectrum
-from memscal.model.arrays import FloatArray, array_record, value_record
+from memscal.model.arrays import Arrays, FloatArray, array_record, value_record
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.notation import VOLTS, Reading
 from memscal.model.result import Result
@@ -92,7 +92,7 @@ class DrawnScans:
             for i, scan in enumerate(self.solution.scans)
         ]
 
-    def _random(self, index: int) -> tuple[np.random.Generator, dict[str, FloatArray]]:
+    def _random(self, index: int) -> tuple[np.random.Generator, Arrays]:
         """Return the generator of a draw, and its inputs' errors over their uncertainties."""
         # The same child as SeedSequence(seed).spawn() gives, whichever process asks for it.
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(index,)))
@@ -106,7 +106,7 @@ class DrawnScans:
         share = RECTANGLE * self._random(index)[1]["model_form"]
         return share * (self._results_of(effect.exact) - self._results_of(self.solution))
 
-    def standardised(self, normal: FloatArray) -> dict[str, FloatArray]:
+    def standardised(self, normal: FloatArray) -> Arrays:
         """Turn normal draws, (inputs, ...), into each input's error over its uncertainty."""
         matrix = correlation_matrix(list(self.effects), self.correlations)
         values, vectors = np.linalg.eigh(matrix)
@@ -117,7 +117,7 @@ class DrawnScans:
             joined["model_form"] = np.sqrt(3) * (2 * ndtr(joined["model_form"]) - 1)
         return joined | {item.source: item.truncated(joined[item.source]) for item in self.solved}
 
-    def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
+    def voltages(self, standard: Arrays) -> FloatArray:
         """Voltages without noise (n,), in V: A G convolved with the stress of the true inputs."""
         estimate = self.solution.estimate
         voltages = drawn_about(self.solution)
@@ -164,7 +164,7 @@ class DrawnScans:
             spectra.append(_rod(expected, reference, scan))
         return spectra
 
-    def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
+    def _reference_changes(self, standard: Arrays) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""
         scans = list(self.solution.scans)
         for item in self.solved:

@@ -10,7 +10,7 @@ from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import Disturbances, Shear
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray, Values, require_positive, value_record
+from memscal.model.arrays import Arrays, FloatArray, Values, require_positive, value_record
 from memscal.model.instrument import StressSensor
 from memscal.model.scan import Scan
 
@@ -72,9 +72,7 @@ class SimulatedSensor:
     conversion_constant: float
     shear: Shear
 
-    def stresses(
-        self, blurred: Blurred, offset: FloatArray, distance: FloatArray
-    ) -> dict[str, FloatArray]:
+    def stresses(self, blurred: Blurred, offset: FloatArray, distance: FloatArray) -> Arrays:
         """Return the stresses that the channels see, in Pa, at distances along x and in all (m)."""
         seen = {"zz": blurred(self.kernel, 0)}
         if self.shear is not None:
@@ -99,7 +97,7 @@ def simulated_sensor(
 
 def simulated_scan(
     sensor: SimulatedSensor,
-    stresses: Mapping[str, FloatArray],
+    stresses: Arrays,
     largest: float,
     draws: FloatArray,
     disturbances: Disturbances,
@@ -119,7 +117,7 @@ def simulated_scan(
     signal = constant * stresses["zz"].reshape(draws.shape)
     largest_signal = constant * largest
     normal: Values = _read("u_zz", signal, largest_signal, draws, x, disturbances)
-    tangential: dict[str, FloatArray] = {}
+    tangential: Arrays = {}
     tangential_truth: dict[str, float | str] = {}
     if sensor.shear is not None:
         kernel, shear_constant = sensor.shear
@@ -162,7 +160,7 @@ def _read(
     draws: FloatArray,
     x: FloatArray,
     disturbances: Disturbances,
-) -> dict[str, FloatArray]:
+) -> Arrays:
     """Return the voltages of a channel, and their standard deviations if the scan states them."""
     noise = disturbances.noise
     channel = {name: signal + largest * (disturbances.level(x) + noise * draws)}

@@ -20,7 +20,7 @@ from memscal.formats.tables.dialect import (
     number_of,
 )
 from memscal.formats.units import is_unit, same_unit, to_si
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import Arrays, FloatArray
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_HDF5_BYTES, MOST_ROWS, too_large
@@ -90,7 +90,7 @@ class NamedColumns:
         # Lines of the rows, part by part.
         self._lines_of: list[Lines] = []
 
-    def columns(self, wanted: Mapping[str, Wanted]) -> dict[str, FloatArray]:
+    def columns(self, wanted: Mapping[str, Wanted]) -> Arrays:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
         for item in wanted.values():  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))

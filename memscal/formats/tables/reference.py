@@ -10,7 +10,7 @@ from memscal.errors import InputError
 from memscal.formats.files import FilePath
 from memscal.formats.tables.columns import Wanted
 from memscal.formats.tables.sheets import open_table
-from memscal.model.arrays import FloatArray, array_record, keyword_array_record
+from memscal.model.arrays import Arrays, array_record, keyword_array_record
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
@@ -36,7 +36,7 @@ class ImportedProfile:
 class Samples:
     """Stress at the base as a file states it, in SI, and the words for it in messages."""
 
-    columns: dict[str, FloatArray]  # (n,): r, sigma_zz and perhaps sigma_rz
+    columns: Arrays  # (n,): r, sigma_zz and perhaps sigma_rz
     source: SourceFile
     notes: Sequence[Message]
     kind: str
