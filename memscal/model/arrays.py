@@ -17,6 +17,7 @@ BoolArray = NDArray[np.bool_]
 ArrayPair = tuple[FloatArray, FloatArray]
 
 Arrays = dict[str, FloatArray]
+Columns = dict[str, NDArray[Any]]
 Values = dict[str, Any]
 """Arrays, and any values, by their names."""
 

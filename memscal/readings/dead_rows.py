@@ -1,11 +1,8 @@
 """Rows and columns at the edge of a raster that were never read: all their readings are zero."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from memscal.model.arrays import BoolArray
+from memscal.model.arrays import BoolArray, Columns
 from memscal.readings.find_places import places_of
 
 #: A row has at least so many positions; of the row beside dead ones more than this share is alive.
@@ -13,9 +10,7 @@ _FEWEST = 3
 _ALIVE = 0.75
 
 
-def without_dead_rows(
-    columns: dict[str, NDArray[Any]], notes: list[str]
-) -> dict[str, NDArray[Any]]:
+def without_dead_rows(columns: Columns, notes: list[str]) -> Columns:
     """Leave the rows and columns at the edges of a plane out that hold zeros alone; name them."""
     for along, across in (("y", "x"), ("x", "y")):
         if "y" in columns and np.any(columns["u_zz"] == 0):
@@ -30,7 +25,7 @@ def without_dead_rows(
     return columns
 
 
-def _dead(columns: dict[str, NDArray[Any]], along: str, across: str) -> BoolArray:
+def _dead(columns: Columns, along: str, across: str) -> BoolArray:
     """Mark the readings, (n,), of the rows from either end on that hold zeros alone."""
     zero = columns["u_zz"] == 0
     passes = columns.get("repeat", np.zeros(zero.size, dtype=np.intp))

@@ -1,9 +1,8 @@
 """One calibration of many as tables, a mapping and a row of a data frame."""
 
-from typing import Any
-
 from memscal.errors import InputError
 from memscal.extensions.fleet.many import FleetCalibration
+from memscal.model.arrays import Values
 from memscal.model.quantities import parameter_quantity
 from memscal.model.records import TRANSFER
 from memscal.summaries.calibration import estimate_rows
@@ -20,7 +19,7 @@ def tables(result: FleetCalibration) -> list[Table]:
     return [Table(title, ("", "", ""), rows), checks_table(result.checks)]
 
 
-def mapping(result: FleetCalibration) -> dict[str, Any]:
+def mapping(result: FleetCalibration) -> Values:
     """Return the estimates and the quality checks, or the error."""
     values = {"index": result.index, "passed": result.passed}
     if result.parameters is None:
@@ -47,7 +46,7 @@ def frame(result: FleetCalibration) -> DataFrame:
     return pd.DataFrame(row, index=pd.Index([result.index], name="scan"))
 
 
-def correlated(result: FleetCalibration) -> dict[str, Any]:
+def correlated(result: FleetCalibration) -> Values:
     """Return the parameters as numbers of the package uncertainties, with their covariance."""
     if result.parameters is None:
         raise InputError(f"Scan {result.index} could not be calibrated.", why=str(result.error))

@@ -1,11 +1,11 @@
 """Results of a fleet of sensors as tables and a mapping: distributions, outliers, failures."""
 
 from collections import Counter
-from typing import Any
 
 import numpy as np
 
 from memscal.extensions.fleet.results import FleetResults, robust_limit, robust_spread
+from memscal.model.arrays import Values
 from memscal.model.notation import format_measured
 from memscal.summaries.table import Table, finite, texts_of
 
@@ -126,7 +126,7 @@ def _errors_table(fleet: FleetResults) -> Table:
     return Table("Not calibrated", ("error", "scans", "the first of them", "its error"), rows)
 
 
-def mapping(fleet: FleetResults) -> dict[str, Any]:
+def mapping(fleet: FleetResults) -> Values:
     """Return counts, distributions, failed checks, errors, and the farthest outliers."""
     listed = [{"path": fleet.paths[i], "reason": text} for i, text in outliers(fleet).items()]
     return {
@@ -140,7 +140,7 @@ def mapping(fleet: FleetResults) -> dict[str, Any]:
     }
 
 
-def _distribution(fleet: FleetResults, name: str) -> dict[str, Any]:
+def _distribution(fleet: FleetResults, name: str) -> Values:
     """Return median, spread and quantiles of a parameter over the sensors, in its unit."""
     known = np.isfinite(getattr(fleet, name))
     values = getattr(fleet, name)[known]

@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,9 @@ _MAX_SHOWN = 80
 _HDF5_ENDINGS = (".h5", ".hdf5", ".hdf")
 # The address of an array in another file, such as film.h5:/data0, where XDMF has numbers.
 _ADDRESS = re.compile(rb"<DataItem\b[^<>]{0,1000}>\s{0,200}([^<>:]{0,200}):([^<>]{1,500})<")
+ByName = dict[str, NDArray[Any]]
+"""Arrays of a mesh file by their names."""
+
 _AS_VTU = (
     "Save it from ParaView as an unstructured grid (.vtu) in one piece, of data mode ASCII or "
     "Binary and without texts, or as legacy VTK (.vtk)."
@@ -70,7 +73,7 @@ def with_drawn_in(path: Path) -> list[Path]:
     return [path, *(path.parent / name for name in sorted(names))]
 
 
-def heavy_arrays(data: bytes, path: str) -> tuple[dict[str, NDArray[Any]], list[SourceFile]]:
+def heavy_arrays(data: bytes, path: str) -> tuple[ByName, list[SourceFile]]:
     """Return the arrays that an XDMF file has in the HDF5 file beside it, by their addresses."""
     folder, name = os.path.split(path)
     stem = os.path.splitext(name)[0]
@@ -95,7 +98,7 @@ def heavy_arrays(data: bytes, path: str) -> tuple[dict[str, NDArray[Any]], list[
 
 
 def run_meshio(
-    data: bytes, kind: str, name: str, heavy: Mapping[str, NDArray[Any]]
+    data: bytes, kind: str, name: str, heavy: ByName
 ) -> tuple[Values, list[NDArray[Any]]]:
     """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
@@ -239,7 +242,7 @@ def read_mesh(path: FilePath) -> Mesh:
     if not data:
         raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
     sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
-    heavy: dict[str, NDArray[Any]] = {}
+    heavy: ByName = {}
     if _KINDS[ending] == "xdmf":
         heavy, drawn = heavy_arrays(data, shown)
         sources += drawn
@@ -304,7 +307,7 @@ def _cells(
         yield Cells(block["dimension"], nodes, _fields(fields, len(nodes)))
 
 
-def _fields(fields: dict[str, NDArray[Any]], count: int) -> Arrays:
+def _fields(fields: ByName, count: int) -> Arrays:
     """Return fields of numbers with one row each; a name is stripped of what does not print."""
     return {
         printable(name, _MAX_NAME): numbers.reshape(count, -1).astype(np.float64)

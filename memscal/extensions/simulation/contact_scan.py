@@ -10,6 +10,7 @@ from memscal.errors import InputError
 from memscal.extensions.simulation.disturbances import TYPICAL, Disturbances, Shear
 from memscal.extensions.simulation.rod_scan import PAPER_FILM
 from memscal.extensions.simulation.sensor import (
+    Truth,
     blurred_stress,
     checked_loads,
     simulated_scan,
@@ -165,7 +166,7 @@ def _truth(
     load_scale: float,
     loads: FloatArray,
     disturbances: Disturbances,
-) -> dict[str, float | str]:
+) -> Truth:
     """Return what was pressed on what, where and how, by the names of a truth."""
     return {
         **described_film(film),
@@ -182,7 +183,7 @@ def _truth(
     }
 
 
-def _described_interface(interface: Interface) -> dict[str, float | str]:
+def _described_interface(interface: Interface) -> Truth:
     """Return what yields of the interface, by the names of a truth; nothing if it is rigid."""
     if interface.rigid:
         return {}

@@ -1,6 +1,6 @@
 """The simulated sensor: base stress seen through a known G, as disturbed voltages."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,9 @@ def blurred_stress(
     return np.moveaxis(nodes.synthesise(spectra, radius, order=order), -1, 0)
 
 
+Truth = dict[str, float | str]
+"""What is known of a synthetic scan, by name, in SI units."""
+
 Blurred = Callable[[RadialKernel, int], FloatArray]
 """Base stress through a kernel, in Pa at each reading: normal (order 0), radial shear (order 1)."""
 
@@ -105,7 +108,7 @@ def simulated_scan(
     *,
     x: FloatArray,
     loads: FloatArray,
-    truth: Mapping[str, float | str],
+    truth: Truth,
     **stated: Any,
 ) -> Scan:
     """Return the scan that a sensor reads of stresses (Pa), with its truth.
@@ -118,7 +121,7 @@ def simulated_scan(
     largest_signal = constant * largest
     normal: Values = _read("u_zz", signal, largest_signal, draws, x, disturbances)
     tangential: Arrays = {}
-    tangential_truth: dict[str, float | str] = {}
+    tangential_truth: Truth = {}
     if sensor.shear is not None:
         kernel, shear_constant = sensor.shear
         shear = shear_constant * stresses["xz"].reshape(draws.shape)

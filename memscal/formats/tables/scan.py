@@ -20,7 +20,7 @@ from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
 from memscal.formats.units import reading_of, to_si
-from memscal.model.arrays import frozen_array, keyword_array_record, unmasked
+from memscal.model.arrays import Columns, frozen_array, keyword_array_record, unmasked
 from memscal.model.checks import Message, at_ceiling_text, import_notes, marked_texts
 from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
@@ -42,7 +42,6 @@ from memscal.readings.mistaken_unit import (
 )
 
 Column = str | int
-Columns = dict[str, NDArray[Any]]
 #: Dimension of a column, its unit as it is stated, the option that states it, and the default.
 Form = tuple[str, str | None, str, str | None]
 
