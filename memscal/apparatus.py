@@ -19,6 +19,7 @@ from memscal.model.arrays import (
     ArrayPair,
     FloatArray,
     finite_vector,
+    floats,
     keyword_array_record,
     require_increasing,
 )
@@ -122,11 +123,10 @@ class ApparatusFunction(Result, ApparatusData):
         """
         if y is not None:
             return self._convolved_field(r, y, sigma_zz)
-        radii, stress, wavenumbers = self._checked(r, sigma_zz)
+        radii, wavenumbers, transform = self._checked(r, sigma_zz)
         profile = self.radial_profile
         kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
-        blurred = kernel * hankel_transform(radii, stress, wavenumbers.k, order=self.order)
-        return wavenumbers.synthesise(blurred, radii, order=self.order)
+        return wavenumbers.synthesise(kernel * transform, radii, order=self.order)
 
     def predict(
         self, r: ArrayLike, sigma_zz: ArrayLike, *, y: ArrayLike | None = None
@@ -176,7 +176,7 @@ class ApparatusFunction(Result, ApparatusData):
         :meth:`convolve`.  Baselines must have been subtracted.
         """
         self.require_pascals()
-        return np.asarray(u_zz, dtype=np.float64) / self.conversion_constant
+        return floats(u_zz) / self.conversion_constant
 
     def compact(self) -> ApparatusFunction:
         """Return a copy whose artifact leaves G over the plane out, where G is round.
@@ -210,11 +210,10 @@ class ApparatusFunction(Result, ApparatusData):
 
     def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> ArrayPair:
         """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""
-        radii, stress, wavenumbers = self._checked(r, sigma_zz)
+        radii, wavenumbers, transform = self._checked(r, sigma_zz)
         profile = self.radial_profile
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
         kernel = j0(np.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
-        transform = hankel_transform(radii, stress, wavenumbers.k, order=self.order)
         bessel = j1 if self.order else j0
         field = wavenumbers.weights * transform
         operator = (bessel(np.outer(radii, wavenumbers.k)) * field) @ kernel
@@ -230,7 +229,7 @@ class ApparatusFunction(Result, ApparatusData):
                 f"Channel {self.sensor.channel} measures a component of a vector field.",
                 cure="Give the radial profile of the shear, without y.",
             )
-        stress = np.asarray(sigma_zz, dtype=np.float64)
+        stress = floats(sigma_zz)
         g = self.field
         offsets = []
         if stress.ndim != 2 or not np.isfinite(stress).all():
@@ -290,7 +289,7 @@ class ApparatusFunction(Result, ApparatusData):
             )
 
     def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:
-        radii = np.abs(np.asarray(r, dtype=np.float64))
+        radii = np.abs(floats(r))
         if np.isnan(radii).any():
             raise InputError("A radius is not a number.", cure="Leave missing radii out.")
         support = self.radial_profile.r
@@ -299,8 +298,8 @@ class ApparatusFunction(Result, ApparatusData):
 
     def _checked(
         self, r: ArrayLike, sigma_zz: ArrayLike
-    ) -> tuple[FloatArray, FloatArray, Wavenumbers]:
-        """Return radii and stress, if G can be convolved with it, and the wavenumbers for that."""
+    ) -> tuple[FloatArray, Wavenumbers, FloatArray]:
+        """Return radii, wavenumbers and the transform of a stress with which G can be convolved."""
         radii = finite_vector("r", r)
         stress = finite_vector("sigma_zz", sigma_zz)
         if radii.shape != stress.shape:
@@ -326,7 +325,9 @@ class ApparatusFunction(Result, ApparatusData):
         self._require_decayed(float(abs(stress[-1])), peak, end)
         # G is zero beyond the last wavenumber of its grid.
         reach = radii[-1] + self.radial_profile.r[-1]
-        return radii, stress, Wavenumbers.covering(float(self.transfer.k[-1]), reach)
+        wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
+        transform = hankel_transform(radii, stress, wavenumbers.k, order=self.order)
+        return radii, wavenumbers, transform
 
 
 def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -> ApparatusFunction:

@@ -79,10 +79,11 @@ class Progress:
         return f"{text}, {span(self.left)} left" if self.kept < self.done < self.total else text
 
 
-Listener: TypeAlias = Callable[[Progress], None] | Literal[True] | None
+_Hears = Callable[[Progress], None]
+Listener: TypeAlias = _Hears | Literal[True] | None
 """What is told of progress: a callback, or ``True`` for a bar; ``None`` for what is told now."""
 
-_LISTENER: ContextVar[Callable[[Progress], None] | None] = ContextVar("listener", default=None)
+_LISTENER: ContextVar[_Hears | None] = ContextVar("listener", default=None)
 _STEPS: ContextVar["tuple[Task, Sequence[str]] | None"] = ContextVar("steps", default=None)
 
 
@@ -118,7 +119,7 @@ class Task:
     name: str
     total: float
     done: float = 0
-    listener: Callable[[Progress], None] | None = field(default_factory=_LISTENER.get)
+    listener: _Hears | None = field(default_factory=_LISTENER.get)
     start: float = field(default_factory=monotonic)
     logged: float = 0.0  # seconds from the start to the last line of the log
 
@@ -187,7 +188,7 @@ def reported(function: _Function) -> _Function:
     return cast("_Function", with_progress)
 
 
-def _bar() -> Callable[[Progress], None]:
+def _bar() -> _Hears:
     """Return what shows a bar in a notebook, or else a line on standard error."""
     if "ipykernel" in sys.modules and hasattr(sys.modules["IPython"].get_ipython(), "kernel"):
         from IPython.display import HTML, display

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import j0, j1, jv
 
 from memscal.errors import InputError
-from memscal.model.arrays import ArrayPair, FloatArray, array_record, table_spline
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats, table_spline
 
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> ArrayPair:
@@ -87,7 +87,7 @@ class Wavenumbers:
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
-        radii = np.asarray(r, dtype=np.float64)
+        radii = floats(r)
         if order == ACROSS:
             matrix = 2 * np.cos(np.multiply.outer(radii, self.k)) / self.k
         else:

@@ -56,7 +56,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_profiles(axes, data, floor=-np.inf)
     band = EXPANDED * radial.g_errors
-    peak = max(_largest(radial.g), _largest(radial.g_gaussian))
+    peak = _peak(radial)
     # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(radial.g + band), 3 * peak)
     bottom = -min(_largest(band - radial.g, floor=0.0), 1.5 * peak)
@@ -79,7 +79,7 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     """Draw G(r) on a logarithmic axis; where G is not positive, it leaves the axis below."""
     radial = data.radial_profile
     axes.set_yscale("log")
-    peak = max(_largest(radial.g), _largest(radial.g_gaussian))
+    peak = _peak(radial)
     inside = radial.r <= _shown_radius(radial)
     smallest = np.min(np.maximum(radial.g_gaussian[inside], 10**-_LOG_DECADES * peak))
     floor = max(0.3 * smallest, 10**-_LOG_DECADES * peak)
@@ -131,7 +131,7 @@ def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
 
 def _shown_radius(radial: ApparatusRadial) -> float:
     """Return the radius to draw up to: where G, or its Gaussian, has died away."""
-    peak = max(_largest(radial.g), _largest(radial.g_gaussian))
+    peak = _peak(radial)
     alive = np.flatnonzero(np.maximum(np.abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
     gaussian_alive = np.flatnonzero(radial.g_gaussian > 1e-3 * peak)
     if not alive.size or not gaussian_alive.size:
@@ -139,6 +139,11 @@ def _shown_radius(radial: ApparatusRadial) -> float:
     # Ripples of a poor deconvolution reach far; the Gaussian bounds the sensor.
     far = min(radial.r[alive[-1]], 1.6 * radial.r[gaussian_alive[-1]])
     return float(min(1.1 * far, radial.r[-1])) or float(radial.r[-1])
+
+
+def _peak(radial: ApparatusRadial) -> float:
+    """Return the largest of G and its Gaussian."""
+    return max(_largest(radial.g), _largest(radial.g_gaussian))
 
 
 def _largest(values: FloatArray, floor: float = 1e-300) -> float:

@@ -4,12 +4,12 @@ A folder of such files is a cache.  Each is named after the SHA-256 of everythin
 depend on (SI units, bit for bit); a damaged, foreign or older file counts as not found.
 """
 
-import contextlib
 import hashlib
 import json
 import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +81,7 @@ def find_contact_table(folder: FilePath, key: str) -> Arrays | None:
             }
     except MemscalError:
         return None
-    with contextlib.suppress(OSError):
+    with suppress(OSError):
         os.utime(path)
     return arrays
 
@@ -93,9 +93,9 @@ def _path(folder: FilePath, key: str) -> Path:
 def _prune(folder: FilePath) -> None:
     """Remove the tables of a folder that were used longest ago, until it is small enough."""
     entries = []
-    with contextlib.suppress(OSError), os.scandir(folder) as items:
+    with suppress(OSError), os.scandir(folder) as items:
         for item in items:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 if _ENTRY.fullmatch(item.name) and item.is_file(follow_symlinks=False):
                     entries.append((Path(item.path), item.stat(follow_symlinks=False)))
     entries.sort(key=lambda entry: (entry[1].st_mtime_ns, entry[0].name))
@@ -104,6 +104,6 @@ def _prune(folder: FilePath) -> None:
     for number, (path, status) in enumerate(entries[:-1]):
         if size <= _MOST_BYTES and len(entries) - number <= _MOST_ENTRIES:
             return
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             path.unlink()
         size -= status.st_size

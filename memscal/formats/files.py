@@ -1,6 +1,5 @@
 """Bytes of files: written whole or not at all, never over an input; read within a limit."""
 
-import contextlib
 import errno
 import os
 import re
@@ -8,6 +7,7 @@ import secrets
 import stat
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -61,7 +61,7 @@ def atomic_write_bytes(
         _OPEN.get().write(target, data, overwrite)
 
 
-@contextlib.contextmanager
+@contextmanager
 def together(folder: FilePath | None = None) -> Iterator[None]:
     """Have all files that are written in a block take their names at its end, or none of them.
 
@@ -107,18 +107,18 @@ class _Transaction:
     def __exit__(self, *_: object) -> None:
         for file in self._files:
             for temporary in (file.temporary, file.before):
-                with contextlib.suppress(OSError):
+                with suppress(OSError):
                     if temporary is not None:
                         os.unlink(temporary)
             for descriptor in file.descriptors:
                 os.close(descriptor)
         if self._made is not None:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 self._made.rmdir()  # takes nothing from one that holds the files
 
     def make(self, folder: Path) -> None:
         """Make a folder for the files; one that is there stays."""
-        with _blamed(folder), contextlib.suppress(FileExistsError):
+        with _blamed(folder), suppress(FileExistsError):
             folder.mkdir()
             self._made = folder
 
@@ -129,7 +129,7 @@ class _Transaction:
         self._files.append(file)
         with _blamed(target):
             mode = None
-            with contextlib.suppress(FileNotFoundError):
+            with suppress(FileNotFoundError):
                 mode = stat.S_IMODE(os.stat(target).st_mode)
             file.descriptors += _write_durably(file.temporary, data, mode)
 
@@ -160,7 +160,7 @@ class _Transaction:
 
     def _keep(self, file: _File) -> None:
         """Give what is there a second name, locked; a disk without hard links has no way back."""
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             if fcntl is not None:
                 file.descriptors += _locked(os.open(file.target, os.O_RDONLY))
             file.before = _beside(file.target)
@@ -199,7 +199,7 @@ def _checked_target(path: FilePath, *, overwrite: bool, inputs: Iterable[FilePat
     except OSError as error:
         raise _output_error(Path(shown), error) from error
     for source in inputs:
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             if os.path.samestat(status, os.stat(source)):
                 raise OutputError(
                     f"The output {shown} is also an input.",
@@ -226,7 +226,7 @@ def _beside(target: Path) -> Path:
     return target.parent / f".memscal-{secrets.token_hex(8)}.tmp"
 
 
-@contextlib.contextmanager
+@contextmanager
 def _blamed(target: Path) -> Iterator[None]:
     """Say of what the system refuses which output it was."""
     try:
@@ -264,7 +264,7 @@ def _locked(descriptor: int) -> list[int]:
     """Lock an open file for as long as this process lives; where there are locks, return it."""
     if fcntl is None:
         return []
-    with contextlib.suppress(OSError):
+    with suppress(OSError):
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     return [descriptor]
 
@@ -279,10 +279,10 @@ def _remove_orphans(folder: Path) -> None:
     """Remove from a folder, once in a process, what killed processes left of their outputs."""
     if fcntl is None:
         return
-    with contextlib.suppress(OSError), os.scandir(folder) as items:
+    with suppress(OSError), os.scandir(folder) as items:
         left = [item.path for item in items if _TEMPORARY.fullmatch(item.name)]
         for path in left:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 _remove_orphan(path)
 
 
@@ -309,7 +309,7 @@ def _place_new(temporary: Path, target: Path) -> None:
 
 def _sync_folder(folder: Path) -> None:
     """Make the new name durable; some systems cannot, and the content is safe without it."""
-    with contextlib.suppress(OSError):
+    with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY | _flags("DIRECTORY"))
         try:
             os.fsync(descriptor)
@@ -369,7 +369,7 @@ def read_pieces(path: FilePath, *, limit: int) -> Iterator[bytes]:
         os.close(descriptor)
 
 
-@contextlib.contextmanager
+@contextmanager
 def damage_named(
     problem: str,
     *,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import UnitError
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, floats
 from memscal.model.notation import NAMED_UNITS, Reading
 from memscal.model.quantities import DIMENSIONS
 
@@ -56,7 +56,7 @@ _MAX_LENGTH = 64
 
 def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
     """Convert values from a file's unit to SI; only a dimensionless quantity may have no unit."""
-    numbers = np.asarray(values, dtype=np.float64)
+    numbers = floats(values)
     if unit is None:
         if dimension == "dimensionless":
             return numbers
@@ -77,7 +77,7 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
 def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:
     """Convert SI values to the unit that our files use; return them with that unit."""
     unit = DIMENSIONS[dimension].stored
-    return _scaled(np.asarray(values, dtype=np.float64), -(_power(unit, dimension) or 0)), unit
+    return _scaled(floats(values), -(_power(unit, dimension) or 0)), unit
 
 
 def _power(unit: str, dimension: str) -> int | None:

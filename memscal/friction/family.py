@@ -32,6 +32,7 @@ from memscal.model.arrays import (
     Values,
     array_record,
     finite_vector,
+    floats,
     keyword_value_record,
     require_positive,
 )
@@ -50,14 +51,14 @@ _ROUNDING = 1e-9
 
 def bounded(values: ArrayLike, scale: float) -> FloatArray:
     """Return the bounded coordinate t of values: 1 where they are infinite."""
-    theta = np.asarray(values, dtype=np.float64)
+    theta = floats(values)
     finite = np.where(np.isfinite(theta), theta, 0.0)
     return np.where(np.isfinite(theta), finite / (finite + scale), 1.0)
 
 
 def unbounded(coordinates: ArrayLike, scale: float) -> FloatArray:
     """Return the values at bounded coordinates: the inverse of :func:`bounded`."""
-    t = np.asarray(coordinates, dtype=np.float64)
+    t = floats(coordinates)
     with np.errstate(divide="ignore"):
         return scale * t / (1 - t)
 
@@ -100,7 +101,7 @@ class ProfileFamily(FrozenArrays):
 
     def at(self, values: ArrayLike) -> ProfileFamily:
         """Return the members at one or several values, in any order; none is extrapolated."""
-        chosen = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        chosen = np.atleast_1d(floats(values))
         nodes = self.coordinates
         t = bounded(chosen, self.scale)
         inside = (t >= nodes[0] - _ROUNDING) & (t <= nodes[-1] + _ROUNDING)
@@ -415,7 +416,7 @@ def require_loads(loads: ArrayLike) -> FloatArray:
 
 def parameter_values(what: str, values: Sequence[float]) -> FloatArray:
     """Return the values of a parameter; refuse what does not increase from 0 or above."""
-    checked = np.asarray(values, dtype=np.float64)
+    checked = floats(values)
     if checked.ndim != 1 or checked.size == 0 or np.any(np.isnan(checked)) or np.any(checked < 0):
         raise InputError(f"The {what} are {values!r}, but they are a list, none of them negative.")
     if np.any(np.diff(checked) <= 0):

@@ -13,7 +13,7 @@ from memscal.errors import DomainError, InputError
 from memscal.mechanics.film_response import InterfaceTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.surface import FilmField
-from memscal.model.arrays import FloatArray, keyword_array_record
+from memscal.model.arrays import FloatArray, floats, keyword_array_record
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Indenter, Rod
@@ -131,7 +131,7 @@ class Contact(Result):
         At ``k`` in rad/m, of any shape and sign:
         :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, which is the load at k = 0.
         """
-        return self.inside.spectrum(np.abs(np.asarray(k, dtype=np.float64)), 0)
+        return self.inside.spectrum(np.abs(floats(k)), 0)
 
     def base_shear(self, r: ArrayLike) -> FloatArray:
         r"""Return the radial traction of the base on the film, in Pa, positive outward.
@@ -147,7 +147,7 @@ class Contact(Result):
         At ``k`` in rad/m, of any shape and sign: :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of
         :meth:`base_shear`, which is odd in k and zero at k = 0.
         """
-        signed = np.asarray(k, dtype=np.float64)
+        signed = floats(k)
         return np.sign(signed) * self.inside.spectrum(np.abs(signed), 1)
 
     def interface_pressure(self, r: ArrayLike) -> FloatArray:
@@ -251,7 +251,7 @@ def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -
 
 
 def _radii(r: ArrayLike) -> FloatArray:
-    radii = np.asarray(r, dtype=np.float64)
+    radii = floats(r)
     if not np.all(np.isfinite(radii)):
         raise InputError("A radius is not finite.", cure="Leave missing positions out.")
     if np.any(radii < 0):

@@ -48,7 +48,7 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import bessel, gauss_between, gauss_panels
 from memscal.mechanics import surface
-from memscal.model.arrays import ArrayPair, FloatArray, array_record
+from memscal.model.arrays import ArrayPair, FloatArray, array_record, floats
 from memscal.model.film import ElasticFilm
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
@@ -231,7 +231,7 @@ class RingTraction:
         return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
-        flat = np.ravel(np.asarray(k, dtype=np.float64))
+        flat = np.ravel(floats(k))
         transform = np.zeros_like(flat)
         if np.any(values):
             for start in range(0, flat.size, _CHUNK):

@@ -70,6 +70,11 @@ _PREFIXES = {"m": 1e-3, "u": 1e-6, "k": 1e3, "M": 1e6, "G": 1e9}
 _SHOWN: dict[Any, Any] = {}
 
 
+def floats(values: ArrayLike) -> FloatArray:
+    """Return values as an array of floating-point numbers."""
+    return np.asarray(values, dtype=np.float64)
+
+
 def require_positive(name: str, value: float, unit: str = "") -> None:
     """Refuse a value that is not a finite number above zero, or no quantity at all."""
     if not 0 < value < math.inf:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, IndexArray, frozen_array
+from memscal.model.arrays import FloatArray, IndexArray, floats, frozen_array
 from memscal.model.sizes import MOST_CORRELATED, too_large
 
 #: A combination of voltages with less of the noise than this would outweigh all others.
@@ -101,5 +101,5 @@ def root_of(correlation: FloatArray) -> FloatArray:
     from scipy.linalg import cholesky_banded
 
     if is_banded(correlation):
-        return np.asarray(cholesky_banded(correlation.T, lower=True), dtype=np.float64)
-    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
+        return floats(cholesky_banded(correlation.T, lower=True))
+    return floats(np.linalg.cholesky(correlation))

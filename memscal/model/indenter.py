@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import FloatArray, keyword_array_record, keyword_value_record
+from memscal.model.arrays import FloatArray, floats, keyword_array_record, keyword_value_record
 
 
 class Indenter:
@@ -100,7 +100,7 @@ class Sphere(RoundIndenter):
 
     def height(self, r: ArrayLike) -> FloatArray:
         r"""Return :math:`R - \sqrt{R^2 - r^2}`, in m; the sphere itself, not its parabola."""
-        radii = np.asarray(r, dtype=np.float64)
+        radii = floats(r)
         inside = np.minimum(radii, self.radius)
         rise = inside**2 / (self.radius + np.sqrt((self.radius - inside) * (self.radius + inside)))
         return np.where(radii <= self.radius, rise, np.inf)
@@ -140,7 +140,7 @@ class Cone(Indenter):
 
     def height(self, r: ArrayLike) -> FloatArray:
         """Return r tan(inclination), in m."""
-        return np.asarray(r, dtype=np.float64) * math.tan(self.inclination)
+        return floats(r) * math.tan(self.inclination)
 
 
 @keyword_array_record
@@ -221,7 +221,7 @@ class Profile(Indenter):
         """Return the height at ``r`` in m by a monotone cubic spline, in m."""
         from scipy.interpolate import PchipInterpolator
 
-        radii = np.asarray(r, dtype=np.float64)
+        radii = floats(r)
         inside = PchipInterpolator(self.r, self.z)(np.minimum(radii, self.extent))
         return np.where(radii <= self.extent, inside, np.inf)
 

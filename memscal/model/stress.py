@@ -9,7 +9,7 @@ from scipy.special import j0, j1
 
 from memscal.errors import InputError
 from memscal.model import arrays
-from memscal.model.arrays import ArrayPair, FloatArray, keyword_array_record, value_record
+from memscal.model.arrays import ArrayPair, FloatArray, floats, keyword_array_record, value_record
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -81,7 +81,7 @@ class IdealReference:
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Return the Fourier transform at ``k`` (rad/m), in m^2; of a slit across it, in m."""
-        phase = np.asarray(k, dtype=np.float64) * self.size
+        phase = floats(k) * self.size
         square = math.pi * self.size**2
         if self.shape == "disc":
             far = phase != 0
@@ -214,7 +214,7 @@ class StressField:
         radius = np.hypot.outer(*self._offsets).ravel()
         ring = np.rint(radius * per_pixel / math.sqrt(self.cell_area)).astype(int)
         summed = radius, self.values.ravel(), np.ones(radius.size)
-        sums = [np.asarray(np.bincount(ring, part), dtype=np.float64) for part in summed]
+        sums = [floats(np.bincount(ring, part)) for part in summed]
         radii, totals, counts = (part[sums[2] > 0] for part in sums)
         return radii / counts, totals, counts
 

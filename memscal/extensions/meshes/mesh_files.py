@@ -26,7 +26,7 @@ from memscal.errors import FormatError, InputError, OutputError, UnsafeFileError
 from memscal.formats.files import FilePath, atomic_write_bytes, damage_named, read_bytes
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.units import from_si
-from memscal.model.arrays import Arrays, FloatArray, IndexArray, Values, array_record
+from memscal.model.arrays import Arrays, FloatArray, IndexArray, Values, array_record, floats
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
@@ -266,7 +266,7 @@ def _checked(
     *,
     tensor_order: bool,
 ) -> Mesh:
-    points = np.asarray(arrays[header["points"]], dtype=np.float64)
+    points = floats(arrays[header["points"]])
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
         raise _unusable(sources[0], f"points of shape {points.shape}")
     if points.shape[1] == 2:

@@ -4,11 +4,11 @@ HDF5 sees bytes in memory and never the disk; only known paths are opened, along
 every dataset is checked before it is read.
 """
 
-import contextlib
 import hashlib
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -46,7 +46,7 @@ StoredAttribute = str | int | float | tuple[str, ...] | tuple[float, ...] | None
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
-@contextlib.contextmanager
+@contextmanager
 def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["SafeFile"]:
     """Open an HDF5 file safely, for the time of a ``with`` block."""
     data = read_bytes(path, limit=MOST_HDF5_BYTES)
@@ -67,7 +67,7 @@ def open_hdf5(path: FilePath, *, accept_altered: bool = False) -> Iterator["Safe
         with placed(name):
             yield opened
     finally:
-        with contextlib.suppress(Exception):
+        with suppress(Exception):
             file.close()
 
 
@@ -185,7 +185,7 @@ class SafeFile:
                 self._check_texts(path, item, _SCALES, lists.size)
                 attribute.read(lists)
                 for i, references in enumerate(lists):
-                    with contextlib.suppress(KeyError):  # of a scale that was deleted
+                    with suppress(KeyError):  # of a scale that was deleted
                         scales = [h5py.h5r.dereference(at, item) for at in references]
                         axes += [i] * (self._open(scale) in scales)
         return axes

@@ -1,9 +1,9 @@
 """The dialect of a table of text: what parts its cells, its decimal mark, head and first row."""
 
-import itertools
 import math
 import re
 from collections.abc import Sequence, Set
+from itertools import chain, zip_longest
 
 from memscal.errors import FormatError
 from memscal.formats.units import is_common_unit, is_unit
@@ -97,7 +97,7 @@ def first_of_numbers(rows: Rows, missing: Set[str]) -> int | None:
         return None
     dense = [row for row, count in zip(rows, counts, strict=True) if count >= most]
     numeric = []
-    for i, column in enumerate(itertools.zip_longest(*dense[-_LAST:], fillvalue="")):
+    for i, column in enumerate(zip_longest(*dense[-_LAST:], fillvalue="")):
         words = sum(not is_number(cell) and cell.lower() not in missing for cell in column)
         if 2 * words <= len(column):  # an empty column holds no words, either
             numeric.append(i)
@@ -126,16 +126,14 @@ def find_delimiter(lines: list[str]) -> str:
     by_tabs = [line.split("\t") for line in last[len(last) // 2 :]]
     count = {len(row) for row in by_tabs}
     # Blanks would close up a column that is empty, or cut a text.
-    tabs = len(count) == 1 < max(count) and not any(
-        map(_several_numbers, itertools.chain(*by_tabs))
-    )
+    tabs = len(count) == 1 < max(count) and not any(map(_several_numbers, chain(*by_tabs)))
     for delimiter in DELIMITERS:
         if delimiter == " " and tabs:
             break
         rows = [line.split(None if delimiter == " " else delimiter) for line in last]
         widths = [len(row) for row in rows]
         common = max(set(widths), key=widths.count)
-        whole = itertools.chain(*(row for row in rows if len(row) == common))
+        whole = chain(*(row for row in rows if len(row) == common))
         stated = [cell.strip(' "') for cell in whole if cell.strip()]
         tests = (is_number(c) or c.lower() in MISSING or holds_unit(c) for c in stated)
         numbers = sum(tests) - sum(map(_several_numbers, stated))
@@ -151,10 +149,10 @@ def find_decimal(rows: Rows, marks: str = ",.") -> str:
 
     A comma is it only where cells hold one comma each and no point.
     """
-    by_column = itertools.zip_longest(*rows[:200], fillvalue="")
+    by_column = zip_longest(*rows[:200], fillvalue="")
     columns = [[cell for cell in column if is_number(cell)] for column in by_column]
     columns = [column for column in columns if column]
-    written = "".join(itertools.chain(*columns))
+    written = "".join(chain(*columns))
     mark = "," if "," in written and "." not in written else "."
     if mark not in marks:
         return "."

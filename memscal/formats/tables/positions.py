@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.extensions import hook
 from memscal.formats.tables.stated import TableLayout
+from memscal.model.arrays import Columns
 from memscal.model.scan import LINE
 
 
@@ -37,7 +37,7 @@ def require_positions(named: Mapping[str, Any], layout: TableLayout) -> None:
 
 
 def make_positions(
-    columns: dict[str, NDArray[Any]],
+    columns: Columns,
     layout: TableLayout,
     notes: list[str],
     name_rows: Callable[[Any], str],
@@ -70,7 +70,7 @@ def make_positions(
     return presses
 
 
-def direction_of(columns: dict[str, NDArray[Any]], notes: list[str]) -> str:
+def direction_of(columns: Columns, notes: list[str]) -> str:
     """Return the axis of a line; points of two axes that spread along one become one."""
     x, y = (np.ptp(columns[name]) if name in columns else 0.0 for name in ("x", "y"))
     if "y" not in columns or min(x, y) > LINE * max(x, y):
