@@ -21,11 +21,14 @@ CELLS: dict[str, list[Any]] = {
     "WHOLE": list(range(-7, 8)),
     "COUNT": [f"{12_000 + 4 * i:,}" for i in range(N)],
     "LABEL": [*range(1, N - 1), "Mean", "Max"],
+    "ABOVE": ["Mean", "SD", *range(1, N - 1)],
     "LARGE": [*U[:6], "-9.9E37", *U[7:]],
     "END": [*X[:-1], "inf"],
     "UNIT": ["uV"] * 9 + ["mV"] + ["uV"] * 5,
     "SIDE": ["N"] * 9 + ["S"] * 6,
     "T": ["21", "err"] + ["21"] * 13,
+    "WARM": ["err"] + ["21.5"] * 14,
+    "COMMA": ["21,5"] * N,
 }
 CELLS["POINT"] = [count.replace(",", ".") for count in CELLS["COUNT"]]
 CELLS["LOW"] = [x.replace(".", "_") for x in CELLS["X"]]
@@ -82,6 +85,7 @@ LVM = "Channels\t2\t\nX0\t0.0\t0.0\n***End_of_Header***\t\t\nt\tx (mm)\tU (mV)\t
         ("x,U~{X} mm,{U}mV", {}, "Units stand in its cells"),
         ("x,U~{X},{U}&x,U~{X},{U}&x,U~{X},{U}", NO_UNITS, "stands again in lines 17, 33"),
         ("# rod\n# x,U~{X},{U}&# rod\n# x,U~{X},{U}", NO_UNITS, "again in line 19"),
+        ("n,x,U~{ABOVE},{X},{U}", NO_UNITS, r"line 2 \('Mean'\), 3"),
         ("# x,U,V~{X},{U},{V}&# U,x,V~{U},{X},{V}", NO_UNITS, "again in line 17"),
     ],
 )
@@ -112,6 +116,7 @@ def test_what_two_readings_of_a_table_could_mean_is_asked(tmp_path: Path, tables
         ("~{XC} {UC} S", BY_NUMBER),
         ("x (mm),U (mV),T~{X},{U},{T}", {}),
         ("x (mm),U (mV),side~{X},{U},{SIDE}", {}),
+        ("x (mm),U (mV),T~{X},{U},{WARM}", {}),
         ("x (mm),U (mV)~{X},{U}\n# U here", {}),
     ],
 )
@@ -137,6 +142,28 @@ def test_of_columns_that_are_named_by_numbers_none_is_counted():
         with pytest.raises(InputError, match="no column 3"):
             imported(columns, x=1, u=3, **NO_UNITS)
     assert imported({"x": frame[0], "300": frame[1]}, x=1, u=2, **NO_UNITS).u_zz[1] == 2e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("ABOVE", r"row 1 \('Mean'\), 2"),
+        ("LABEL", "row 14 .* 15"),
+        ("UNIT", "Units change"),
+        ("T", ""),
+        ("WARM", ""),
+        ("COMMA", ""),
+        ("SIDE", ""),
+        ("X", ""),
+    ],
+)
+def test_other_columns_of_a_table_in_memory_are_looked_at(name, words):
+    frame = {"x": X, "U": U, "other": CELLS[name], "ragged": [[0]] * 14 + [[1, 2]], "made": "2026"}
+    if words:
+        with pytest.raises(InputError, match=words):
+            imported(frame, x="x", u="U", **NO_UNITS)
+    else:
+        np.testing.assert_allclose(imported(frame, x="x", u="U", **NO_UNITS).x, X * 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Columns of numbers: chosen by name or number, with units from their heads, read part by part."""
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -14,6 +15,7 @@ from memscal.formats.tables.dialect import (
     GROUPED,
     MISSING,
     UNIT,
+    are_units,
     cut_head,
     holds_unit,
     is_number,
@@ -137,7 +139,9 @@ class NamedColumns:
             )
         chosen = unit or stated or default
         if not chosen:
-            cure = f"Give it in the head of the column, as in 'x/mm', or as {option}."
+            cure = f"Give it in the head of the column, as in 'x/mm', or as {option}. Where it is "
+            cure += "not known: 1 of readings; of positions any, and calibrate with a source "
+            cure += "(--reference point), so that all lengths are in it."
             raise InputError(f"{self.where(column)} states no unit that is known.", cure=cure)
         return chosen.strip()
 
@@ -229,6 +233,18 @@ class NamedColumns:
         self._reject(cell, line, item.column)
         return np.nan
 
+    def _is_watched(self, name: str, cells: Sequence[str]) -> bool:
+        """Whether a column not asked for begins with numbers or a unit: no word may follow."""
+        begun = [cell for cell in cells[: len(cells) // 2] if cell.lower() not in self._missing]
+        units = {begun[0].lower(): 0.0} if begun and are_units(begun) else {}
+        numbers = [*itertools.dropwhile(lambda cell: not is_number(cell), begun)]
+        # Words above whole numbers are a summary, as words below numbers are.
+        usual = is_number if numbers == begun else str.isdigit
+        if not units and not (numbers and all(map(usual, numbers))):
+            return False
+        self._others.append(Wanted(name, words=units))
+        return True
+
     def _reject(self, cell: str, line: int, column: str | int) -> None:
         lines, cells = self._wrong.setdefault(column, ([], []))
         lines.append(line)
@@ -246,8 +262,10 @@ class NamedColumns:
             )
         for item in wanted + self._others:
             lines, cells = self._wrong.get(item.column, ([], []))
-            # Others count where the table ends in words, as a summary does, or a unit changes.
-            stray = item in self._others and not item.words and lines[-1:] != [self._last]
+            # Others count where the table begins or ends in words, as a summary does, or a unit
+            # changes.
+            ends = {int(self._lines_of[0][1][0]), self._last}
+            stray = item in self._others and not item.words and ends.isdisjoint(lines)
             if stray or not lines:
                 continue
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))

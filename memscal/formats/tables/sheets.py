@@ -210,6 +210,16 @@ class FrameTable(NamedColumns):
     def _parts(self, wanted: list[Wanted]) -> Parts:
         lines = range(1, self._rows + 1)
         yield lines, [self._converted(item, lines) for item in wanted]
+        # Others of texts are looked at in memory: those of a file would have to be read.
+        read = [self._index(item.column) for item in wanted]
+        for i in range(len(self.names) if self.source is None else 0):
+            values = np.asarray(self._column(i), dtype=object).ravel()
+            text = "".join(value for value in values if isinstance(value, str))
+            if i in read or not text or "," in text:
+                continue
+            cells = [str(value).strip() for value in values]
+            if self._is_watched(self.names[i], cells):
+                self._numbers(cells, lines, self._others[-1])
 
     def _converted(self, item: Wanted, lines: Lines) -> FloatArray:
         index = self._index(item.column)

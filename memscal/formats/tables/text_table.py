@@ -18,7 +18,6 @@ from memscal.formats.tables.columns import MAX_NAME, NamedColumns, Parts, Wanted
 from memscal.formats.tables.dialect import (
     DELIMITERS,
     Rows,
-    are_units,
     filled,
     find_decimal,
     find_delimiter,
@@ -343,14 +342,11 @@ class TextTable(NamedColumns):
         """Yield names of columns that vary; read those that begin with numbers or units, too."""
         rows, _ = self._first
         for i, cells in enumerate(itertools.zip_longest(*rows, fillvalue="")):
-            begun = [cell for cell in cells[: len(rows) // 2] if cell.lower() not in self._missing]
-            if i in read or not begun:
+            if i in read:
                 continue
             if len({*cells}) > 1:
                 yield self.names[i]
-            units = {begun[0].lower(): 0.0} if are_units(begun) else {}
-            if units or all(map(is_number, begun)):
-                self._others.append(Wanted(self.names[i], words=units))
+            if self._is_watched(self.names[i], cells):
                 read.append(i)
 
     def _bare_numbers(self, block: bytes) -> FloatArray | None:
