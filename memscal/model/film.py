@@ -15,10 +15,9 @@ from memscal.model.arrays import (
 
 #: A normal distribution whose mean is moved by less, in standard deviations, is not cut off.
 _UNCUT = 1e-6
-#: In Pa and in m: softer and thicker at once is a film that was given in MPa and mm. One that is
-#: merely thick may stand for a half-space.
+#: In Pa: a softer film was given in MPa or kPa. Of one that is merely thick, which may stand for a
+#: half-space, a scan warns.
 _LEAST_MODULUS = 1e3
-_THICKEST = 0.1
 #: Laws of the film's stress: linear elasticity, and two of rubber at finite strain.
 LINEAR, NEO_HOOKEAN, MOONEY_RIVLIN = LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 
@@ -88,7 +87,7 @@ class ElasticFilm:
                 cure="Give both or neither: law and mooney_rivlin_ratio.",
             )
         require_non_negative("film mooney_rivlin_ratio", self.mooney_rivlin_ratio)
-        if self.young_modulus < _LEAST_MODULUS and self.thickness > _THICKEST:
+        if self.young_modulus < _LEAST_MODULUS:
             warn_of_units(self)
 
     @property
