@@ -169,6 +169,17 @@ def test_the_page_on_tables_imports_the_shipped_ones(folder: Path, run: Run) -> 
     follow("import_tables.md", run)
 
 
+def test_the_page_on_incomplete_scans_calibrates_them(folder: Path, run: Run, capsys) -> None:
+    shutil.copy(DOCS.with_name("calibration_data") / "tables" / "rod.csv", folder)
+    assert (
+        "mV (relative: the load is not known)" in follow("incomplete_scan.md", run)["calibrate"].out
+    )
+    run_examples("incomplete_scan.md")
+    ratio, u = numbers(capsys.readouterr().out)
+    # Two scans of one sensor.
+    assert 0 < abs(ratio - 1) < 3 * u < 0.1
+
+
 def run_examples(page: str) -> dict[str, object]:
     """Run the Python of a page, as a module of its name; return its names."""
     names: dict[str, object] = {"__name__": page.removesuffix(".md")}

@@ -275,6 +275,7 @@ def _solved(prepared: Prepared) -> Solution:
         request.channel,
         centre=request.centre,
         owners=prepared.owners,
+        per=prepared.reading.per,
     )
 
 

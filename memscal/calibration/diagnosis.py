@@ -28,6 +28,7 @@ from memscal.model.arrays import TINY, FloatArray, array_record
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
+from memscal.model.stress import IDEAL
 from memscal.readings.mistaken_unit import mistaken_unit
 
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
@@ -51,6 +52,7 @@ _USUAL_SPAN = 8.0
 _THINNEST = 0.02
 #: Load of the rods that are tried, in N: the reference per newton does not depend on it.
 _LOAD = 1e-6
+_RADII = "/entry/reference/r"
 
 
 def diagnosed(
@@ -90,7 +92,7 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     noise = 0.0 if stated is None else np.median(stated) / estimate.largest_signal
     residual = np.median(estimate.noise) / estimate.largest_signal
     why = (
-        "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
+        "Film and rod, or the source, blur the image. A sensor of a Gaussian width below "
         f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined."
     )
     if residual > max(_MISFIT, 2 * noise):
@@ -100,12 +102,17 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
         )
     places = ", ".join(length.place for length in search.lengths)
     return FitError(
-        "The scan is as narrow as its reference, the stress at the base of the film: the width of "
-        "the apparatus function would be zero.",
+        f"The scan is as narrow as its reference, {_reference(search.stresses)}: the width of the "
+        "apparatus function would be zero.",
         why=why,
         cure=f"Look at the scan for a second peak; check the values and units of {places}. If they "
-        "are right, use a thinner film or a narrower rod, or average more repeats.",
+        "are right, use a thinner film, a narrower rod or source, or average more repeats.",
     )
+
+
+def _reference(stresses: Sequence[BaseStress]) -> str:
+    form = None if isinstance(stresses[0], Contact) else stresses[0].form
+    return f"the {form}" if form else "the stress at the base of the film"
 
 
 @array_record
@@ -141,7 +148,7 @@ class _Length:
 
     @property
     def place(self) -> str:
-        return f"{self.name} (/entry/{self.path})"
+        return f"{self.name} ({self.path})"
 
     def scaled(self, factor: float, limit: str = "") -> str:
         """Name the length and the value that the factor gives."""
@@ -168,15 +175,19 @@ class _Search:
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
         h = min(scan.film.thickness if scan.film else span / _USUAL_SPAN for scan in self.scans)
         stretch = _grid(_LONGEST_SPAN * h / span)
-        positions = _Length("positions", "data/x", 1.0, stretch)
+        positions = _Length("positions", "/entry/data/x", 1.0, stretch)
+        ideal = getattr(self.stresses[0], "ideal", None)
+        if ideal is not None:
+            words = f"a {IDEAL[ideal.shape]} of the {ideal.shape}"
+            return _Length(words, "--reference", ideal.size, 1 / stretch), positions
         if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
-            return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
+            return _Length("radii of the reference", _RADII, 1.0, 1 / stretch), positions
         a = self.scans[0].set_up.indenter.radius
         # A calibration asks for a rod no wider than its film is thick.
         thinner = _grid(min(_LONGEST_SPAN * h / span, h / (2 * a)))
         return (
-            _Length("a film thickness", "sample/film/thickness", h, 1 / thinner),
-            _Length("a rod radius", "indenter/radius", a, 1 / _grid(a / (_THINNEST * h))),
+            _Length("a film thickness", "/entry/sample/film/thickness", h, 1 / thinner),
+            _Length("a rod radius", "/entry/indenter/radius", a, 1 / _grid(a / (_THINNEST * h))),
             positions,
         )
 
@@ -210,10 +221,9 @@ class _Search:
         file = f"{source.file_name}: the " if source else "The "
         cause = "; or with ".join(causes)
         return FitError(
-            f"{file}scan is narrower than its reference, the stress at the base of the film as "
-            "stated.",
-            why="Film and rod blur the sensor's image, so that no voltage is narrower than the "
-            "reference: the width of the apparatus function would be zero, and A any number.",
+            f"{file}scan is narrower than its reference, {_reference(self.stresses)} as stated.",
+            why="Blurred by a sensor, no voltage is narrower than the reference: the width of the "
+            "apparatus function would be zero, and A any number.",
             cure=f"Check the stated lengths. The scan would fit with {cause}.{beyond}",
         )
 
@@ -261,7 +271,7 @@ class _Search:
     def _trial(self, length: _Length, factor: float) -> _Trial:
         points = self.points
         stresses = self.stresses
-        if length.path == "data/x":
+        if length.path == "/entry/data/x":
             points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
         else:
             stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
@@ -278,10 +288,10 @@ class _Search:
 
 def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
     """Return the linear rod with one length scaled, or a profile at scaled radii."""
-    if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != "reference/r":
+    if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != _RADII:
         film = stress.film
         rod = stress.indenter
-        if path == "indenter/radius":
+        if path == "/entry/indenter/radius":
             rod = replace(rod, radius=rod.radius * factor)
         else:
             film = replace(film, thickness=film.thickness * factor)

@@ -53,8 +53,11 @@ def calibration_messages(
         )
         messages.append(Message("load_of_reference", text))
     solved = prepared.request.reference is None and prepared.as_stated[0].reference is None
-    if prepared.reading.per == "relative" and unloaded and solved:
-        text = "No load is stated: 1 N is taken, under which the shape of the stress is calculated."
+    if prepared.reading.relative and unloaded and solved:
+        text = (
+            f"No load is stated: {stress.load:.3g} N is taken, under which the shape of the "
+            "stress is calculated; of a linear film it is that of any load (--film-law linear)."
+        )
         messages.append(Message("load_of_reference", text))
     messages += quality.failed_check_messages(checks)
     if estimate.points.order:
@@ -85,7 +88,7 @@ def calibration_messages(
     if form is not None:
         text = (
             f"The reference is a {form}, taken as exact: A is the reading over its unit, "
-            f"{form.unit}. Film and rod that the scan states are not used."
+            f"{form.unit}. Film and rod do not enter: what they blur is in G."
         )
         messages.append(Message("reference", f"{text} {form.notes}".strip()))
     elif not isinstance(stress, Contact) and stress.convergence is None:

@@ -23,9 +23,10 @@ from memscal.estimation.set_up import (
     with_film_of,
 )
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import array_record, keyword_array_record
 from memscal.model.film import LINEAR
-from memscal.model.notation import Reading
+from memscal.model.notation import RELATIVE, Reading
 from memscal.model.provenance import accepted_alterations
 from memscal.model.scan import Scan
 from memscal.model.stress import IdealReference, StressField, StressProfile
@@ -38,6 +39,10 @@ Reference: TypeAlias = (
     StressProfile | StressField | IdealReference | Contact | str | PathLike[str] | None
 )
 """A base stress, an ideal reference, the path or name of one, or nothing: the rod is solved."""
+
+
+#: A load in N under which a rod hardly sinks.
+_LIGHT = 1e-6
 
 
 @keyword_array_record
@@ -113,8 +118,12 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
         references = [None] * len(scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     peak = None
+    per = stresses[0].unit
     if request.relative:
         peak = float(np.abs(stress_table(stresses[0]).sigma_zz).max())
+        # A point has no largest value, but a unit integral.
+        per = RELATIVE if peak else f"{RELATIVE} {per}"
+        peak = peak or 1.0
     scans = [at_load_of(stress, s, peak) for s, stress in zip(scans, stresses, strict=True)]
     return Prepared(
         request=request,
@@ -124,7 +133,7 @@ def prepare(as_stated: Sequence[Scan], request: Request) -> Prepared:
         stresses=tuple(stresses),
         alternatives=alternatives,
         owners=owners,
-        reading=replace(scans[0].reading, per="relative" if request.relative else stresses[0].unit),
+        reading=replace(scans[0].reading, per=per),
         overridden=overridden,
     )
 
@@ -156,9 +165,14 @@ def _with_law(scan: Scan, reference: BaseStress | None, request: Request) -> Sca
 
 
 def _with_some_load(scan: Scan) -> Scan:
-    """Return the scan with a load: 1 N where none is stated, for a relative A knows no other."""
-    stated = scan.load is not None or scan.reference is not None
-    return scan if stated else replace(scan, load=1.0)
+    """Return the scan with a load where none is stated, for a relative A knows no other."""
+    if scan.load is not None or scan.reference is not None:
+        return scan
+    # 1 N, or less where the rod would sink deeper than finite elements can follow.
+    light = replace(scan, load=_LIGHT).set_up.under(LINEAR)
+    per_newton = press_rod(*light).depth / _LIGHT
+    deepest = min(0.4 * light.film.thickness, 3 * light.indenter.radius)
+    return replace(scan, load=min(1.0, deepest / per_newton))
 
 
 def _without_loads(scan: Scan, stress: BaseStress | None) -> Scan:

@@ -51,22 +51,23 @@ def solve(
     *,
     centre: str | None = COMMON,
     owners: Sequence[int] | None = None,
+    per: str = "Pa",
 ) -> Solution:
     """Find A and G."""
     # ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test. ``owners``:
-    # the number of the scan that each is a part of.
+    # the number of the scan that each is a part of. ``per``: the unit by which A divides.
     require_channel_method(channel, method)
     owners = tuple(owners or range(len(scans)))
     apart = None
     if centre != PER_REPEAT:
-        estimate = require_profile(scans, stresses, channel, owners)
+        estimate = require_profile(scans, stresses, channel, owners, per)
         apart = repeat_centres_test(estimate)
     if centre == PER_REPEAT or (centre is None and apart and apart.p_value < FALSE_ALARM):
         try:
             separate, numbers = points.scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
             parts = tuple(owners[i] for i in numbers)
-            estimate = require_profile(separate, of_repeats, channel, parts)
+            estimate = require_profile(separate, of_repeats, channel, parts, per)
             scans = separate
             stresses = of_repeats
             owners = parts
@@ -100,11 +101,13 @@ def require_profile(
     stresses: Sequence[BaseStress],
     channel: str,
     owners: Sequence[int],
+    per: str,
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     measured = [points.calibration_points(scan, channel) for scan in scans]
     references = expected_spectra(scans, stresses, reference_spectra(stresses, measured))
     joined = points.joined_points(measured, owners)
+    joined = replace(joined, reading=replace(joined.reading, per=per))
     outcome = _attempted(joined, references, np.ones(joined.u.size, dtype=np.bool_))
     ordinary = points.ordinary_readings(joined)
     if not _has_width(outcome) and not ordinary.all():

@@ -401,10 +401,18 @@ def _stated(values: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
     return {name: values[name] for name in names if values[name] is not None}
 
 
+#: What can be done where a property of the film is not known.
+_UNKNOWN = (
+    " One that is not known: of a linear film (--film-law linear) any modulus serves; give the "
+    "others as guessed, with their uncertainty, or leave the film out, and calibrate with "
+    "--reference point."
+)
+
+
 def _set_up(options: dict[str, Any]) -> dict[str, Any]:
     stated: dict[str, Any] = {}
     if _stated(options, [name for name in options if name.startswith((*common.FILM, *common.LAW))]):
-        stated["film"] = common.film_from(options)
+        stated["film"] = common.film_from(options, _UNKNOWN)
     if _stated(options, ("indenter", "radius", "radius_uncertainty", "rod_friction")):
         stated["indenter"] = common.indenter_from(options["indenter"] or "rod", options)
     return stated

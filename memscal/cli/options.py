@@ -270,9 +270,9 @@ def si(value: float | None, power: int) -> Any:
     return float(Decimal(repr(value)).scaleb(power))
 
 
-def film_from(options: Options) -> ElasticFilm:
-    """Return the film that the options describe."""
-    _require("The film", options, FILM)
+def film_from(options: Options, otherwise: str = "") -> ElasticFilm:
+    """Return the film that the options describe; ``otherwise``: what to do without one of them."""
+    _require("The film", options, FILM, otherwise)
     law = options["film_law"] or ""
     ratio = options["mooney_rivlin_ratio"]
     if (law == FILM_LAWS[-1]) != (ratio is not None):
@@ -304,10 +304,10 @@ def named(names: Iterable[str]) -> str:
     return ", ".join("--" + name.replace("_", "-") for name in names)
 
 
-def _require(subject: str, options: Options, names: Iterable[str]) -> None:
+def _require(subject: str, options: Options, names: Iterable[str], otherwise: str = "") -> None:
     missing = [name for name in names if options[name] is None]
     if missing:
-        raise click.UsageError(f"{subject} is not fully given: add {named(missing)}.")
+        raise click.UsageError(f"{subject} is not fully given: add {named(missing)}.{otherwise}")
 
 
 kernel_options = options_of(

@@ -204,7 +204,7 @@ def _smoothing_length(model: ForwardModel) -> float:
 def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
     end = ""
     if conversion_constant is not None:
-        end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)"
+        end = f" (it stopped at A = {model.points.reading.constant(conversion_constant)})"
     return FitError(
         f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{end}.",
         why="The voltage does not rise and fall with the distance from one centre.",

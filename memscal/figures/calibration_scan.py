@@ -242,7 +242,7 @@ def _seen_stress(data: ApparatusData) -> FloatArray | None:
     """The reference at the load, as the channel sees it where its voltage is positive, in Pa."""
     reference = data.reference
     factor = (data.load or reference.load) / reference.load
-    if data.reading.per == "relative":
+    if data.reading.relative:
         factor = 1 / np.abs(reference.sigma_zz).max()
     if not _tangential(data):
         return reference.sigma_zz * factor

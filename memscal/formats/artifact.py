@@ -66,10 +66,11 @@ def write_artifact(data: ApparatusData, path: FilePath, *, overwrite: bool = Fal
 
 def artifact_tree(data: ApparatusData) -> Group:
     """Return what a memscal-artifact file holds; its root states the content digest."""
-    sensor = data.sensor.name
+    sensor = f" of {data.sensor.name}" if data.sensor.name else ""
+    a = ", with a relative A (no load was known)" if data.reading.relative else ""
     reconvolution = records.RECONVOLUTION.read_in(data.reading)
     children = {
-        "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
+        "title": f"Apparatus function{sensor}{a}",
         "radial_profile": write_record(records.RADIAL, data.radial_profile),
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
         "transfer_function": write_record(records.TRANSFER, data.transfer),

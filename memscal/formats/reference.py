@@ -22,7 +22,7 @@ from memscal.model.provenance import SourceFile
 from memscal.model.sizes import MOST_PIXELS, too_large
 from memscal.model.stress import IDEAL, IdealReference, StressField, StressProfile
 
-_NAMED = re.compile(rf"({'|'.join(IDEAL)})(?::(.*))?")
+_NAMED = re.compile(r"([A-Za-z]{3,})(?::(.*))?")
 _LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-zµμ]+)\s*")
 #: Files of pixels, which state no size of theirs; weights of red, green and blue in the luminance.
 _PIXELS = (".npy", ".png", ".tif", ".tiff")
@@ -89,8 +89,14 @@ def ideal_reference(text: FilePath) -> IdealReference | None:
     match = _NAMED.fullmatch(os.fspath(text).strip())
     if match is None or os.path.exists(text):
         return None
-    shape, size = match.groups()
-    if shape == "point" and size is None:
+    shape = match[1].lower()
+    size = match[2]
+    if shape not in IDEAL:
+        cure = (
+            "Sources are disc:R, slit:W and gaussian:S, each with a unit (disc:0.5mm), and point."
+        )
+        raise InputError(f"{text} cannot be read: it is no file, and no source.", cure=cure)
+    if shape == "point" and not size:
         return IdealReference(shape)
     what = f"The {IDEAL[shape] or 'size'} of the reference {os.fspath(text)!r}"
     return IdealReference(shape, length(size or "", what))
@@ -102,7 +108,7 @@ def length(text: str, what: str) -> float:
     if match is None:
         raise InputError(
             f"{what}, {text!r}, is no length.",
-            cure="Give a number with a unit of length, such as 0.5mm or 200um.",
+            cure="Give a number with a decimal point and a unit of length, such as 0.5mm or 200um.",
         )
     return float(to_si(float(match[1]), match[2], "length", what))
 

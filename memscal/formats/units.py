@@ -20,7 +20,7 @@ SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
 
 #: Words for readings in a unit of their own.
-ARBITRARY = ("a.u.", "arb", "adu", "lsb", "digits")
+ARBITRARY = ("a.u.", "arb", "arb.", "arb. units", "arbitrary", "adu", "ADU", "lsb", "LSB", "digits")
 # Canonical units of each dimension with the power of ten that takes them to SI; the micro sign and
 # the Greek mu are two characters.
 _POWERS = {
@@ -52,6 +52,11 @@ _WORD = r"(?:[A-Za-zµμ°%][A-Za-z0-9_µμ°%]*|1)"
 _FACTOR = rf"{_WORD}(?:\s*(?:\*\*|\^)\s*\(?-?[0-9](?:\.5)?\)?)?"
 _UNIT = re.compile(rf"\s*\(?{_FACTOR}(?:\s*[*/·.]\s*\(?{_FACTOR}\)?|\s+{_FACTOR})*\)?\s*")
 _MAX_LENGTH = 64
+#: What to do where there is no unit that is known.
+_NONE = {
+    "reading": " A reading in a unit of its own has the unit 1.",
+    "length": " Of counts of unknown size take any, and --reference point: lengths are in it.",
+}
 
 
 def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
@@ -170,6 +175,7 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
 def _pint_quantity(unit: str, dimension: str, where: str) -> Any:
     """Return one of a unit, which pint must know, and whose zero is that of the SI unit."""
     cure = f'Write it like "{DIMENSIONS.get(dimension, DIMENSIONS["voltage"]).stored}".'
+    cure += _NONE.get(dimension, "")
     if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
         raise UnitError(
             f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.',

@@ -270,12 +270,13 @@ class ApparatusData(Checked):
 
     def require_pascals(self) -> None:
         """Refuse to state pascals by a conversion constant that is not per pascal."""
-        per = self.reading.per
-        if per != "Pa":
-            whose = "relative" if per == "relative" else "per unit of a reference that is no stress"
+        reading = self.reading
+        if reading.per != "Pa":
+            whose = "relative" if reading.relative else "per unit of a reference that is no stress"
             raise InputError(
-                f"The conversion constant of the artifact is {whose}.",
-                why="The stress of its calibration was not known, and no reading tells another.",
+                f"The conversion constant of the artifact is {whose}: it gives no stress in Pa.",
+                why="The stress of its calibration was not known, and no reading tells another. "
+                "Centre, widths and G hold, and the ratio to the A of another sensor.",
                 cure="Calibrate with a known load and a stress in Pa, without --relative.",
             )
 

@@ -14,6 +14,8 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: SI units that take prefixes, and these, from 10^-18 to 10^9.
 NAMED_UNITS = ("V", "A", "T", "Pa", "N", "m", "Hz", "W", "J", "C", "F", "ohm", "S", "K", "s")
 _PREFIXES = "afpnum kMG"
+#: Begins the unit of a reference whose size is not known.
+RELATIVE = "relative"
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,8 @@ class Reading:
     """Unit of a sensor's readings: SI unit in Python (1: counts), the power of ten shown with it.
 
     ``per``: the unit of the reference, by which A divides that of the readings; ``"1"``: by none,
-    ``"relative"``: by the reference's largest value, as the load is not known.
+    ``"relative"``: by the reference's largest value, as the load is not known, or before the unit
+    of a reference without one, a point.
     """
 
     si: str = "V"
@@ -45,11 +48,17 @@ class Reading:
         """How many SI units that is."""
         return 10.0**self.power
 
+    @property
+    def relative(self) -> bool:
+        """Whether A is relative: the size of what the sensor read is not known."""
+        return self.per.startswith(RELATIVE)
+
     def over(self, unit: str) -> str:
         """Return a unit of readings over that of the reference."""
-        if self.per in ("1", "relative"):
-            return unit if self.per == "1" else f"{unit} (relative)"
-        return "1" if unit == self.per else f"{unit}/{self.per}".replace("/1/", "*")
+        per = self.per.removeprefix(RELATIVE).strip() or "1"
+        if per != "1":
+            unit = "1" if unit == per else f"{unit}/{per}".replace("/1/", "*")
+        return f"{unit} (relative)" if self.relative else unit
 
     def text(self, value: float, form: str = ".3g") -> str:
         """Write a reading, given in its SI unit."""

@@ -348,10 +348,17 @@ class Scan:
             "load (/entry/indenter/load)": load,
         }
         missing = " and no ".join(place for place, stated in places.items() if stated is None)
+        cure = "--relative (relative=True): centre, widths and G, with a relative A"
+        if film is None or indenter is None:
+            cure = (
+                '--reference point (reference="point"), or another source in their place: centre '
+            )
+            cure += "and width of the image, and a G in which film and rod blur"
         raise InputError(
             f"{self.source.file_name if self.source else 'The scan'} states no {missing}.",
             why="The stress that an indenter makes at the base of a film is calculated from them.",
-            cure="State them (memscal import --thickness, --radius, --load), or give --reference.",
+            cure="State them (memscal import --thickness, --radius, --load). What a calibration "
+            f"finds without them: {cure}.",
         )
 
     @property

@@ -75,8 +75,7 @@ def answer(result: Calibrated) -> str:
     method = _method(apparatus)
     by = f" (method {method})" if method else ""
     a = measured_text(apparatus.parameters, "conversion_constant")
-    if apparatus.reading.per == "relative":
-        a = a.replace("(relative)", "(relative: the load is not known)")
+    a = a.replace("(relative)", "(relative: the load is not known)")
     law = _dominating_law(apparatus)
     checks = verdict(apparatus.checks)
     if not misfit(apparatus.checks):

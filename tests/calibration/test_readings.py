@@ -100,6 +100,16 @@ def test_a_relative_calibration_of_a_scan_without_a_load_is_that_at_1_n(options)
     assert not any("1 N is taken" in message.text for message in stated.process.messages)
 
 
+def test_a_load_that_is_not_known_does_not_sink_the_rod():
+    soft = replace(SCAN, film=replace(FILM, young_modulus=5e4), load_uncertainty=None)
+    unknown, light = (
+        memscal.calibrate(replace(soft, load=load), relative=True).apparatus
+        for load in (None, 1e-3)
+    )
+    np.testing.assert_allclose(numbers(unknown), numbers(light), rtol=1e-6)
+    assert not any("1 N is taken" in message.text for message in unknown.process.messages)
+
+
 def test_an_artifact_without_a_film_measures_the_stress_of_a_scan_that_states_its_own(bare):
     measured, usual = (memscal.measure_stress(SCAN, a).profiles[0] for a in (bare, CALIBRATED))
     np.testing.assert_allclose(measured.s_zz, usual.s_zz, rtol=0.01, atol=0.01 * usual.maximum)

@@ -16,7 +16,7 @@ from scipy.special import chndtr, ndtr
 from scipy.stats import chi2, norm
 
 import memscal
-from memscal.errors import InputError, MemscalError
+from memscal.errors import FitError, InputError, MemscalError
 
 A = 2.0
 SIGMA = 0.3e-3
@@ -196,7 +196,10 @@ def test_what_is_no_field_is_refused(tmp_path, name):
         ("disc:-1mm", "above zero"),
         ("disc:1s", "length"),
         ("point:1mm", "no size"),
-        ("disk:1mm", "cannot be read"),
+        ("disk:1mm", "cannot be read: it is no file, and no source"),
+        ("gaussian", "no length"),
+        ("slit:0mm", "above zero"),
+        ("disc:0,5mm", "decimal point"),
         (["disc:1mm", None], "2 references"),
         (field(), "not round"),
     ],
@@ -204,6 +207,21 @@ def test_what_is_no_field_is_refused(tmp_path, name):
 def test_what_is_no_reference_is_refused(reference, said):
     with pytest.raises(InputError, match=said):
         memscal.calibrate(scanned("ellipse"), reference=reference)
+
+
+@pytest.mark.parametrize(
+    ("reach", "reference", "said"),
+    [
+        (0.4, "Point:", r"A = .* mV\*m\^2 \(relative\)\)"),
+        (1.5, "gaussian:0.8mm", r"0\.8 mm as stated(.|\n)*--reference\) of 0\.\d"),
+    ],
+)
+def test_a_refusal_is_in_terms_of_the_source(reach, reference, said):
+    scan = scanned("point", noise=0.0)
+    near = np.abs(scan.x) < reach * 1e-3
+    short = replace(scan, x=scan.x[near], u_zz=scan.u_zz[near], film=None, load=None)
+    with pytest.raises(FitError, match=said):
+        memscal.calibrate(short, reference=reference, relative=True)
 
 
 def test_a_slit_is_not_the_reference_of_a_raster_nor_beside_a_stress():
