@@ -24,6 +24,7 @@ from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import FitError, MemscalError
+from memscal.estimation.profile import LEAST_DISTINCT
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.set_up import reference_profile
 from memscal.extensions import hook
@@ -42,8 +43,7 @@ from memscal.progress import Listener, done_with, in_steps, reported
 if TYPE_CHECKING:
     from memscal import Sweep
 
-#: A must exceed so many standard uncertainties of what a scan leaves open, of these sources.
-_DISTINCT = 3.0
+#: Sources of what a scan leaves open.
 _OF_THE_SCAN = ("noise", "regularisation", "window")
 
 
@@ -312,14 +312,15 @@ def _require_distinct(results: Results, solution: Solution) -> None:
     a = results.parameters["conversion_constant"]
     sources = results.budget["conversion_constant"]
     uncertainty = math.hypot(*(sources[name] for name in _OF_THE_SCAN))
-    if a > _DISTINCT * uncertainty:
+    if a > LEAST_DISTINCT * uncertainty:
         return
     unit = solution.estimate.points.reading
     raise FitError(
         f"The conversion constant would be ({a / unit.scale:.2g} ± "
         f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)} by method "
         f"{solution.method.name}: it is not distinct from zero.",
-        why=f"It is below {_DISTINCT:g} standard uncertainties, those of the inputs left out.",
+        why=f"It is {a / uncertainty:.2g} standard uncertainties, those of the inputs left out; at "
+        f"least {LEAST_DISTINCT:g} are needed.",
         cure='Look at the scan; take method="bayesian" (--method bayesian), or other options.',
     )
 

@@ -17,6 +17,7 @@ from memscal.estimation.bayesian import HYPOTHESES, Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference_spectra import carried_force
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
+from memscal.estimation.runs import compare_runs, hysteresis_test
 from memscal.estimation.slow_noise import slow_noise
 from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
@@ -49,6 +50,8 @@ _DEEP = 0.1
 _CURVED = 3.3
 _LEAST_FOUND = 1e-3
 _BEYOND = 1.5
+#: Offsets of scans and repeats that differ by less of the largest signal are usual.
+_OFFSET = 0.02
 _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
 
@@ -410,25 +413,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
             "is not linear in the load, and that one A does not serve all loads."
         )
         checks.append(added_check("load_linearity", linear.fall, linear.count, meaning))
-    owner = np.array(solution.owners)[estimate.points.scan]
-    branches = model_tests.hysteresis_test(estimate, owner)
-    if branches is not None:
-        reading = estimate.points.reading
-        units = [("A", 1e-2, "%"), ("the centre's position", 1e-6, "um")]
-        units.append(("the baseline", reading.scale, reading.unit))
-        differences = []
-        for i, (name, scale, unit) in enumerate(units[: branches.count]):
-            change = branches.coefficients[i] / scale
-            words = format_measured(change, branches.errors[i] / scale, unit)
-            differences.append(f"of {name} by {words}")
-        meaning = (
-            "Fall of chi-square by differences between approach and retreat (approach minus "
-            f"retreat): {', '.join(differences)}. A failure means that A and G are means over two "
-            "different scans: the film relaxes or adheres, the stage has play, or the amplifier "
-            "drifts. Wait longer before each reading, move to each position from the same side, "
-            "or calibrate with one branch alone."
-        )
-        checks.append(added_check("hysteresis", branches.fall, branches.count, meaning))
+    checks += [*_hysteresis(solution), *_runs(solution)]
     apart = solution.apart
     if apart is not None and not solution.per_repeat:
         meaning = (
@@ -439,6 +424,85 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
         )
         checks.append(_tested("repeat_centres", apart, meaning))
     return checks
+
+
+def _hysteresis(solution: Solution) -> list[QualityCheck]:
+    """Compare approach with retreat where scans say which is which."""
+    estimate = solution.estimate
+    owner = np.array(solution.owners)[estimate.points.scan]
+    branches = hysteresis_test(estimate, owner)
+    if branches is None:
+        return []
+    reading = estimate.points.reading
+    units = (
+        ("A", 1e-2, "%"),
+        ("the width", 1e-2, "%"),
+        ("the centre's position", 1e-6, "um"),
+        ("the baseline", reading.scale, reading.unit),
+    )
+    differences = []
+    pairs = zip(branches.values, branches.errors, strict=True)
+    for (name, scale, unit), (value, error) in zip(units, pairs, strict=False):
+        differences.append(f"of {name} by {format_measured(value / scale, error / scale, unit)}")
+    meaning = (
+        "Differences between approach and retreat over the scatter that is left: an F ratio. They "
+        f"differ (approach less retreat): {', '.join(differences)}. A failure means that A and G "
+        "are means over two different scans. Scan at another speed: a difference that grows with "
+        "the speed is creep of the film or a slow amplifier, of which a longer wait before each "
+        "reading rids; one that does not is play of the stage (backlash), or a film that adheres: "
+        "move to each position from the same side. Or calibrate with one branch alone."
+    )
+    return [_tested("hysteresis", branches.outcome, meaning)]
+
+
+def _runs(solution: Solution) -> list[QualityCheck]:
+    """Compare the offset and the noise of each repeat and scan with those of the others."""
+    estimate = solution.estimate
+    runs = compare_runs(estimate)
+    if runs is None:
+        return []
+    reading = estimate.points.reading
+    largest = estimate.largest_signal
+    distance = runs.distance / reading.scale
+    apart = format_measured(distance, runs.error / reading.scale, reading.unit)
+    meaning = (
+        "Difference of a baseline from those of all other scans and repeats, over the largest "
+        f"signal: that of {_run(solution, runs.moved)} is off by {apart}. A failure means that the "
+        "sensor's offset moved between them, beyond chance: let it warm up, and read it without "
+        "the indenter before each run. A baseline of its own (scans have it, repeats by --centre "
+        "per-repeat) takes that up, but not what else moved."
+    )
+    limit = max(_OFFSET, runs.offset.limit**0.5 * runs.error / largest)
+    offset = check(
+        "offset_agreement", abs(runs.distance) / largest, limit, meaning, runs.offset.p_value
+    )
+    stated = "" if estimate.points.u_errors is None else ", each over what is stated"
+    meaning = (
+        f"Ratio of the scatter of one scan or repeat to that of all others{stated}, or back: "
+        f"{_run(solution, runs.noisy)} has {'more' if runs.louder else 'less'}. A failure means "
+        "that their noise differs beyond chance, so that weights and uncertainties are wrong: look "
+        "for its cause, or state the noise of each (u_zz_errors)."
+    )
+    limit = max(quality.NOISE_LIMIT, runs.noise.limit**0.5)
+    ratio = runs.noise.value**0.5
+    return [offset, check("noise_agreement", ratio, limit, meaning, runs.noise.p_value)]
+
+
+def _run(solution: Solution, number: int) -> str:
+    """Name a repeat by its number within its scan, and the scan where there are several."""
+    points = solution.estimate.points
+    _, start = np.unique(points.repeat, return_index=True)
+    owners = np.array(solution.owners)[points.scan[start]]
+    owner = owners[number]
+    scan = f"scan {owner + 1}"
+    source = solution.scans[points.scan[start[number]]].source
+    if source is not None and source.file_name:
+        scan += f" ({source.file_name})"
+    before = np.count_nonzero(owners[:number] == owner)
+    repeat = f"repeat {before + 1}"
+    if np.all(owners == owner):
+        return repeat
+    return f"{repeat} of {scan}" if np.count_nonzero(owners == owner) > 1 else scan
 
 
 def _held_out(solution: Solution) -> list[QualityCheck | None]:

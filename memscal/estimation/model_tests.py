@@ -241,34 +241,6 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     )
 
 
-def hysteresis_test(
-    estimate: ProfileEstimate, owner: IndexArray | None = None
-) -> ExtraColumns | None:
-    """Compare approach and retreat within each scan that has both; ``None`` without any."""
-    # Columns, each approach minus retreat: of A, relative; of the centre along the scan, in m; of
-    # the baseline, in V, whose step would else count as a difference of A.  It is A alone where
-    # repeats have centres and baselines of their own.  ``owner`` (n,): the scan, repeats included.
-    points = estimate.points
-    owner = points.scan if owner is None else owner
-    sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
-    for scan in np.unique(owner):
-        inside = owner == scan
-        if np.ptp(sign[inside]) < 1:
-            sign[inside] = 0
-    if not sign.any():
-        return None
-    columns = [estimate.predicted - estimate.background]
-    if np.array_equal(owner, points.scan):
-        shift = estimate.model.shift_derivative(
-            estimate.model.geometry(estimate.centres), estimate.kernel
-        )
-        columns += [
-            shift[np.argmax(points.free[points.scan], axis=1), range(points.u.size)],
-            np.ones_like(sign),
-        ]
-    return _add(estimate, sign[:, None] * np.stack(columns, axis=1))
-
-
 def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
     model = estimate.model

@@ -26,8 +26,10 @@ from memscal.progress import done_with
 
 #: Error of the reference and of its transforms, relative to the largest signal.
 NUMERICAL_FLOOR = 1e-6
-#: A conversion constant must exceed this many of its standard uncertainties.
+#: A conversion constant must exceed this many standard uncertainties by noise, and of all that a
+#: scan leaves open this many: what form G has may be unsure where the signal is not.
 LEAST_SIGNIFICANCE = 5.0
+LEAST_DISTINCT = 3.0
 _WEIGHING_ROUNDS = 4
 #: Noise that is not stated is found to this share.
 _SAME_NOISE = 0.1
@@ -406,15 +408,24 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
     integrals = estimate.basis.integrals
     # Rounding makes the variance of a scan without noise negative.
     uncertainty = np.sqrt(max(float(integrals @ estimate.weighed.covariance @ integrals), 0.0))
-    if not a > LEAST_SIGNIFICANCE * uncertainty:
-        unit = estimate.points.reading
-        wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
-        raise FitError(
-            f"The conversion constant would be ({a / unit.scale:.2g} ± "
-            f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)}: it is {wrong}.",
-            why=_why_undetermined(estimate),
-            cure=cure,
-        )
+    if a > LEAST_SIGNIFICANCE * uncertainty:
+        return
+    of_a = integrals[None] @ estimate.weighed.gain
+    columns = np.hstack([estimate.scattered(of_a), integrals[None] @ estimate.curving])
+    scatter = float(np.linalg.norm(columns))
+    shown = a > LEAST_SIGNIFICANCE * scatter
+    if shown and a > LEAST_DISTINCT * uncertainty:
+        return
+    unit = estimate.points.reading
+    wrong = "negative" if a < -LEAST_DISTINCT * uncertainty else "not distinct from zero"
+    raise FitError(
+        f"The conversion constant would be ({a / unit.scale:.2g} ± {uncertainty / unit.scale:.2g}) "
+        f"{unit.over(unit.unit)}: it is {wrong}.",
+        why=f"It is {a / scatter:.2g} standard uncertainties by noise (at least "
+        f"{LEAST_SIGNIFICANCE:g} are needed) and {a / uncertainty:.2g} of all that the scan leaves "
+        f"open (at least {LEAST_DISTINCT:g}). {_why_undetermined(estimate, shown=shown)}",
+        cure=cure,
+    )
 
 
 #: A voltage that varies by less than this many times its noise is lost in it, and a scan that ends
@@ -423,8 +434,9 @@ _LEAST_RISE = 6.0
 _LEFT = 0.1
 
 
-def _why_undetermined(estimate: ProfileEstimate) -> str:
+def _why_undetermined(estimate: ProfileEstimate, *, shown: bool) -> str:
     """Say what keeps A from being determined: the noise, or the parameter it is confused with."""
+    # ``shown``: whether noise and baseline alone would leave it distinct from zero.
     base = np.linalg.qr(estimate.model.straight_columns)[0]
     rise = np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted))
     ratio = rise / float(np.median(estimate.noise))
@@ -440,6 +452,11 @@ def _why_undetermined(estimate: ProfileEstimate) -> str:
             f"{varies}, but the scan is too short or off centre to show the baseline: "
             f"{estimate.distance[farthest] * 1e3:.3g} mm from the sensor's centre, where it ends, "
             f"{left:.0%} of the largest signal is left."
+        )
+    if shown:
+        return (
+            f"{varies}, but the forms that G may have differ in A by more than the noise: tails of "
+            "G that fall slowly cannot be told from the baseline."
         )
     centres = 2 + int(estimate.points.free.sum())
     flat = estimate.basis.flat

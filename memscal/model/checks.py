@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 #: Chance that a check fails although its assumption holds.
 FALSE_ALARM = 1e-3
 #: Scatter over stated noise up to which a scan counts as being as noisy as stated.
-_NOISE_LIMIT = 1.5
+NOISE_LIMIT = 1.5
 #: Share of points that may be outliers.
 _OUTLIER_LIMIT = 0.10
 #: A point of less weight is an outlier.
@@ -75,8 +75,12 @@ axisymmetry: ellipticity of the sensor or of the contact (rasters)
     contact or sensor is not round; of a calibration G(r) is a mean over directions
 load_linearity: change of A with the load (several loads)
     calibrate at the load of use
-hysteresis: difference of approach and retreat, in A, position and baseline
-    wait before each reading, come from the same side, or calibrate with one branch
+hysteresis: difference of approach and retreat, in A, width and centre, over its uncertainty
+    at another speed: what grows is creep (wait), what stays is backlash (one side only)
+offset_agreement: baseline of each scan and repeat against those of all others
+    the sensor's offset moved: let it warm up; the check names the run and the offset
+noise_agreement: scatter of each scan and repeat against that of all others
+    look for what disturbs the run that it names; state the noise of each
 repeat_centres: a centre for each repeat of a line against one for all (F ratio)
     stage or sensor moved: --centre per-repeat, the default then
 held_out_repeat: each repeat against its prediction from the others; the worst
@@ -196,7 +200,7 @@ def noise_check(scatter: float, channel: str = "zz") -> QualityCheck:
         "that something besides electronic noise scatters the scan, such as position or load; the "
         "uncertainties have been raised accordingly."
     )
-    return check("noise_as_stated", scatter, _NOISE_LIMIT, meaning)
+    return check("noise_as_stated", scatter, NOISE_LIMIT, meaning)
 
 
 def outlier_check(weights: "FloatArray", where: str) -> QualityCheck:

@@ -1,19 +1,20 @@
 """The model's assumptions: false alarms are as rare as stated, and real departures are found."""
 
+import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from helpers import outside
 from helpers.bounds import FULL
+from helpers.outside import ROUND, line
 from helpers.scans import CENTRE, CONVERSION, as_points, estimated, simulated
 from scipy.stats import binom, chi2
 
-from memscal.estimation.model_tests import (
-    axisymmetry_test,
-    hysteresis_test,
-    linearity_test,
-    symmetry_test,
-)
+import memscal
+from memscal.estimation.model_tests import axisymmetry_test, linearity_test, symmetry_test
+from memscal.estimation.runs import hysteresis_test
 from memscal.model.checks import chi_square_limit
 from memscal.model.scan import Scan
 
@@ -32,7 +33,11 @@ BOTH = {"repeats": 2, "points": 33, "branch": ["approach", "retreat"]}
 def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options) -> None:
     scans = 80 if FULL else 16
     extra = [test(estimated(simulated(seed=seed, **options))) for seed in range(scans)]
-    rejected = sum(chi2.sf(columns.fall, columns.count) < 0.1 for columns in extra)
+    chances = [
+        columns.outcome.p_value if test is hysteresis_test else chi2.sf(columns.fall, columns.count)
+        for columns in extra
+    ]
+    rejected = sum(chance < 0.1 for chance in chances)
     # A tenth of good scans fall below p = 0.1, within what a binomial allows once in 1e6.
     low, high = binom.ppf([1e-6, 1 - 1e-6], scans, 0.1)
     assert low <= rejected <= high
@@ -70,16 +75,88 @@ def hysteretic(seed: int, conversion: float = 0.0, play: float = 0.0, step: floa
     return replace(rows[0], u_zz=u, u_zz_errors=errors, branch=BOTH["branch"])
 
 
-@pytest.mark.parametrize("differences", [(0.01, 0.0, 0.0), (0.0, -20e-6, 0.0), (0.0, 0.0, 1e-4)])
+@pytest.mark.parametrize("differences", [(0.02, 0.0, 0.0), (0.0, -20e-6, 0.0), (0.0, 0.0, 1e-4)])
 def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences) -> None:
     scans = 40 if FULL else 8
     extra = [hysteresis_test(estimated(hysteretic(seed, *differences))) for seed in range(scans)]
-    assert all(columns.fall > chi_square_limit(3) for columns in extra)
-    z = np.array([(columns.coefficients - differences) / columns.errors for columns in extra])
+    assert all(columns.outcome.value > columns.outcome.limit for columns in extra)
+    truth = np.insert(differences, 1, 0.0)  # of the width
+    z = np.array([(columns.values - truth) / columns.errors for columns in extra])
     low, high = chi2.ppf([1e-6, 1 - 1e-6], scans)
     assert np.all((low < np.sum(z**2, axis=0)) & (np.sum(z**2, axis=0) < high))
     found = hysteresis_test(estimated(as_points(hysteretic(0, *differences))))
-    np.testing.assert_allclose(found.coefficients, extra[0].coefficients, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.values, extra[0].values, rtol=1e-6, atol=1e-9)
+
+
+PASSES = line(step=0.5e-3)
+
+
+def passes(seed: int, *, stated: bool = True, **given: Any) -> Scan:
+    """Passes forth and back over a sensor, each pair with its own disturbances."""
+    pairs = given.get("pairs", 1)
+    side = np.tile([1.0, -1.0], pairs)
+    rng = np.random.default_rng(seed)
+    lag = given.get("lag", 0.0) * side
+    shift = given.get("play", 0.0) * side + given.get("wander", 0.0) * rng.standard_normal(
+        side.size
+    )
+    share = given.get("creep", 0.0)
+    noise = np.full(side.size, 0.003)
+    noise[-1] *= given.get("louder", 1.0)
+    rows = []
+    for own, moved in zip(lag, shift, strict=True):
+        at_once = ROUND.voltages(PASSES + moved)
+        late = replace(ROUND, lag=own).voltages(PASSES + moved)
+        rows.append((1 - share) * at_once + share * late)
+    u = np.array(rows)
+    top = u.max()
+    u[-1] += given.get("offset", 0.0) * top
+    u += top * noise[:, None] * rng.standard_normal(u.shape)
+    return Scan(
+        x=PASSES,
+        u_zz=u,
+        u_zz_errors=np.full(u.shape, 0.003 * top) if stated else None,
+        load=ROUND.load,
+        indenter=memscal.Rod(radius=ROUND.radius),
+        film=outside.FILM,
+        branch=["approach", "retreat"] * pairs if given.get("named", True) else None,
+    )
+
+
+CREEP = {"creep": 0.05, "lag": 0.5e-3}
+
+
+@pytest.mark.parametrize(
+    ("given", "failed", "centre"),
+    [
+        ({}, "", None),
+        ({}, "", "per-repeat"),
+        ({"pairs": 3, "wander": 30e-6}, "", None),
+        (CREEP, "hysteresis", "common"),
+        (CREEP, "hysteresis", None),
+        (CREEP | {"stated": False}, "hysteresis", "per-repeat"),
+        (CREEP | {"pairs": 2}, "hysteresis", None),
+        ({"play": -20e-6}, "hysteresis", None),
+        ({"offset": 0.3, "named": False}, "offset_agreement", "per-repeat"),
+        ({"offset": 0.3, "named": False, "stated": False, "pairs": 2}, "offset_agreement", None),
+        ({"louder": 4.0, "named": False, "stated": False}, "noise_agreement", None),
+    ],
+)
+def test_what_differs_between_passes_fails_its_check_and_no_other(given, failed, centre) -> None:
+    found = memscal.calibrate(passes(1, **given), centre=centre, method="bayesian", other=False)
+    checks = {check.name: check for check in found.apparatus.checks}
+    names = {"hysteresis", "offset_agreement", "noise_agreement"}
+    assert [name for name in names & {*checks} if not checks[name].passed] == [*failed.split()]
+    if failed == "hysteresis":
+        words = checks["hysteresis"].meaning
+        assert re.search(r"position by \((3|4)\d\.\d ± \d\.\d\) um", words)
+        assert "grows with the speed is creep" in words
+        assert "play of the stage" in words
+    if failed == "offset_agreement":
+        last = 2 * given.get("pairs", 1)
+        named = checks["offset_agreement"]
+        assert named.value == pytest.approx(0.3, rel=0.05)
+        assert f"repeat {last if last > 2 else 1} is off by" in named.meaning
 
 
 @pytest.mark.parametrize("eta", [-0.05, 0.1])
