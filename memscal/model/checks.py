@@ -32,7 +32,7 @@ constraint: rise of chi-square by --option nonnegative=true or monotone=true
 gaussian_misfit: scan against the best Gaussian convolved with the reference
     G or a statement is wrong: the check says
 method_agreement: division against Bayesian estimate, in A and G(r), over what noise explains
-    one follows a feature that the other does not: compare both G(r) and the residuals
+    compare both G(r) and the residuals
 width_agreement: width of G against that of the Gaussian, in standard uncertainties without misfit
     one width does not describe G: use the profile
 shape_width: full width of G at half maximum over a Gaussian's, or the inverse
@@ -66,21 +66,21 @@ chi_square: residuals that no radial G, or no radial stress, explains, against t
 residual_steps: largest step of the residuals, in standard deviations
     look for a step or bend of the baseline, a wrong reference, slow noise
 residual_correlation: correlation of neighbouring residuals
-    as residual_steps; or state u_zz_correlation; the meaning says what correlation it finds
+    as residual_steps; or state u_zz_correlation
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear
     look for a tilted rod, uneven film, drifting load or lag
 axisymmetry: ellipticity of the sensor or of the contact (rasters)
-    contact or sensor is not round; of a calibration G(r) is a mean over directions
+    it is not round; of a calibration G(r) is a mean over directions
 load_linearity: change of A with the load (several loads)
     calibrate at the load of use
-hysteresis: difference of approach and retreat, in A, width and centre, over its uncertainty
-    at another speed: what grows is creep (wait), what stays is backlash (one side only)
-offset_agreement: baseline of each scan and repeat against those of all others
-    the sensor's offset moved: let it warm up; the check names the run and the offset
-noise_agreement: scatter of each scan and repeat against that of all others
-    look for what disturbs the run that it names; state the noise of each
+hysteresis: approach against retreat in A, width and centre
+    what grows with the speed is creep, what does not backlash
+offset_agreement: baseline of a scan or repeat against all others'
+    it names the run: let the sensor warm up
+noise_agreement: scatter of a scan or repeat against all others'
+    look at the run that it names; state its noise
 repeat_centres: a centre for each repeat of a line against one for all (F ratio)
     stage or sensor moved: --centre per-repeat, the default then
 held_out_repeat: each repeat against its prediction from the others; the worst
