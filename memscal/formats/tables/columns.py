@@ -84,7 +84,6 @@ class NamedColumns:
         self._again = set[int]()
         # Columns not asked for, in whose cells other words are no readings.
         self._others: list[Wanted] = []
-        self._last = 0
         self._missing = {*MISSING, *(word.strip().lower() for word in missing)}
         self._sentinels = [number_of(w.replace(",", ".")) for w in missing if is_number(w)]
         # Cells that are no numbers, by column: how many, and the first of them with their lines.
@@ -112,7 +111,6 @@ class NamedColumns:
                     self._reject(f"{numbers[i]:g}".replace("e+", "E"), lines[i], item.column)
                 column[count : count + len(lines)] = numbers
             count += len(lines)
-            self._last = lines[-1] if len(lines) else self._last
         self._refuse_wrong([*wanted.values()])
         self._describe(count)
         return {
@@ -264,9 +262,8 @@ class NamedColumns:
             lines, cells = self._wrong.get(item.column, ([], []))
             # Others count where the table begins or ends in words, as a summary does, or a unit
             # changes.
-            ends = {int(self._lines_of[0][1][0]), self._last}
-            stray = item in self._others and not item.words and ends.isdisjoint(lines)
-            if stray or not lines:
+            watched = item in self._others and not item.words
+            if not lines or (watched and {*self.all_lines()[[0, -1]]}.isdisjoint(lines)):
                 continue
             named = ", ".join(f"{i} ({cell!r})" for i, cell in zip(lines, cells, strict=False))
             more = f" and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
