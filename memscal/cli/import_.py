@@ -72,7 +72,7 @@ Examples:
 Columns are given by their names in the header, or by their numbers counted from 1 where no name
 is a number. Units stand in the header (x [mm], x/mm) or in a row below it. Missing values are
 empty cells and the words nan, na, n/a, #n/a, nat, null, none and -. Workbooks and Parquet need the
-extra tables: pip install "memscal[tables]".
+extra tables: pip install "memscal[tables]"; TDMS needs the extra recorded.
 Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
@@ -315,7 +315,9 @@ _NEEDED_WITH_MESH = ("r_unit", "sigma_unit")
 def command(
     table: Path, output: Path, kind: str, as_json: bool, force: bool, **options: Any
 ) -> int:
-    """Convert a TABLE (CSV, XLSX, Parquet) or a mesh (VTU, VTK, XDMF) to a scan or a reference.
+    """Convert a TABLE or a mesh (VTU, VTK, XDMF) to a scan or a reference.
+
+    Tables are text (CSV, SPEC), .xlsx, Parquet, HDF5 (its columns are paths) and TDMS.
 
     The options state the film and the indenter, which a table does not, and units that it does not
     state; a scan to be calibrated with a reference of its own needs no film, indenter or load.

@@ -18,12 +18,15 @@ from memscal.formats.tables.dialect import cut_head
 from memscal.formats.tables.sheets import installed
 from memscal.formats.units import is_unit
 from memscal.model.provenance import SourceFile
-from memscal.model.sizes import too_large
+from memscal.model.sizes import MOST_COLUMNS, too_large
 
 _LEAD_IN = 28
 _BIG_ENDIAN = 0x40
-#: Each segment may copy the list of all channels; each scale may refer twice to the one before.
-_MOST_SEGMENTS = 10_000
+_NEW_LIST = 0x04
+#: Each segment is an object, and may copy the list of all channels before it: so many bytes of
+#: them, each time counted, are taken.  Each scale may refer twice to the one before.
+_MOST_LISTED = 2**28
+_SEGMENT = 500
 _MOST_SCALES = 12
 #: Properties that state a unit, the column that those of a waveform make, and the unit of that.
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
@@ -45,6 +48,8 @@ def open_channels(path: FilePath, named: Mapping[str, Any], **reading: Any) -> R
             for channel in group.channels():
                 channels[f"{group.name}/{channel.name}"] = channel
                 _require_bounded(f"{name}: {channel.path}", (file, group, channel), len(data))
+        if len(channels) > MOST_COLUMNS:
+            raise too_large(name, len(channels), MOST_COLUMNS, "channels", cure="Leave out some.")
         used = {column: channels[column] for column in named.values() if column in channels}
         arrays = channels | {column: channel[:] for column, channel in used.items()}
     _require_one_clock(name, used)
@@ -80,17 +85,19 @@ def _warnings_refused() -> Iterator[None]:
 def _require_whole(name: str, data: bytes) -> None:
     """Refuse a file that does not end with a segment: readings would be missing in silence."""
     position = 0
-    for _ in range(_MOST_SEGMENTS):
+    known = 0
+    listed = 0
+    while position < len(data) and listed <= _MOST_LISTED:
         contents = struct.unpack_from("<I", data, position + 4)[0]
         order = ">" if contents & _BIG_ENDIAN else "<"
-        position += _LEAD_IN + struct.unpack_from(f"{order}Q", data, position + 12)[0]
-        if position >= len(data):
-            break
+        size, added = struct.unpack_from(f"{order}QQ", data, position + 12)
+        position += _LEAD_IN + size
+        known = added if contents & _NEW_LIST else known + added
+        listed += known + _SEGMENT
     if position != len(data):
-        problem = (
-            f"{name} does not end where its last segment, of at most {_MOST_SEGMENTS:,}, does."
-        )
-        raise FormatError(problem, why="It was cut short, or not closed.", cure=_DEFRAGMENT)
+        problem = f"{name} does not end where its last segment does."
+        why = "It was cut short, not closed, or is in too many pieces."
+        raise FormatError(problem, why=why, cure=_DEFRAGMENT)
 
 
 def _require_bounded(where: str, owners: Sequence[Any], size: int) -> None:

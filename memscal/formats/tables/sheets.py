@@ -35,6 +35,7 @@ _OTHERS = (".xls", ".xlsb", ".ods", ".numbers")
 _USES = {
     "delimiter": ("text", "SPEC file"),
     "scan": ("SPEC file",),
+    "decimal": ("text", "SPEC file", "TDMS file", *_KINDS.values(), "table in memory"),
     "skip_rows": ("text", "SPEC file", "workbook"),
     "sheet": ("workbook",),
 }
