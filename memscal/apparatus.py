@@ -133,6 +133,8 @@ class ApparatusFunction(Result, ApparatusData):
     ) -> FloatArray:
         r"""Return the reading :math:`A\,G \otimes \sigma_{zz}` of a base stress, in its unit (V).
 
+        Of a relative A the stress is in units of the largest of its reference, not in Pa.
+
         Parameters and errors are those of :meth:`convolve`.
         """
         return self.conversion_constant * self.convolve(r, sigma_zz, y=y)

@@ -111,7 +111,7 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
 
 
 def _reference(stresses: Sequence[BaseStress]) -> str:
-    form = None if isinstance(stresses[0], Contact) else stresses[0].form
+    form = getattr(stresses[0], "form", None)
     return f"the {form}" if form else "the stress at the base of the film"
 
 

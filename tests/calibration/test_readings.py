@@ -86,7 +86,7 @@ def test_a_relative_calibration_takes_no_load_and_states_no_pascals(bare, tmp_pa
     stored = memscal.load_apparatus(tmp_path / "sensor.h5")
     assert stored.load is None
     for state in (lambda: stored.stress(0.01), lambda: memscal.restore(SCAN, stored)):
-        with pytest.raises(InputError, match="relative"):
+        with pytest.raises(InputError, match="relative: it gives no stress in Pa"):
             state()
 
 
@@ -102,12 +102,9 @@ def test_a_relative_calibration_of_a_scan_without_a_load_is_that_at_1_n(options)
 
 def test_a_load_that_is_not_known_does_not_sink_the_rod():
     soft = replace(SCAN, film=replace(FILM, young_modulus=5e4), load_uncertainty=None)
-    unknown, light = (
-        memscal.calibrate(replace(soft, load=load), relative=True).apparatus
-        for load in (None, 1e-3)
-    )
+    unknown = memscal.calibrate(replace(soft, load=None), relative=True).apparatus
+    light = memscal.calibrate(replace(soft, load=1e-3), relative=True).apparatus
     np.testing.assert_allclose(numbers(unknown), numbers(light), rtol=1e-6)
-    assert not any("1 N is taken" in message.text for message in unknown.process.messages)
 
 
 def test_an_artifact_without_a_film_measures_the_stress_of_a_scan_that_states_its_own(bare):
