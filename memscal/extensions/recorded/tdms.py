@@ -18,7 +18,7 @@ from memscal.formats.tables.dialect import cut_head
 from memscal.formats.tables.sheets import installed
 from memscal.formats.units import is_unit
 from memscal.model.provenance import SourceFile
-from memscal.model.sizes import MOST_COLUMNS, too_large
+from memscal.model.sizes import too_large
 
 _LEAD_IN = 28
 _BIG_ENDIAN = 0x40
@@ -28,10 +28,9 @@ _NEW_LIST = 0x04
 _MOST_LISTED = 2**28
 _SEGMENT = 500
 _MOST_SCALES = 12
-#: Properties that state a unit, the column that those of a waveform make, and the unit of that.
+#: Properties that state a unit, and the column that the step of a waveform makes.
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
 _TIME = "wf_increment"
-_TIME_UNIT = "wf_xunit_string"
 _DEFRAGMENT = "Get the file again, or let LabVIEW defragment it (TDMS Defragment)."
 
 
@@ -48,17 +47,16 @@ def open_channels(path: FilePath, named: Mapping[str, Any], **reading: Any) -> R
             for channel in group.channels():
                 channels[f"{group.name}/{channel.name}"] = channel
                 _require_bounded(f"{name}: {channel.path}", (file, group, channel), len(data))
-        if len(channels) > MOST_COLUMNS:
-            raise too_large(name, len(channels), MOST_COLUMNS, "channels", cure="Leave out some.")
         used = {column: channels[column] for column in named.values() if column in channels}
         arrays = channels | {column: channel[:] for column, channel in used.items()}
+        units = [_unit_of(channel) for channel in channels.values()]
+        signal = used.get(named["u_zz"], ())
+        step = _time_step(signal.properties) if signal else 0.0
     _require_one_clock(name, used)
-    units = [_unit_of(channel) for channel in channels.values()]
-    signal = used.get(named["u_zz"], ())
     defaults = {}
-    if signal and _TIME in signal.properties:
-        arrays[_TIME] = np.arange(len(signal)) * signal.properties[_TIME]
-        units.append(str(signal.properties.get(_TIME_UNIT) or "s"))
+    if step > 0:
+        arrays[_TIME] = np.arange(len(signal)) * step
+        units.append("s")
         defaults = {"time": _TIME} if named["time"] is None else {}
     rows = len(signal) or max(map(len, channels.values()), default=0)
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
@@ -119,6 +117,12 @@ def _unit_of(channel: Any) -> str:
     stated = [channel.properties[name] for name in _UNITS if channel.properties.get(name)]
     unit = str([*stated, *cut_head(channel.name)[1:], ""][0]).strip()
     return unit if is_unit(unit) else unit.lower()  # Volts
+
+
+def _time_step(properties: Mapping[str, Any]) -> float:
+    """Return the time between readings, in s; 0 where a waveform states none."""
+    timed = properties.get("wf_xunit_string") in (None, "", "s")
+    return float(properties.get(_TIME, 0.0)) if timed else 0.0
 
 
 def _require_one_clock(name: str, channels: Mapping[str, Any]) -> None:

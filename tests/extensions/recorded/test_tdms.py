@@ -38,6 +38,7 @@ def write(u: dict[str, Any], x: dict[str, Any]) -> bytes:
         (WAVE, {}, 1e-3, ""),
         (SCALE, {}, 1e-4, ""),
         ({}, {}, 1, "no unit"),
+        (WAVE | {"wf_increment": "often"}, {}, 1, "cannot be read"),
         (WAVE, {"unit_string": "N"}, 1, "must be a length"),
         (WAVE, {"wf_increment": 0.1}, 1, "differs between the channels"),
         (SCALE | {"NI_Number_Of_Scales": 10**9}, {}, 1, "scales"),
