@@ -132,13 +132,14 @@ def _draw_profiles(axes: Axes, data: ApparatusData, *, floor: float) -> None:
 def _shown_radius(radial: ApparatusRadial) -> float:
     """Return the radius to draw up to: where G, or its Gaussian, has died away."""
     peak = _peak(radial)
+    last = float(radial.r[-1])
     alive = np.flatnonzero(np.maximum(np.abs(radial.g), radial.g_gaussian) > 1e-3 * peak)
     gaussian_alive = np.flatnonzero(radial.g_gaussian > 1e-3 * peak)
     if not alive.size or not gaussian_alive.size:
-        return float(radial.r[-1])
+        return last
     # Ripples of a poor deconvolution reach far; the Gaussian bounds the sensor.
     far = min(radial.r[alive[-1]], 1.6 * radial.r[gaussian_alive[-1]])
-    return float(min(1.1 * far, radial.r[-1])) or float(radial.r[-1])
+    return float(min(1.1 * far, last)) or last
 
 
 def _peak(radial: ApparatusRadial) -> float:

@@ -324,11 +324,12 @@ def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
         # Elsewhere than at the points: of a raster or several scans a line through all of them.
         return stated if x is along else np.polynomial.Polynomial.fit(along, stated, 1)(x)
     level = np.full(x.shape, _baseline(data))
-    if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
+    length = np.ptp(along)
+    if "drift" in data.parameters and length > 0 and not _by_distance(data):
         middle = (np.max(along) + np.min(along)) / 2
-        level += data.parameters["drift"] * (x - middle) / np.ptp(along)
+        level += data.parameters["drift"] * (x - middle) / length
         if "baseline_curvature" in data.parameters:
-            level += data.parameters["baseline_curvature"] * (2 * (x - middle) / np.ptp(along)) ** 2
+            level += data.parameters["baseline_curvature"] * (2 * (x - middle) / length) ** 2
     return level
 
 

@@ -162,15 +162,16 @@ def comparison_figure(
         raise InputError("There is no figure of a comparison by the shear alone.")
     loads = chosen(comparison, loading, lubrication)
     with panels_of(5.6, 2, 2, note=_BOTH_NOTE) as (figure, panels):
-        draw_profiles(panels[0, 0], comparison, loads)
-        _draw_maxima(panels[0, 1], comparison, loads[0].loading)
+        (profiles, maxima), (residuals, effective) = panels
+        draw_profiles(profiles, comparison, loads)
+        _draw_maxima(maxima, comparison, loads[0].loading)
         best = joint_estimate(comparison, loads).best
-        largest = draw_residuals(panels[1, 0], comparison, loads, best)
-        share_limits([panels[1, 0]], largest)
-        panels[0, 0].set_xlabel(ALONG_RADIUS)
-        panels[1, 0].set_xlim(panels[0, 0].get_xlim())
-        _draw_effective(panels[1, 1], comparison, loads)
-        legend_above(panels[1, 1], columns=2)
+        largest = draw_residuals(residuals, comparison, loads, best)
+        share_limits([residuals], largest)
+        profiles.set_xlabel(ALONG_RADIUS)
+        residuals.set_xlim(profiles.get_xlim())
+        _draw_effective(effective, comparison, loads)
+        legend_above(effective, columns=2)
     return figure
 
 

@@ -13,6 +13,7 @@ from memscal.friction.likelihood import (
     Channel,
     LoadPoints,
     Predicted,
+    Readings,
     points_at,
     predict,
     standardise,
@@ -80,24 +81,26 @@ def dry_against_lubricated(
     _, (chi_square,) = log_likelihood(standardised.statistics)
 
     # Stresses, at the places and the load of the dry scan.
-    profiles = [measured.profiles[i] for i in pair]
+    dry_profile, lubricated_profile = (measured.profiles[i] for i in pair)
     conversion_share = measured.conversion_constant_uncertainty / measured.conversion_constant
-    dry_stress, dry_variance = _stress_at(profiles[0], places[0])
-    lubricated_stress, lubricated_variance = _stress_at(profiles[1], places[1])
+    dry_stress, dry_variance = _stress_at(dry_profile, places[0])
+    lubricated_stress, lubricated_variance = _stress_at(lubricated_profile, places[1])
     farther = lubricated_contact.slope[0] * (dry.radius - lubricated.radius)
-    heavier = lubricated_contact.by_load[0] * math.log(profiles[0].load / profiles[1].load)
+    heavier = lubricated_contact.by_load[0] * math.log(dry_profile.load / lubricated_profile.load)
     moved = (farther + heavier) / sensor.conversion_constant
     difference = dry_stress - lubricated_stress - moved
     variance = dry_variance + lubricated_variance + (conversion_share * difference) ** 2
-    maximum = profiles[0].maximum - profiles[1].maximum
-    random = [random_uncertainty(profile.maximum_budget) for profile in profiles]
+    maximum = dry_profile.maximum - lubricated_profile.maximum
+    budgets = (dry_profile.maximum_budget, lubricated_profile.maximum_budget)
     # What each scan has for itself, its gain and load, on the axis as nearest to it.
     own = np.concatenate([columns["between_scan_gain"], columns["load"]], axis=-1)[0]
     by_scan = np.linalg.norm(own, axis=1) / sensor.conversion_constant
     on_axis = float(by_scan[np.argmin(dry.radius)])
-    maximum_uncertainty = math.hypot(conversion_share * maximum, on_axis, *random)
+    maximum_uncertainty = math.hypot(
+        conversion_share * maximum, on_axis, *map(random_uncertainty, budgets)
+    )
     return DryAgainstLubricated(
-        load=profiles[0].load,
+        load=dry_profile.load,
         r=dry.radius,
         difference=difference,
         difference_errors=np.sqrt(variance + by_scan**2),
@@ -106,8 +109,8 @@ def dry_against_lubricated(
         p_value=float(chdtrc(apart.degrees, chi_square)),
         maximum=maximum,
         maximum_uncertainty=maximum_uncertainty,
-        relative=maximum / profiles[1].maximum,
-        relative_uncertainty=maximum_uncertainty / profiles[1].maximum,
+        relative=maximum / lubricated_profile.maximum,
+        relative_uncertainty=maximum_uncertainty / lubricated_profile.maximum,
     )
 
 
@@ -165,7 +168,7 @@ def _stress_at(profile: MeasuredProfile, places: IndexArray) -> ArrayPair:
 
 
 def _noise_of_difference(
-    *readings: tuple[LoadPoints, Predicted],
+    *readings: Readings,
 ) -> tuple[FloatArray, FloatArray | None]:
     """Noise of a difference, in V, without what both scans share, and its correlation if any."""
     variance = np.zeros(())

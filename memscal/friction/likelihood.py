@@ -334,9 +334,11 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     )
 
 
-def stacked(
-    normal: tuple[LoadPoints, Predicted], shear: tuple[LoadPoints, Predicted]
-) -> tuple[LoadPoints, Predicted]:
+Readings = tuple[LoadPoints, Predicted]
+"""Points of a load, and what the sensor reads of its contacts there."""
+
+
+def stacked(normal: Readings, shear: Readings) -> Readings:
     """Return what two channels read of the same contacts as the readings of one load."""
     # Common are the centre, the scatter of each contact's load and position, and all systematic
     # sources but what is left of each sensor; noise, baseline and drift are each channel's own.

@@ -101,7 +101,7 @@ def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
         spread = Decimal(repr(float(uncertainty)))
         for _ in range(2):  # 0.0996 gives 0.10, not 0.100
             spread = spread.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
-        number = number.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
+        number = number.quantize(spread)
         exponent = max(number.adjusted() if number else spread.adjusted(), spread.adjusted())
         if exponent in _PLAIN_EXPONENTS:
             exponent = 0

@@ -1,14 +1,14 @@
 """Holds in the log of an instrument: rows in which the indenter presses at rest, averaged."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.model.arrays import Arrays, BoolArray, FloatArray, IndexArray
 from memscal.model.holds import Holds
 from memscal.model.notation import Reading
+
+Runs = list[IndexArray]
+"""Rows of a log that follow each other, run by run."""
 
 #: The indenter moves where its position changes, from one row to the next, by more than this share
 #: of the whole way, and presses where the load is above this share of the way from lifted to held.
@@ -35,7 +35,7 @@ _CURE = (
 
 def find_holds(
     columns: Arrays,
-    line: NDArray[Any],
+    line: IndexArray,
     reading: Reading,
     *,
     depth: FloatArray | None = None,
@@ -91,8 +91,8 @@ def find_holds(
 
 def _averaged(
     columns: Arrays,
-    line: NDArray[Any],
-    held: list[IndexArray],
+    line: IndexArray,
+    held: Runs,
     before: FloatArray | None,
     left_out: int,
     reading: Reading,
@@ -146,7 +146,7 @@ def _averaged(
     )
 
 
-def _runs(rows: BoolArray, dwell: IndexArray) -> list[IndexArray]:
+def _runs(rows: BoolArray, dwell: IndexArray) -> Runs:
     """Return runs of some rows, each within one dwell."""
     starts = np.flatnonzero(np.diff(np.where(rows, dwell, -1), prepend=-1))
     return [run for run in np.split(np.arange(rows.size), starts) if run.size and rows[run[0]]]
@@ -191,8 +191,8 @@ def _lowered(
 
 def _before_each(
     columns: Arrays,
-    line: NDArray[Any],
-    held: list[IndexArray],
+    line: IndexArray,
+    held: Runs,
     waiting: BoolArray,
     dwell: IndexArray,
 ) -> FloatArray:
@@ -218,7 +218,7 @@ def _before_each(
 
 
 def _timed(
-    u: FloatArray, dwell: IndexArray, line: NDArray[Any], notes: list[str]
+    u: FloatArray, dwell: IndexArray, line: IndexArray, notes: list[str]
 ) -> tuple[BoolArray, BoolArray]:
     """Tell from the readings when the indenter presses at a place, and when it waits before."""
     # Far from the sensor no reading tells: the times at the others' places, all alike, do.
@@ -278,8 +278,8 @@ def _noise(values: FloatArray) -> float:
 
 
 def _steady_rows(
-    runs: list[IndexArray], values: FloatArray, pressed: BoolArray, *, lifted: float, share: float
-) -> list[IndexArray]:
+    runs: Runs, values: FloatArray, pressed: BoolArray, *, lifted: float, share: float
+) -> Runs:
     """Cut each run to the rows from the first to the last that is close to its quantile."""
     noise = _NOISE * _noise(values[pressed])
     steady = []

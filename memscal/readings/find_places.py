@@ -31,8 +31,10 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IndexArray) -> Places:
     columns, step_x = _clusters(x, close)
     rows, step_y = _clusters(y, close)
     # Along a line the neighbours of a place are those in order.
-    index = rows if np.ptp(y) else columns
-    if np.ptp(x) and np.ptp(y):
+    width = np.ptp(x)
+    height = np.ptp(y)
+    index = rows if height else columns
+    if width and height:
         index = _linked(x, y, close, int(np.ptp(repeat)) + 1)
     count = int(index.max()) + 1
     if 0.0 in (step_x, step_y) or _nodes(columns, rows) <= _MOST_NODES * count:
@@ -44,7 +46,7 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IndexArray) -> Places:
         index = np.unique(nodes, return_inverse=True)[1]
         return Places(index, along_y.index, (along_x.step, along_y.step))
     # No rows and columns: every place stands for an equal share of the plane.
-    step = float(np.sqrt(np.ptp(x) * np.ptp(y) / count))
+    step = float(np.sqrt(width * height / count))
     return Places(index, np.floor((y - y.min()) / step).astype(np.intp), (step, step))
 
 

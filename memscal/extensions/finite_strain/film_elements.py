@@ -312,9 +312,10 @@ class FilmElements:
         flat = gradients.reshape(cells, -1, 12)
         stiff = flat.transpose(0, 2, 1) @ (stiffness @ gradients).reshape(cells, -1, 12)
         squeeze = cofactor(F)[..., None, :] * volumes[..., None, None] @ gradients
-        couple = -pressures.transpose(0, 2, 1) @ squeeze[:, :, 0]
+        against = -pressures.transpose(0, 2, 1)
+        couple = against @ squeeze[:, :, 0]
         weighted = pressures * (self.material.softness * volumes)[..., None]
-        soft = -pressures.transpose(0, 2, 1) @ weighted
+        soft = against @ weighted
         whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
         places, indices, starts = self._pattern
         values = np.bincount(places, whole.ravel(), indices.size)

@@ -396,16 +396,17 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
     # The axis is held: its radial force is not the indenter's.
     if r[0] < 1e-12:
         dragged[0] = 0.0
-    side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
+    corners = r[::2]
+    side = np.hypot(np.diff(corners), np.diff(z[::2]))
     left = r[:-2:2]
     right = r[2::2]
     area = np.pi / 3 * on_hats(side * (2 * left + right), side * (left + 2 * right))
 
     chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
-    chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
+    chosen = chosen[np.argsort(corners[chosen], kind="stable")]
     pressure = _on_corners(pushed) / area
     shear = _on_corners(dragged) / area
-    return RingTraction(r[::2][chosen] / _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA)
+    return RingTraction(corners[chosen] / _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA)
 
 
 def _on_corners(forces: FloatArray) -> FloatArray:

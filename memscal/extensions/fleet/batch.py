@@ -111,34 +111,35 @@ class Batch:
     def prepare(self, *, resume: bool) -> "Batch":
         """Make the folder of results, if it may be used; count the scans."""
         arrow()
+        results = self.results
         count = self._counted()
         stays = "It may hold results, which are not replaced."
         with suppress(FileNotFoundError, NotADirectoryError):
-            if not resume and any(path.is_file() for path in self.results.rglob("*")):
+            if not resume and any(path.is_file() for path in results.rglob("*")):
                 raise OutputError(
-                    f"The folder {self.results} exists.",
+                    f"The folder {results} exists.",
                     why=stays,
                     cure="Continue them with --resume, or give another folder.",
                 )
-        begun_with = read_batch(self.results).get("shard_size")
+        begun_with = read_batch(results).get("shard_size")
         balanced = min(max(_SMALLEST, -(-count // _SHARDS)), _LARGEST)
         size = self.shard_size or begun_with or balanced
         shards = -(-count // size)
-        numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(self.results)]
+        numbers = [int(path.stem.rpartition("-")[2]) for path in shard_paths(results)]
         if max(numbers, default=0) >= shards:
             raise OutputError(
-                f"{self.results} has shard {max(numbers)}; this batch ends at {shards - 1}.",
+                f"{results} has shard {max(numbers)}; this batch ends at {shards - 1}.",
                 why=stays,
                 cure="Resume with the manifest and the --shard-size that it was begun with.",
             )
         try:
-            (self.results / "shards").mkdir(parents=True, exist_ok=True)
+            (results / "shards").mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(
-                f"The folder {self.results} cannot be made: {error.strerror}.",
+                f"The folder {results} cannot be made: {error.strerror}.",
                 cure="Give a folder in which you may write.",
             ) from error
-        ensure_writable(self.results / "shards" / "proof")
+        ensure_writable(results / "shards" / "proof")
         return replace(self, shard_size=size, count=count)
 
     def _counted(self) -> int:

@@ -93,25 +93,26 @@ class NamedColumns:
 
     def columns(self, wanted: Mapping[str, Wanted]) -> Arrays:
         """Read columns in SI units, NaN where a cell is empty; state source and notes."""
-        for item in wanted.values():  # a wrong unit is refused before the work
+        items = [*wanted.values()]
+        for item in items:  # a wrong unit is refused before the work
             to_si(0.0, item.unit, item.dimension, self.where(item.column))
-        asked = [self._index(item.column) for item in wanted.values()]
+        asked = [self._index(item.column) for item in items]
         self.others = ", ".join(n for i, n in enumerate(self.names) if i not in asked)
         rows = self._expected(len(wanted))
         count = 0
         # Lines may have other ends than were counted; room that stays empty is no memory.
         values = [np.empty(2 * rows + _SPARE) for _ in wanted]
-        parts = self._parts([*wanted.values()])
+        parts = self._parts(items)
         for lines, part in Task("rows", rows).counted(parts, lambda part: len(part[0])):
             self._lines_of.append(lines)
-            for item, column, numbers in zip(wanted.values(), values, part, strict=True):
+            for item, column, numbers in zip(items, values, part, strict=True):
                 if self._sentinels:
                     numbers = np.where(np.isin(numbers, self._sentinels), np.nan, numbers)
                 for i in np.flatnonzero(np.abs(numbers) >= _OVERLOAD):
                     self._reject(f"{numbers[i]:g}".replace("e+", "E"), lines[i], item.column)
                 column[count : count + len(lines)] = numbers
             count += len(lines)
-        self._refuse_wrong([*wanted.values()])
+        self._refuse_wrong(items)
         self._describe(count)
         return {
             name: to_si(values.pop(0)[:count], item.unit, item.dimension, self.where(item.column))
