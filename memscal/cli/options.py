@@ -102,6 +102,7 @@ class Quantity(_Number):
         return f"a number {' and '.join(bounds)}" if bounds else "a finite number"
 
 
+POSITION = Quantity("mm", low=-math.inf)
 NonNegative = partial(Quantity, open_low=False)
 """A quantity that may be zero, such as an uncertainty."""
 

@@ -14,6 +14,7 @@ from memscal.figures.style import (
     COVERAGE_NOTE,
     EXPANDED,
     SCATTER_THRESHOLD,
+    along_radius,
     draw_band,
     draw_measured,
     draw_residual_band,
@@ -222,8 +223,7 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
     axes.plot([], [], color="0.4", marker="|", ms=8, ls="none", label="contact radius")
     if slipping:
         axes.plot([], [], color="0.4", ls="none", label="stick radius", **stick)
-    draw_zero(axes)
-    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the interface (kPa)")
+    along_radius(axes, r, "stress at the interface (kPa)")
     legend_above(axes)
 
 
@@ -235,6 +235,5 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
         axes.plot(r / MM, contact.base_shear(r) / KPA, color=colour, ls="--")
     axes.plot([], [], color="0.4", label=r"normal, $\sigma_{zz}$")
     axes.plot([], [], color="0.4", ls="--", label=r"shear, outward, $\sigma_{rz}$")
-    draw_zero(axes)
-    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="stress at the base (kPa)")
+    along_radius(axes, r, "stress at the base (kPa)")
     legend_above(axes, columns=1)

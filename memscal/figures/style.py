@@ -23,6 +23,7 @@ from memscal.estimation.points import TANGENTIAL
 from memscal.figures import FIGURE_SUFFIXES
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray, Values
+from memscal.model.quantities import MM
 
 
 def channel_indices(data: ApparatusData) -> str:
@@ -204,6 +205,12 @@ def draw_residual_band(axes: Axes) -> None:
 def draw_zero(axes: Axes) -> None:
     """Draw the line of no stress, behind all data."""
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+
+
+def along_radius(axes: Axes, r: FloatArray, ylabel: str) -> None:
+    """Label axes on which curves are drawn up to the last of some radii, in m."""
+    draw_zero(axes)
+    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel=ylabel)
 
 
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:

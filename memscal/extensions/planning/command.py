@@ -12,6 +12,7 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FREE_OR_STUCK,
     PAPER_FILM,
+    POSITION,
     NonNegative,
     Quantity,
     figure_option,
@@ -85,9 +86,7 @@ def _target(value: str) -> tuple[str, float]:
     "sensor."
 )
 @option("--noise-voltage", Quantity("mV"))("The same in mV, in place of --noise.")
-@option("--centre", Quantity("mm", low=-float("inf")), 0.0)(
-    "Expected position of the sensor along the scan, in mm."
-)
+@option("--centre", POSITION, 0.0)("Expected position of the sensor along the scan, in mm.")
 @rod_friction_option(f"{FREE_OR_STUCK} Default: the scan will not state it.")
 @option("--position-scale-uncertainty", NonNegative("percent"))(
     "Standard uncertainty (k = 1) of the stage's scale, in percent."

@@ -10,11 +10,10 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from memscal.errors import InputError
 from memscal.extensions.planning.design import Design, varied_designs
 from memscal.figures.style import (
-    ALONG_RADIUS,
     COLOURS,
     EXPANDED,
+    along_radius,
     draw_band,
-    draw_zero,
     legend_above,
     on_axis,
     panels_of,
@@ -62,8 +61,7 @@ def _draw_radial(axes: Axes, planned: Design) -> None:
     axes.plot(r / MM, g, color=COLOURS["deconvolved"], label="G expected")
     assumed = planned.plan.kernel.radial(r) / PER_MM2
     axes.plot(r / MM, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
-    draw_zero(axes)
-    axes.set(xlim=(0, r[-1] / MM), xlabel=ALONG_RADIUS, ylabel="$G_{zz}$ (1/mm$^2$)")
+    along_radius(axes, r, "$G_{zz}$ (1/mm$^2$)")
     legend_above(axes)
 
 

@@ -16,6 +16,7 @@ from memscal.cli.options import (
     FILE,
     FREE_OR_STUCK,
     PAPER_FILM,
+    POSITION,
     NonNegative,
     Options,
     Quantity,
@@ -49,6 +50,8 @@ FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 _LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
+_POSITIONS = click.IntRange(min=2, max=4096)
+
 _sphere_options = options_of(
     option("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75), multiple=True)(
         "Sphere: load of the lubricated contacts, in N. May be repeated."
@@ -64,7 +67,7 @@ _sphere_options = options_of(
         "Sphere: a point sticks where it first touched, or as if loaded in one step."
     ),
     interface_options,
-    option("--contacts", click.IntRange(min=2, max=4096), 33)("Sphere: contacts in a row."),
+    option("--contacts", _POSITIONS, 33)("Sphere: contacts in a row."),
     option("--spacing", Quantity("mm"), 0.5)("Sphere: distance of neighbouring contacts, in mm."),
     option("--load-scatter", NonNegative("percent", high=10.0), 2.0)(
         "Sphere: standard deviation of each contact's own load, in percent."
@@ -224,7 +227,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
 )
-@option("--points", click.IntRange(min=2, max=4096), 65)("Positions of the rod along each axis.")
+@option("--points", _POSITIONS, 65)("Positions of the rod along each axis.")
 @option("--repeats", click.IntRange(min=1, max=4096), 1)(
     "Repeats at each load; with a sphere, of its contacts."
 )
@@ -232,10 +235,8 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @option("--noise", NonNegative("percent"), 0.5)(
     "Standard deviation of the noise, in percent of the largest signal."
 )
-@option("--centre", Quantity("mm", low=-math.inf), 0.14)(
-    "Position of the sensor along the scan, in mm."
-)
-@option("--centre-y", Quantity("mm", low=-math.inf), 0.0)("Its position across the scan, in mm.")
+@option("--centre", POSITION, 0.14)("Position of the sensor along the scan, in mm.")
+@option("--centre-y", POSITION, 0.0)("Its position across the scan, in mm.")
 @option("--baseline", Quantity("percent", low=-math.inf), 1.0)(
     "Offset of the voltage, in percent of the largest signal."
 )

@@ -539,14 +539,15 @@ def _counted(columns: Columns, others: str) -> list[str]:
     full = number * places.count - x.size
     if number > 1 and full > 0:
         notes.append(f"{full} more would make every repeat complete.")
-    notes += _repeated(columns, places.index, others)
+    notes += _repeated(columns, repeat, places.index, others)
     return notes
 
 
-def _repeated(columns: Columns, place: NDArray[Any], others: str) -> Iterator[str]:
+def _repeated(
+    columns: Columns, line: NDArray[Any], place: NDArray[Any], others: str
+) -> Iterator[str]:
     """Yield a note on positions that were read several times in one line, if there are many."""
     x = columns["x"]
-    line = columns.get("repeat", np.zeros(x.size, dtype=np.intp))
     if "repeat" in columns:
         line = line * 3 + columns.get("branch", 0)
     group = place * (line.max() + 1) + line
