@@ -262,9 +262,11 @@ def read_parameters(file: SafeFile, path: str, reading: Reading) -> ParameterSet
     )
 
 
-def estimated_record(file: SafeFile, path: str) -> Record:
+def estimated_record(file: SafeFile) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
-    return Record("NXcollection", tuple(map(estimated_quantity, text_list(file, f"{path}/names"))))
+    return Record(
+        "NXcollection", tuple(map(estimated_quantity, text_list(file, "/entry/parameters/names")))
+    )
 
 
 def named_collection(children: Mapping[str, Node]) -> Group:

@@ -183,7 +183,7 @@ def _schema(file: SafeFile) -> str:
 
 
 def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
-    yield "/entry/parameters", estimated_record(file, "/entry/parameters")
+    yield "/entry/parameters", estimated_record(file)
     yield from _LAYOUTS[schema].items()
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
@@ -243,7 +243,13 @@ def sensor_of(
     nodes = family.wavenumbers
     known = shared_changes(apparatus, scans, nodes.k)
     shared = {name: change for name, change in known.items() if name in (*family.changes, "load")}
-    shared |= input_changes(apparatus, _one_chain(apparatus, scans), nodes.k)
+    alike = []
+    if all(scan.stage.same_as(apparatus.stage) for scan in scans):
+        alike.append("position_scale")
+    # The sensor is the same, and so is its chain.
+    if all(scan.gain_uncertainty is not None for scan in scans):
+        alike.append("gain")
+    shared |= input_changes(apparatus, alike, nodes.k)
     inputs = [name for name in common if name not in shared]
     calibration = input_changes(apparatus, inputs, nodes.k)
     transfer, changes = sensor_changes(apparatus, nodes.k, [*shared, *calibration])
@@ -260,15 +266,6 @@ def sensor_of(
         changes = changes @ axes[sizes > _NEGLIGIBLE * sizes[0]].T
     constant = apparatus.conversion_constant
     return Sensor(nodes, constant * transfer, changes, constant, family.order, shared)
-
-
-def _one_chain(apparatus: ApparatusFunction, scans: Sequence[MeasuredScan | Scan]) -> Iterator[str]:
-    """Yield what calibration and contacts have in common of the stage and the sensor's chain."""
-    if all(scan.stage.same_as(apparatus.stage) for scan in scans):
-        yield "position_scale"
-    # The sensor is the same, and so is its chain.
-    if all(scan.gain_uncertainty is not None for scan in scans):
-        yield "gain"
 
 
 @array_record

@@ -233,7 +233,7 @@ def _cure(lengths: Lengths, thickness: float) -> str:
     causes = []
     for name, path, scaled, stated in inputs:
         low, high = _usual_factors(lengths, thickness, scaled)
-        if (name == "a rod radius" and not stated) or not 0 < low < high < np.inf:
+        if not 0 < low < high < np.inf:  # so of a rod that is none
             continue
         # Two digits, without a power of ten.
         millimetres = stated * 1e3 or 1.0
