@@ -1,6 +1,6 @@
 """Panels of a calibration's scan: voltages with both reconvolutions, and residuals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import cycle, pairwise
 from typing import Any
@@ -23,7 +23,7 @@ from memscal.figures.style import (
     shades,
 )
 from memscal.model.apparatus import ApparatusData, Reconvolution
-from memscal.model.arrays import ArrayPair, FloatArray
+from memscal.model.arrays import ArrayPair, FloatArray, Values
 from memscal.model.checks import REPEAT_CENTRES
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
@@ -374,7 +374,7 @@ def draw_residuals(axes: Axes, data: ApparatusData, loads: Loads) -> None:
 
 
 def _draw_residual_points(
-    axes: Axes, x: FloatArray, z: FloatArray, name: str, limit: float, look: Mapping[str, Any]
+    axes: Axes, x: FloatArray, z: FloatArray, name: str, limit: float, look: Values
 ) -> None:
     rms = np.sqrt(np.mean(z**2))
     axes.plot(x / MM, z, label=f"{name}: rms {rms:.2f}", **look)

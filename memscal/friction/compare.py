@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import Any
 
 import numpy as np
 
@@ -375,7 +374,7 @@ def _setting(measured: MeasuredStress, cache: CacheFolder, workers: int) -> Valu
 
 
 def _families(
-    setting: Mapping[str, Any],
+    setting: Values,
     friction: Sequence[float] | None,
     loading: str | Sequence[str],
     references: Sequence[StressProfile] | None = None,
@@ -504,7 +503,7 @@ def fit_together(
 def _compared_by_shear(
     measured: MeasuredStress,
     apparatus: ApparatusFunction,
-    setting: Mapping[str, Any],
+    setting: Values,
     friction: Sequence[float] | None,
     loading: str | Sequence[str],
     override: bool,

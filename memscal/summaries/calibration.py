@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from memscal.calibration.calibrate import Calibration
 from memscal.calibration.explanations import DEPARTURE, explanation, misfit
@@ -88,7 +87,7 @@ def answer(result: Calibrated) -> str:
     return f"{law}A = {a}{by} if all is as stated{settled}. {checks}\n{explanation(rows)}"
 
 
-def _explanations(apparatus: ApparatusData) -> Sequence[Mapping[str, Any]]:
+def _explanations(apparatus: ApparatusData) -> Sequence[Values]:
     return list(apparatus.process.configuration.get("explanations", ()))
 
 

@@ -55,7 +55,7 @@ def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) ->
     return held
 
 
-def _value(name: str, holder: object, values: Mapping[str, Any]) -> Any:
+def _value(name: str, holder: object, values: Values) -> Any:
     return values[name] if name in values else getattr(holder, name)
 
 

@@ -2,14 +2,13 @@
 
 import hashlib
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 from memscal.calibration.calibrate import calibrate
 from memscal.errors import InputError, MemscalError, OutputError
@@ -76,7 +75,7 @@ class Batch:
 
     source: Path
     results: Path
-    options: Mapping[str, Any]
+    options: Values
     artifacts: str
     shard_size: int | None = None  # by default from the number of scans
     count: int = 0  # of scans

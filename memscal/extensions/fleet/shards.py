@@ -3,7 +3,7 @@
 import csv
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -228,7 +228,7 @@ def _correlation(covariance: FloatArray) -> FloatArray:
     return np.asarray(correlation[np.triu_indices(u.size, 1)])
 
 
-def write_shard(path: Path, rows: Sequence[Mapping[str, Any]], digest: str) -> None:
+def write_shard(path: Path, rows: Sequence[Values], digest: str) -> None:
     """Write a table whole or not at all; its metadata state the digest of what it is made from."""
     pa = arrow()
     about = {
@@ -274,7 +274,7 @@ def shard_paths(results: Path) -> list[Path]:
     return sorted((results / "shards").glob("shard-*.parquet"))
 
 
-def write_batch(results: Path, stated: Mapping[str, Any]) -> None:
+def write_batch(results: Path, stated: Values) -> None:
     """State what a batch is, for those that continue or summarise it."""
     text = json.dumps({"schema": FLEET_SCHEMA, "version": FLEET_SCHEMA_VERSION, **stated}, indent=2)
     atomic_write_bytes(results / _BATCH, f"{text}\n".encode(), overwrite=True)

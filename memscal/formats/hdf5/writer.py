@@ -128,7 +128,7 @@ def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
 
 
 # Path, value (None for a group) or node, and attributes.
-DigestItem = tuple[str, "np.ndarray[Any, Any] | str | Node | None", Mapping[str, Any]]
+DigestItem = tuple[str, "np.ndarray[Any, Any] | str | Node | None", Values]
 
 
 def content_digest(items: Iterable[DigestItem]) -> str:
