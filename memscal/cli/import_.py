@@ -32,7 +32,7 @@ _POSITION = Quantity("mm", low=-float("inf"))
 _SIGN = click.Choice(["1", "-1"])
 
 
-def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> ImportedProfile:
+def _read_reference(path: Path, mesh: bool, options: common.Options) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load")) | _set_up(options)
     if not mesh:
@@ -360,7 +360,7 @@ def command(
     return DONE
 
 
-def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> None:
+def _check_usage(path: Path, kind: str, mesh: bool, options: common.Options) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
     if kind == "scan" and mesh:
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
@@ -411,7 +411,7 @@ _UNKNOWN = (
 )
 
 
-def _set_up(options: dict[str, Any]) -> dict[str, Any]:
+def _set_up(options: common.Options) -> dict[str, Any]:
     stated: dict[str, Any] = {}
     if _stated(options, [name for name in options if name.startswith((*common.FILM, *common.LAW))]):
         stated["film"] = common.film_from(options, _UNKNOWN)
@@ -420,7 +420,7 @@ def _set_up(options: dict[str, Any]) -> dict[str, Any]:
     return stated
 
 
-def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
+def _read_scan(path: Path, options: common.Options) -> ImportedScan:
     from memscal.formats.tables.scan import import_table
     from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
     from memscal.model.instrument import LoadCell, StressSensor

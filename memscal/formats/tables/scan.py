@@ -20,7 +20,7 @@ from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.sheets import open_table
 from memscal.formats.tables.stated import ScanConditions, ScanUncertainties, TableLayout
 from memscal.formats.units import reading_of, to_si
-from memscal.model.arrays import Columns, frozen_array, keyword_array_record, unmasked
+from memscal.model.arrays import Columns, Values, frozen_array, keyword_array_record, unmasked
 from memscal.model.checks import Message, at_ceiling_text, import_notes, marked_texts
 from memscal.model.holds import Holds
 from memscal.model.indenter import Rod, RoundIndenter
@@ -243,11 +243,11 @@ def scan_of_arrays(x: ArrayLike, u: ArrayLike, **options: Any) -> ImportedScan:
     options = {"x_unit": "m", "u_unit": "V", **options}
     if "time" in given:
         options.setdefault("time_unit", "s")
-    records: dict[str, Any] = {}
+    records: Values = {}
     for name, record in _RECORDS.items():
         stated = options.keys() & {item.name for item in fields(record)}
         records[name] = record(**{field: options.pop(field) for field in stated})
-    named: dict[str, Any] = {name: name for name in table}
+    named: Values = {name: name for name in table}
     return import_table(table, **named, **records, **options)
 
 
@@ -373,7 +373,7 @@ def _scan_of(
     holds: Holds | None,
 ) -> ImportedScan:
     """Return the scan of columns without gaps in their positions, and add to the notes."""
-    stated: dict[str, Any] = {**vars(conditions), **vars(uncertainties)}
+    stated: Values = {**vars(conditions), **vars(uncertainties)}
     del stated["noise"]  # that of each reading is a column
     load_scatter = stated.pop("load_scatter")
     x_error = stated.pop("x_error")
@@ -399,7 +399,7 @@ def _scan_of(
         columns["normal_load_errors"] = load_scatter * columns["normal_load"]
     if x_error is not None:
         columns["x_errors"] = np.full(columns["x"].size, x_error)
-    arrays: dict[str, Any] = dict(columns)
+    arrays: Values = dict(columns)
     return ImportedScan(
         **arrays,
         **stated,
