@@ -2,7 +2,6 @@
 
 import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,15 +21,6 @@ SCALE = {
 WAVE = {"unit_string": "mV", "wf_increment": 0.02}
 
 
-def write(u: dict[str, Any], x: dict[str, Any]) -> bytes:
-    """Write x, and x once more as the readings, with their properties, in two segments."""
-    held = [ChannelObject("A/b", "x", X, {"unit_string": "mm", **x})]
-    with TdmsWriter("a.tdms") as writer:
-        for _ in range(2):
-            writer.write_segment([*held, ChannelObject("A/b", "u", X, u)])
-    return Path("a.tdms").read_bytes()
-
-
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     ("u", "x", "scale", "why"),
@@ -44,25 +34,22 @@ def write(u: dict[str, Any], x: dict[str, Any]) -> bytes:
         (SCALE | {"NI_Number_Of_Scales": 10**9}, {}, 1, "scales"),
     ],
 )
-def test_units_times_and_scales_of_the_properties_count(u, x, scale, why):
-    write(u, x)
-    if why:
+def test_what_the_properties_state_counts_and_a_file_that_is_not_whole_is_refused(u, x, scale, why):
+    with TdmsWriter("a.tdms") as writer:
+        for name, stated in (("x", {"unit_string": "mm", **x}), ("u", u)) * 2:
+            writer.write_segment([ChannelObject("A/b", name, X, stated)])
+    data = Path("a.tdms").read_bytes()
+    if not why:
+        found = import_table("a.tdms", x="A/b/x", u="A/b/u")
+        np.testing.assert_allclose([found.x, found.u_zz], np.outer([1e-3, scale], np.tile(X, 2)))
+        if u is WAVE:
+            np.testing.assert_allclose(found.time, 0.02 * np.arange(26))
+        claims = [data.replace(b"\x0d" + bytes(7), struct.pack("<Q", n)) for n in (2**62, 999, 14)]
+        many = b"TDSm" + bytes(8) + struct.pack("<QQ", 10**4, 10**4) + bytes(10**4)
+        for wrong in [*claims, many * 999, data[:-1], data[:-130], data + b"TDSm"]:
+            Path("a.tdms").write_bytes(wrong)
+            with pytest.raises(MemscalError, match=r"TDMS|does not end|values"):
+                import_table("a.tdms", x="A/b/x", u="A/b/u")
+    else:
         with pytest.raises(MemscalError, match=why):
-            import_table("a.tdms", x="A/b/x", u="A/b/u")
-        return
-    found = import_table("a.tdms", x="A/b/x", u="A/b/u")
-    np.testing.assert_allclose([found.x, found.u_zz], np.outer([1e-3, scale], np.tile(X, 2)))
-    if u is WAVE:
-        np.testing.assert_allclose(found.time, 0.02 * np.arange(26))
-
-
-@pytest.mark.usefixtures("folder")
-def test_a_file_that_is_cut_short_or_claims_too_much_is_refused():
-    data = write(WAVE, {})
-    altered = [data[:n] for n in range(4, len(data), 7) if n != data.rindex(b"TDSm")]
-    altered += [data.replace(b"\x0d" + bytes(7), struct.pack("<Q", n)) for n in (2**62, 999, 14)]
-    many = b"TDSm" + bytes(8) + struct.pack("<QQ", 10**4, 10**4) + bytes(10**4)
-    for wrong in [*altered, many * 999, data.replace(b"A/b", b"A\xffb")]:
-        Path("a.tdms").write_bytes(wrong)
-        with pytest.raises(MemscalError, match=r"TDMS|does not end|values"):
             import_table("a.tdms", x="A/b/x", u="A/b/u")
