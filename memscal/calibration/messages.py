@@ -20,6 +20,8 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
+#: An uncertainty is mostly of the form of G where that exceeds what is by chance so many times.
+_MOSTLY = 2.0
 #: Lines of the budget that count what is not stated.
 _LINES = {
     "baseline_curvature": "baseline_curvature",
@@ -83,7 +85,7 @@ def calibration_messages(
     messages += point_messages(estimate)
     if estimate.points.u_errors is None:
         messages.append(_noise(estimate, results))
-    messages += _method(solution)
+    messages += _method(solution) + _form_of_g(results)
     form = stress.form
     if form is not None:
         text = (
@@ -144,6 +146,26 @@ def _method(solution: Solution) -> list[Message]:
         how += f"{draw_count(solution)} draws of the voltages"
         how += " and of its own random numbers" if hasattr(method, "seed") else ""
     return [Message("method", f"Method {method.name}: {how}. {method.fails}")]
+
+
+def _form_of_g(results: Results) -> list[Message]:
+    """Return what of an uncertainty is by the prior of the form of G, which like scans share."""
+    parts = []
+    for name, words in (("conversion_constant", "A"), ("fwhm", "the full width")):
+        budget = results.budget[name]
+        form = np.hypot(budget["regularisation"], budget["window"])
+        chance = np.hypot(budget["noise"], budget["baseline_curvature"])
+        if form > _MOSTLY * chance:
+            value = results.parameters[name]
+            parts.append(f"{form / value:.1%} of {words} (by chance: {chance / value:.1%})")
+    if not parts:
+        return []
+    text = (
+        f"What form G may have, where noise or film hide it, makes {' and '.join(parts)}: lines "
+        "regularisation and window of the budget. It is of a prior in which no sensor is exactly a "
+        "Gaussian. Halves of a scan, and scans like it, share it: they agree better than that."
+    )
+    return [Message("form_of_g", text)]
 
 
 def _law(solution: Solution, results: Results) -> list[Message]:
