@@ -8,9 +8,17 @@ from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import j0, j1
+from scipy.special import j0
 
-from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline, ring_areas
+from memscal.axisymmetry.grids import Lattice
+from memscal.axisymmetry.hankel import (
+    ACROSS,
+    RadialSpectrum,
+    Wavenumbers,
+    hankel_transform,
+    radial_spline,
+    ring_areas,
+)
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.extensions import hook
@@ -25,6 +33,7 @@ from memscal.model.arrays import (
 )
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Result
+from memscal.model.stress import IdealReference
 
 #: A base stress reaches no farther than this, in m; a larger radius is in another unit.
 _LARGEST_RADIUS = 1.0
@@ -35,6 +44,10 @@ _FEWEST_RADII = 4
 _ROUND = 1e-4
 #: Positions of a field are even to this share of their step.
 _UNEVEN = 1e-3
+#: An ideal reference is sampled at so many points for each width of G.
+_PER_WIDTH = 8
+#: Principal errors of G(r) below this share of the largest variance are left out over the plane.
+_NEGLIGIBLE = 1e-5
 
 
 @keyword_array_record
@@ -86,7 +99,7 @@ class ApparatusFunction(Result, ApparatusData):
         return self._at(self.radial_profile.g_errors, r)
 
     def convolve(
-        self, r: ArrayLike, sigma_zz: ArrayLike, *, y: ArrayLike | None = None
+        self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference, *, y: ArrayLike | None = None
     ) -> FloatArray:
         r"""Return :math:`G \otimes \sigma_{zz}`: a stress field as the sensor blurs it.
 
@@ -94,8 +107,9 @@ class ApparatusFunction(Result, ApparatusData):
         ----------
         r : array_like, shape (n,)
             Increasing radii of the base stress, in m, from the axis to where it has decayed.
-        sigma_zz : array_like, shape (n,)
-            Normal stress at the base, in Pa; of a tangential channel the radial shear.
+        sigma_zz : array_like, shape (n,), or IdealReference
+            Normal stress at the base, in Pa; of a tangential channel the radial shear.  Of an
+            ideal reference ``r`` (and ``y``) are any positions about its middle.
         y : array_like, shape (m,), optional
             With it ``sigma_zz`` is any field (m, n), on even positions ``y`` and ``x = r``, in m,
             and G is that over the plane: what a point sensor would measure with the indenter at
@@ -122,24 +136,35 @@ class ApparatusFunction(Result, ApparatusData):
         True
         """
         if y is not None:
-            return self._convolved_field(r, y, sigma_zz)
-        radii, wavenumbers, transform = self._checked(r, sigma_zz)
+            return self._convolved_field(r, y, sigma_zz, self.field)
+        radii, spectrum = self._checked(r, sigma_zz)
         profile = self.radial_profile
-        kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
-        return wavenumbers.synthesise(kernel * transform, radii, order=self.order)
+        kernel = hankel_transform(profile.r, profile.g, spectrum.wavenumbers.k)
+        return replace(spectrum, values=kernel * spectrum.values).at(radii)
 
     def predict(
-        self, r: ArrayLike, sigma_zz: ArrayLike, *, y: ArrayLike | None = None
+        self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference, *, y: ArrayLike | None = None
     ) -> FloatArray:
         r"""Return the reading :math:`A\,G \otimes \sigma_{zz}` of a base stress, in its unit (V).
 
         Of a relative A the stress is in units of the largest of its reference, not in Pa.
 
         Parameters and errors are those of :meth:`convolve`.
+
+        Examples
+        --------
+        >>> import memscal, numpy as np
+        >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+        >>> x = np.linspace(-5e-3, 5e-3, 101)
+        >>> disc = memscal.IdealReference("disc", 1e-3)  # one unit within a radius of 1 mm
+        >>> apparatus.predict(x, disc).shape, apparatus.predict(x, disc, y=x[:51]).shape
+        ((101,), (51, 101))
         """
         return self.conversion_constant * self.convolve(r, sigma_zz, y=y)
 
-    def convolve_uncertainty(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+    def convolve_uncertainty(
+        self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference
+    ) -> FloatArray:
         r"""Return the standard uncertainty of :meth:`convolve` that G brings, in Pa.
 
         :math:`\sqrt{K C K^T}` for the operator :math:`K` that takes G(r) to the blurred stress, and
@@ -150,20 +175,41 @@ class ApparatusFunction(Result, ApparatusData):
         variance = np.einsum("ij,jk,ik->i", operator, self.radial_profile.g_covariance, operator)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
-    def predict_uncertainty(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+    def predict_uncertainty(
+        self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference, *, y: ArrayLike | None = None
+    ) -> FloatArray:
         r"""Return the standard uncertainty of :meth:`predict` that A and G bring, in its unit.
 
         The errors of A and G are correlated: a profile that is too narrow has too small a tail,
         and with it too small an A.  Artifacts that do not state the correlation count none.
+        Over the plane (``y``) what ``field`` states beyond the profile's errors is taken as
+        independent between places that the scan resolves.
+
+        Examples
+        --------
+        >>> import memscal, numpy as np
+        >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+        >>> x = np.linspace(-5e-3, 5e-3, 101)
+        >>> stress = 1e3 * np.exp(-np.hypot.outer(x, x) ** 2 / 1e-6)
+        >>> apparatus.predict_uncertainty(x, stress, y=x).shape
+        (101, 101)
         """
-        operator, blurred = self._operator(r, sigma_zz)
         profile = self.radial_profile
         a = self.conversion_constant
         u_a = self.parameters.uncertainty("conversion_constant")
-        variance = (a * self.convolve_uncertainty(r, sigma_zz)) ** 2 + (blurred * u_a) ** 2
+        shared = np.zeros_like(profile.g)
         if profile.conversion_correlation is not None:
-            shared = operator @ (profile.conversion_correlation * profile.g_errors)
-            variance += 2 * a * blurred * u_a * shared
+            shared = profile.conversion_correlation * profile.g_errors
+        if y is None:
+            operator, blurred = self._operator(r, sigma_zz)
+            of_g = self.convolve_uncertainty(r, sigma_zz) ** 2
+            with_a = operator @ shared
+        else:
+            blurred = self.convolve(r, sigma_zz, y=y)
+            of_g = self._field_variance(r, y, sigma_zz)
+            lifted = ApparatusField.of_profile(replace(profile, g=shared))
+            with_a = self._convolved_field(r, y, sigma_zz, lifted)
+        variance = a**2 * of_g + (blurred * u_a) ** 2 + 2 * a * blurred * u_a * with_a
         return np.sqrt(np.maximum(variance, 0.0))
 
     def stress_uncertainty(self, u_zz: ArrayLike) -> FloatArray:
@@ -210,19 +256,47 @@ class ApparatusFunction(Result, ApparatusData):
         """
         hook("write_artifact")(self, path, overwrite=overwrite)
 
-    def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> ArrayPair:
+    def _operator(self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference) -> ArrayPair:
         """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""
-        radii, wavenumbers, transform = self._checked(r, sigma_zz)
+        radii, spectrum = self._checked(r, sigma_zz)
         profile = self.radial_profile
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
-        kernel = j0(np.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
-        bessel = j1 if self.order else j0
-        field = wavenumbers.weights * transform
-        operator = (bessel(np.outer(radii, wavenumbers.k)) * field) @ kernel
+        kernel = j0(np.outer(spectrum.wavenumbers.k, profile.r)) * ring_areas(profile.r)
+        operator = replace(spectrum, values=spectrum.values[:, None] * kernel).at(radii)
         return operator, operator @ profile.g
 
-    def _convolved_field(self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
-        """Convolve a field with G over the plane, on the field's own lattice."""
+    def _field_variance(
+        self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike | IdealReference
+    ) -> FloatArray:
+        """Variance of a convolved field that G brings: by the profile, and by what is not round."""
+        profile = self.radial_profile
+        g = self.field
+        values, vectors = np.linalg.eigh(profile.g_covariance)
+        kept = values > _NEGLIGIBLE * values[-1]
+        total = np.zeros((np.size(y), np.size(x)))
+        for column in (vectors[:, kept] * np.sqrt(values[kept])).T:
+            lifted = ApparatusField.of_profile(replace(profile, g=column))
+            total += self._convolved_field(x, y, sigma_zz, lifted) ** 2
+        round_errors = np.interp(np.hypot.outer(g.y, g.x), profile.r, profile.g_errors)
+        rest = np.maximum(g.g_errors**2 - round_errors**2, 0.0)
+        # Of independent patches each adds its variance, times its area and its stress, twice.
+        patch = 4 * np.pi / self.resolved_wavenumber**2
+        if isinstance(sigma_zz, IdealReference):
+            force = float(sigma_zz.transform(np.zeros(1))[0])
+            area = {"disc": force, "gaussian": 2 * force}.get(sigma_zz.shape, 0.0)
+        else:
+            stress = np.abs(floats(sigma_zz))
+            force = float(stress.sum() * np.ptp(x) * np.ptp(y) / stress.size)
+            area = force * float(stress.sum() / (stress**2).sum())
+            sigma_zz = stress
+        spread = force * patch / (patch + area)
+        varied = self._convolved_field(x, y, sigma_zz, replace(g, g=rest))
+        return total + spread * np.maximum(varied, 0.0)
+
+    def _convolved_field(
+        self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike | IdealReference, g: ApparatusField
+    ) -> FloatArray:
+        """Convolve a field with a kernel over the plane, on the field's own lattice."""
         from scipy.interpolate import RectBivariateSpline
         from scipy.signal import fftconvolve
 
@@ -231,8 +305,22 @@ class ApparatusFunction(Result, ApparatusData):
                 f"Channel {self.sensor.channel} measures a component of a vector field.",
                 cure="Give the radial profile of the shear, without y.",
             )
+        if isinstance(sigma_zz, IdealReference):
+            if sigma_zz.shape == "slit":
+                raise InputError(
+                    "A slit is the same along itself.",
+                    cure="Give positions across it, without y.",
+                )
+            size = max(np.abs(x).max(), np.abs(y).max(), 8 * sigma_zz.size)
+            step = self.gaussian_sigma / _PER_WIDTH
+            reach = int(np.ceil((size + np.abs(g.x).max()) / step))
+            axis = floats(step * np.arange(-reach, reach + 1))
+            source = Lattice(axis, axis).sampled(
+                lambda ky, kx: sigma_zz.transform(np.hypot.outer(ky, kx))
+            )
+            blurred = self._convolved_field(axis, axis, source, g)
+            return RectBivariateSpline(axis, axis, blurred)(floats(y), floats(x))
         stress = floats(sigma_zz)
-        g = self.field
         offsets = []
         if stress.ndim != 2 or not np.isfinite(stress).all():
             raise InputError(
@@ -299,10 +387,15 @@ class ApparatusFunction(Result, ApparatusData):
         return np.where(radii <= support[-1], spline(np.minimum(radii, support[-1])), 0.0)
 
     def _checked(
-        self, r: ArrayLike, sigma_zz: ArrayLike
-    ) -> tuple[FloatArray, Wavenumbers, FloatArray]:
-        """Return radii, wavenumbers and the transform of a stress with which G can be convolved."""
+        self, r: ArrayLike, sigma_zz: ArrayLike | IdealReference
+    ) -> tuple[FloatArray, RadialSpectrum]:
+        """Return radii and the transform of a stress with which G can be convolved."""
         radii = finite_vector("r", r)
+        if isinstance(sigma_zz, IdealReference):
+            radii = np.abs(radii)
+            nodes = self._nodes(float(radii.max()))
+            order = ACROSS if sigma_zz.shape == "slit" else 0
+            return radii, RadialSpectrum(nodes, sigma_zz.transform(nodes.k), order)
         stress = finite_vector("sigma_zz", sigma_zz)
         if radii.shape != stress.shape:
             raise InputError(f"There are {stress.size} stresses for {radii.size} radii.")
@@ -325,11 +418,14 @@ class ApparatusFunction(Result, ApparatusData):
         self._require_fine(coarse)
         end = f"the end of the table, r = {radii[-1] * 1e3:.4g} mm"
         self._require_decayed(float(abs(stress[-1])), peak, end)
-        # G is zero beyond the last wavenumber of its grid.
-        reach = radii[-1] + self.radial_profile.r[-1]
-        wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
-        transform = hankel_transform(radii, stress, wavenumbers.k, order=self.order)
-        return radii, wavenumbers, transform
+        nodes = self._nodes(float(radii[-1]))
+        values = hankel_transform(radii, stress, nodes.k, order=self.order)
+        return radii, RadialSpectrum(nodes, values, self.order)
+
+    def _nodes(self, reach: float) -> Wavenumbers:
+        """Nodes for a stress out to ``reach`` (m): G is zero beyond the last one of its grid."""
+        last = float(self.transfer.k[-1])
+        return Wavenumbers.covering(last, reach + float(self.radial_profile.r[-1]))
 
 
 def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -> ApparatusFunction:

@@ -86,6 +86,10 @@ class EvenGrid:
         line = (2 * spectrum.sum(axis=0) - spectrum[0] - spectrum[-1]) / (2 * (self.count - 1))
         return scipy.fft.idct(line[None], type=1) / self.cell_area
 
+    def filtered(self, field: FloatArray, factor: FloatArray) -> FloatArray:
+        """Multiply the transform of a field by a real factor."""
+        return self.inverse(self.forward(field) * factor)
+
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve two even fields."""
         return self.inverse(self.forward(kernel) * self.forward(field))
@@ -199,6 +203,10 @@ class Lattice:
         """Return wavenumbers along x and the Fourier transform about the central point there."""
         line = scipy.fft.rfft(scipy.fft.ifftshift(field.sum(axis=0)))
         return self.wavenumber_axis, line * self.cell_area
+
+    def filtered(self, field: FloatArray, factor: FloatArray) -> FloatArray:
+        """Multiply the transform of a field by a real factor."""
+        return scipy.fft.irfft2(scipy.fft.rfft2(field) * factor, s=field.shape)
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a kernel centred on the central point with a field of the lattice."""

@@ -8,6 +8,7 @@ from scipy.special import chdtrc, fdtri, logsumexp
 
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.calibration.fields import RasterFields
 from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import DivisionMap, Results, route_difference, slow_noise_text
 from memscal.estimation import model_tests
@@ -54,6 +55,11 @@ _BEYOND = 1.5
 _OFFSET = 0.02
 _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
+#: A lobe of G counts beyond so many standard uncertainties, and from this share of its largest.
+_SURE = 4.0
+_LOBE = 0.05
+#: Degrees of freedom of a noise that is stated.
+_WELL_KNOWN = 1e9
 
 
 def quality_checks(
@@ -70,6 +76,7 @@ def quality_checks(
         _constraint(solution),
         *_agreement(solution, results, division),
         *_shape(solution, results.parameters),
+        *_field_shape(solution, results),
         *_set_up(solution),
         _indentation(solution, results, assumed),
     ]
@@ -213,6 +220,41 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
         check("shape_negative", negative, 0.4, ripples),
         check("shape_roughness", rough, 0.1, noise),
     ]
+
+
+def _field_shape(solution: Solution, results: Results) -> list[QualityCheck]:
+    """Look over the plane, of a raster, for lobes of G and for residuals that are no noise."""
+    fields = solution.fields
+    estimate = solution.estimate
+    points = estimate.points
+    if not isinstance(fields, RasterFields) or not fields.index[0].size:
+        return []
+    g = solution.deconvolution.g.image
+    checks = []
+    if results.field_errors is not None:
+        # Farther out G is tapered to zero.
+        inside = solution.deconvolution.g.grid.radius < fields.support / 2
+        lobe = float(np.max((-g - _SURE * results.field_errors[1])[inside]) / g.max())
+        meaning = (
+            f"Depth of the deepest lobe of G over the plane beyond {_SURE:g} standard "
+            "uncertainties, over the largest G. A failure means that G has ripples that its "
+            "uncertainty does not count: look at the field of G, and take method bayesian."
+        )
+        checks.append(check("field_lobes", max(lobe, 0.0), _LOBE, meaning))
+    weight = estimate.outlier_weight
+    left = weight * (points.u - estimate.predicted)
+    noise = solution.band.excess * weight**0.5 * estimate.noise
+    degrees = estimate.raster_noise.degrees if estimate.raster_noise else _WELL_KNOWN
+    worst = unexplained.ring_test(left, noise, fields.index, degrees)
+    meaning = (
+        "Power of the Bayesian fit's residuals over the plane in one ring of wavenumbers, over "
+        "that of the noise: the ring where chance makes it least likely. A failure means that the "
+        "form of G leaves a structure of the scan, and that the baseline, with it A, is drawn "
+        "along: a sensor or reference of another form, or an error that neighbours share. Look "
+        "at the map of the residuals."
+    )
+    checks.append(_tested("field_residuals", worst, meaning))
+    return checks
 
 
 def _set_up(solution: Solution) -> list[QualityCheck]:

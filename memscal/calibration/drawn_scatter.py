@@ -17,7 +17,7 @@ from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import DrawnScatter, read_off
 from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw, Wiener
 from memscal.errors import FitError
-from memscal.estimation.band import find_band
+from memscal.estimation.band import beyond_zeros, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.smoothing import smooth_profile
@@ -104,6 +104,7 @@ def _divided(
     sigma = estimate.gaussian.sigma + float((gain[1:2] @ error)[0])
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
+    band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)
     drawn = deconvolve(estimate, band, fields, method)
     k, spectrum = fields.grid.axis_transfer(drawn.quotient.values)
     wavenumbers = solution.fields.grid.wavenumber_axis

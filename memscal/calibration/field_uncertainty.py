@@ -67,6 +67,7 @@ def field_errors(
     at_nodes[np.hypot.outer(y, x) >= fields.support] = 0.0
     variances_of = _division_variances if deconvolution.divided else _posterior_variances
     variances = variances_of(solution, deconvolution, (x, y), at_nodes.ravel(), inputs)
+    variances[0] *= solution.band.excess**2
     errors = np.sqrt(np.maximum(np.cumsum(variances, axis=0), 0.0))
     planes = [RectBivariateSpline(y, x, e.reshape(y.size, x.size))(g.y, g.x) for e in errors]
     return np.maximum.accumulate(np.maximum(planes, 0.0))

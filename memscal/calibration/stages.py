@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import j1
 
 from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum
+from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
@@ -22,7 +23,7 @@ from memscal.deconvolution.fourier_ratio import Field, Quotient
 from memscal.deconvolution.widths import fit_gaussian
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation import points
-from memscal.estimation.band import Band, find_band
+from memscal.estimation.band import Band, beyond_zeros, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.model_tests import CentresApart, repeat_centres_test
 from memscal.estimation.points import ScanPoints
@@ -91,6 +92,7 @@ def solved(
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
+    band = beyond_zeros(band, estimate, fields.grid.wavenumber, fields.voltage.transform)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
     return Solution(*steps, deconvolve(estimate, band, fields, method), gaussian)
@@ -156,7 +158,11 @@ def deconvolve(
         quotient = Quotient(fields.grid, fields.kernel(posterior.radial), window)
     else:
         weakest = (band.weakest_reference, band.weakest_voltage)
-        quotient = fourier_ratio.divide(fields.voltage, stress, weakest=weakest, method=method)
+        both = [fields.voltage, stress]
+        if band.blur:
+            factor = gaussian_transfer(stress.grid.wavenumber, band.blur)
+            both = [replace(f, values=f.grid.filtered(f.values, factor)) for f in both]
+        quotient = fourier_ratio.divide(*both, weakest=weakest, method=method)
     quotient = replace(quotient, values=quotient.values * fields.confinement)
     # Eq. 3: A, and G of unit integral.
     a, g = fourier_ratio.normalise(fields.on_support(quotient.values, posterior))

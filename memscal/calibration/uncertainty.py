@@ -276,7 +276,7 @@ def propagate(
     by_voltage = derivatives.by_voltage
     curvatures = [names.index(CURVATURE + _suffix(i)) for i in estimate.points.curved]
     columns = {
-        "noise": estimate.scattered(by_voltage),
+        "noise": solution.band.excess * estimate.scattered(by_voltage),
         "regularisation": derivatives.by_state @ estimate.hidden_root,
         "window": derivatives.hidden,
         CURVATURE: estimate.curved(by_voltage, curvatures),

@@ -3,6 +3,10 @@
 Components are relevant to a division while the transform of the profile stands above its noise.
 G is resolved while the posterior standard uncertainty of its transfer function stays below a third
 of the fitted Gaussian's, which has no zeros and no lobes.
+
+The transform of a disc, a slit or a beam has zeros, and comes back beyond them.  There the voltage
+is zero, too, whatever G is: what it has at the first zero is misfit.  Beyond, components are
+relevant while the voltage stands above that in the power of all directions, not in their mean.
 """
 
 import numpy as np
@@ -19,6 +23,11 @@ RELEVANT = 15.0
 RELEVANT_OF_RASTER = 5.0
 #: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.
 RESOLVED = 3.0
+#: A division opens again where a reference comes back to this share of the weakest component.
+_OPEN = 0.1
+#: Where the voltage is so many times what is not explained, the reference is blurred to fall off.
+_SEEN = 2.0
+_DIRECTIONS = 24
 
 
 @array_record
@@ -33,12 +42,17 @@ class Band:
     resolved: float  # up to it the uncertainty is less than a third of the Gaussian
     weakest_voltage: float  # moduli of both fields' transforms at the relevant wavenumber
     weakest_reference: float
+    # Width (m) of the Gaussian that both fields are blurred with before they are divided: such as
+    # makes the reference fall off as the voltage does where its transform comes back.
+    blur: float = 0.0
+    # What is not explained where a reference vanishes, over the noise, if that is less.
+    excess: float = 1.0
 
 
 def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Band:
     """Find the band of a scan, of a tangential channel (nothing to divide) by its estimate."""
     k = estimate.model.k
-    reference = np.abs(estimate.model.reference.values)
+    reference = envelope(estimate.model.reference.values)
     error = np.maximum(transfer_uncertainty(estimate), TINY)
     clear = RELEVANT
     signal = np.abs((smoothed or estimate).spectrum.values)
@@ -62,6 +76,52 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
     weakest = (float(np.interp(relevant, k, modulus)) for modulus in (signal, reference))
     return Band(k, signal, noise, relevant, resolved, *weakest)
+
+
+def beyond_zeros(
+    band: Band, estimate: ProfileEstimate, wavenumber: FloatArray, voltage: FloatArray
+) -> Band:
+    """Find the band of a raster of a reference with zeros, of whose voltage the transform is."""
+    k = band.k
+    reference = estimate.model.reference.values
+    largest = envelope(reference)
+    turns = np.flatnonzero(reference[1:] * reference[:-1] < 0)
+    opens_again = largest[turns + 1] > _OPEN * band.weakest_reference
+    if not (estimate.points.as_raster and opens_again.any()):
+        return band
+    pair = slice(turns[0], turns[0] + 2)
+    order = np.argsort(reference[pair])
+    zero = float(np.interp(0.0, reference[pair][order], k[pair][order]))
+    excess = max(_residual_at(estimate, zero) / float(band.noise[0]), 1.0)
+    noise = excess * band.noise
+    # The mean of two lobes over all directions is smaller than either: their power is not.
+    width = wavenumber[0, 1]
+    ring = np.rint(wavenumber / width).astype(np.intp).ravel()
+    power = np.bincount(ring, np.abs(voltage.ravel()) ** 2) / np.bincount(ring)
+    signal = np.interp(k, width * np.arange(power.size), np.sqrt(power))
+    relevant = min(_falls_below(k, signal / noise, _SEEN), np.pi / estimate.points.step)
+    last = float(np.interp(relevant, k, noise))
+    weakest = last / estimate.conversion_constant
+    share = min(_SEEN * weakest / float(np.interp(relevant, k, largest)), 1.0)
+    blur = float(np.sqrt(-2 * np.log(share))) / relevant
+    weakest *= RELEVANT_OF_RASTER
+    last *= RELEVANT_OF_RASTER
+    return Band(k, signal, noise, relevant, band.resolved, last, weakest, blur, excess)
+
+
+def envelope(reference: FloatArray) -> FloatArray:
+    """Largest modulus of a transform from each wavenumber on: it falls, and has no zeros."""
+    return np.maximum.accumulate(np.abs(reference)[::-1])[::-1]
+
+
+def _residual_at(estimate: ProfileEstimate, k: float) -> float:
+    """Root mean square over directions of the residuals' transform at a wavenumber, V m^2/N."""
+    points = estimate.points
+    share = points.cell / points.place_numbers("readings") * estimate.outlier_weight / points.load
+    angle = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    along = np.outer(points.x, np.cos(angle)) + np.outer(points.y, np.sin(angle))
+    sums = (share * (points.u - estimate.predicted)) @ np.exp(-1j * k * along)
+    return float(np.sqrt(np.mean(np.abs(sums) ** 2)))
 
 
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:

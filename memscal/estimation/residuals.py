@@ -99,6 +99,8 @@ _LEAST_SKEWNESS = 1e-3
 _APART = 1e-6
 #: A step of which less is left, squared, is not tested.
 _LEAST_STEP = 0.1
+#: Power in a ring of wavenumbers that differs from the noise's by too little to matter.
+_NEGLIGIBLE = 1.2
 #: With fewer independent residuals there is nothing to test.
 FEWEST_RESIDUALS = 3
 
@@ -190,6 +192,27 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     value = misfit / degrees / (pure / pure_degrees)
     limit = float(fdtri(degrees, pure_degrees, 1 - FALSE_ALARM))
     return TestOutcome(value, limit, float(fdtrc(degrees, pure_degrees, value)))
+
+
+def ring_test(
+    left: FloatArray, noise: FloatArray, index: tuple[IndexArray, IndexArray], rest: float
+) -> TestOutcome:
+    """Test a raster's residuals (n,) in rings of wavenumbers against noise known by ``rest``."""
+    # In a ring of n components the power is chi-square of n degrees, F where the noise is
+    # estimated; the least likely of several rings by Bonferroni.
+    plane = np.zeros([int(np.ptp(i)) + 1 for i in index])
+    np.add.at(plane, tuple(i - i.min() for i in index), left)
+    power = np.abs(np.fft.fft2(plane)) ** 2 / (noise @ noise)
+    cycles = [np.fft.fftfreq(count) * max(plane.shape) for count in plane.shape]
+    ring = np.rint(np.hypot.outer(*cycles)).astype(np.intp).ravel()
+    count = np.bincount(ring)
+    ratio = np.bincount(ring, power.ravel()) / count / _NEGLIGIBLE
+    share = FALSE_ALARM / count.size
+    p_values = fdtrc(count, rest, ratio)
+    limits = fdtri(count, rest, 1 - share)
+    worst = int(np.argmax(ratio / limits))
+    p_value = min(count.size * float(p_values[worst]), 1.0)
+    return TestOutcome(float(ratio[worst]), float(limits[worst]), p_value)
 
 
 def steps_test(residuals: Residuals) -> TestOutcome:

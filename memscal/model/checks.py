@@ -26,7 +26,7 @@ OVERRIDE = "override"
 
 _EXPLAINED = """\
 reconvolution: scan against G convolved with the reference, or the restored stress blurred
-    the result misses something: if chi_square passes, calibrate by method bayesian
+    the result misses something: if chi_square passes, use bayesian
 constraint: rise of chi-square by --option nonnegative=true or monotone=true
     the scan contradicts the constraint: leave it out
 gaussian_misfit: scan against the best Gaussian convolved with the reference
@@ -41,6 +41,10 @@ shape_negative: share of the integral of abs(G) where G is negative
     G consists of ripples: use white-noise or bayesian
 shape_roughness: share of the power of G beyond 1.5 times the wavenumbers that the scan determines
     the detail of G is noise: use white-noise or bayesian
+field_lobes: deepest lobe of G over the plane beyond 4 u (rasters)
+    ripples that no uncertainty counts: use bayesian
+field_residuals: residuals over the plane against the noise, by wavenumber (rasters)
+    look at the map of the residuals
 width_over_thickness: width of G over the film's thickness
     check the units of positions and thickness
 resolved_band: the Gaussian's transfer function at the end of the resolved band
@@ -54,23 +58,23 @@ baseline_curvature: fitted curvature of the baseline over what its prior and noi
 reference_force: total force of the reference against its load
     check the reference's load and the reach of its table
 indentation: what a neo-Hookean film would change of A or of the width, over its uncertainty
-    give the film's law (--film-law), leave it out, or calibrate at a lighter load
+    give the film's law (--film-law) or none, or lighten the load
 outliers: share of points with less than half of their weight
     find out what disturbs these points
 saturation: number of points at a ceiling near the largest voltage (not of a shear)
-    lower gain or load, scan again; the check names the points
+    lower gain or load at the points that it names
 noise_as_stated: scatter over the stated noise
     look for noise of position and load; state the actual noise
 chi_square: residuals that no radial G, or no radial stress, explains, against the noise
-    check the reference (rod, film), baseline and stated noise; whether a contact is round
+    check reference (rod, film), baseline, stated noise, roundness of a contact
 residual_steps: largest step of the residuals, in standard deviations
-    look for a step or bend of the baseline, a wrong reference, slow noise
+    a baseline that steps or bends, a wrong reference, slow noise
 residual_correlation: correlation of neighbouring residuals
     as residual_steps; or state u_zz_correlation
 gaussian_evidence: logarithm of the Bayes factor for a departure of G from a Gaussian
     as gaussian_misfit
 symmetry: difference of left and right (lines); even part of a shear
-    look for a tilted rod, uneven film, drifting load or lag
+    a tilted rod, uneven film, drifting load or lag
 axisymmetry: ellipticity of the sensor or of the contact (rasters)
     it is not round; of a calibration G(r) is a mean over directions
 load_linearity: change of A with the load (several loads)
@@ -82,29 +86,29 @@ offset_agreement: baseline of a scan or repeat against all others'
 noise_agreement: scatter of a scan or repeat against all others'
     look at the run that it names; state its noise
 repeat_centres: a centre for each repeat of a line against one for all (F ratio)
-    stage or sensor moved: --centre per-repeat, the default then
+    stage or sensor moved: --centre per-repeat
 held_out_repeat: each repeat against its prediction from the others; the worst
     look at the repeat that it names
 held_out_load: each load against its prediction from the others; the worst
-    calibrate at the load of use; check the load cell's scale
+    calibrate at the load of use; check the load cell
 held_out_scan: each scan against its prediction from the others; the worst
-    calibrate the scans one by one and compare
-applied_force: total force of a profile against its load, in standard uncertainties; not A
+    calibrate each and compare
+applied_force: total force of a profile against its load, in u; not A
     gain, load or a unit differ between calibration and scan
-applied_force_all: mean of total forces over loads against one, in standard uncertainties; not A
+applied_force_all: mean total force over loads against one, in u; not A
     gain, loads or a unit differ between calibration and scans
-restored_force: restored total force against the load, in standard uncertainties; not A
+restored_force: restored total force against the load, in u; not A
     gain, load or a unit differ from the calibration, or Poisson's ratio is wrong
 expected_stress: scan against the expected stress blurred by A G, chi-square per degree
-    the contact is not as it was calculated: friction, shape, film, or load
+    the contact is another: friction, shape, film, or load
 profile_chi_square: one load against the friction that explains it best, chi-square per degree
     no contact explains it: check noise, scatter of loads, shape, film, gain and load
 bracketing: share of a load's points outside of what no friction and full stick give
-    friction alone does not explain the stress: look at the profile's figure
+    friction alone does not explain it: look at the figure
 joint_chi_square: all loads of a kind against one friction coefficient, chi-square per degree
-    alone: friction changes with the load, see the coefficient of each, or --interface
+    friction changes with the load: see each coefficient, or --interface
 lubricated_frictionless: lubricated loads against no friction: rise of -2 ln p
-    more friction than was counted, or A, load or thickness is wrong: the dry ones are doubtful
+    more friction than counted, or a wrong A, load or thickness: doubt the dry ones
 """
 _LINES = _EXPLAINED.splitlines()
 _NAMED = [line.partition(": ") for line in _LINES[::2]]
