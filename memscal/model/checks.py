@@ -41,10 +41,10 @@ shape_negative: share of the integral of abs(G) where G is negative
     G consists of ripples: use white-noise or bayesian
 shape_roughness: share of the power of G beyond 1.5 times the wavenumbers that the scan determines
     the detail of G is noise: use white-noise or bayesian
-field_lobes: deepest lobe of G over the plane beyond 4 u (rasters)
-    ripples that no uncertainty counts: use bayesian
-field_residuals: residuals over the plane against the noise, by wavenumber (rasters)
-    look at the map of the residuals
+field_lobes: deepest lobe of G beyond 4 u (rasters)
+    ripples: use bayesian
+field_residuals: residuals by wavenumber against the noise (rasters)
+    look at their map
 width_over_thickness: width of G over the film's thickness
     check the units of positions and thickness
 resolved_band: the Gaussian's transfer function at the end of the resolved band
