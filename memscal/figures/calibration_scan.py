@@ -212,7 +212,8 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> Fl
     curved = data.film is not None and data.film.law not in ("", LINEAR)
     # Of a curved law the stress at another load has another shape.
     other = curved and data.load and loads_differ((data.load, reference.load))
-    if stress is None or other or not 0 < constant < np.inf:
+    # A point is nothing beside its axis.
+    if stress is None or not stress.any() or other or not 0 < constant < np.inf:
         return np.array([])
     voltage = constant * stress
     peak = voltage.max(keepdims=True)
@@ -243,7 +244,7 @@ def _seen_stress(data: ApparatusData) -> FloatArray | None:
     reference = data.reference
     factor = (data.load or reference.load) / reference.load
     if data.reading.relative:
-        factor = 1 / np.abs(reference.sigma_zz).max()
+        factor = 1 / (np.abs(reference.sigma_zz).max() or 1.0)
     if not _tangential(data):
         return reference.sigma_zz * factor
     return None if reference.sigma_rz is None else -reference.sigma_rz * factor

@@ -26,7 +26,8 @@ def test_a_message_names_what_is_missing_and_what_does_without_it(lacking, folde
     else:
         failed = run("calibrate", "rod.h5").exits(3)
         words = [WORDS[option] for option in lacking if option in WORDS]
-        found = run("calibrate", "rod.h5", "--json", "--reference=point", "--relative").json
+        asked = ("--reference=point", "--relative", "--figure=a.svg", "--json")
+        found = run("calibrate", "rod.h5", *asked).json
         assert found["conversion_constant"]["unit"] == "mV*m^2 (relative)"
         # The integral over the plane of the Gaussian of 1 mm.
         assert found["conversion_constant"]["value"] == pytest.approx(4e-6 * np.pi, 0.05)
