@@ -20,6 +20,7 @@ from helpers.console import Outcome, Run, numbers, words
 from helpers.scans import simulate
 
 import memscal
+from memscal.errors import FitError
 from memscal.cli import main
 from memscal.cli.commands import memscal as program
 from memscal.cli.compare import figure_stems
@@ -283,7 +284,7 @@ def test_the_methods_of_the_page_on_a_method_of_ones_own_calibrate(monkeypatch, 
     monkeypatch.setattr("memscal.calibration.drawn_scatter.draw_count", lambda _: 3)
     names = run_examples("own_method.md")
     assert "(method richardson-lucy)" in capsys.readouterr().out
-    with pytest.raises(memscal.FitError, match="not distinct from zero"):
+    with pytest.raises(FitError, match="not distinct from zero"):
         memscal.calibrate(names["scan"], method=names["UnsupervisedWiener"]())
 
 
