@@ -20,10 +20,10 @@ from helpers.console import Outcome, Run, numbers, words
 from helpers.scans import simulate
 
 import memscal
-from memscal.errors import FitError
 from memscal.cli import main
 from memscal.cli.commands import memscal as program
 from memscal.cli.compare import figure_stems
+from memscal.errors import FitError
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTEBOOKS = DOCS.with_name("notebooks")
