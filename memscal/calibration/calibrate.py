@@ -319,7 +319,7 @@ def _require_distinct(results: Results, solution: Solution) -> None:
         f"The conversion constant would be ({a / unit.scale:.2g} ± "
         f"{uncertainty / unit.scale:.2g}) {unit.over(unit.unit)} by method "
         f"{solution.method.name}: it is not distinct from zero.",
-        why=f"It is {a / uncertainty:.2g} standard uncertainties, those of the inputs left out; at "
+        why=f"It is {a / uncertainty:.3g} standard uncertainties, those of the inputs left out; at "
         f"least {LEAST_DISTINCT:g} are needed.",
         cure='Look at the scan; take method="bayesian" (--method bayesian), or other options.',
     )

@@ -421,8 +421,8 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
     raise FitError(
         f"The conversion constant would be ({a / unit.scale:.2g} ± {uncertainty / unit.scale:.2g}) "
         f"{unit.over(unit.unit)}: it is {wrong}.",
-        why=f"It is {a / scatter:.2g} standard uncertainties by noise (at least "
-        f"{LEAST_SIGNIFICANCE:g} are needed) and {a / uncertainty:.2g} of all that the scan leaves "
+        why=f"It is {a / scatter:.3g} standard uncertainties by noise (at least "
+        f"{LEAST_SIGNIFICANCE:g} are needed) and {a / uncertainty:.3g} of all that the scan leaves "
         f"open (at least {LEAST_DISTINCT:g}). {_why_undetermined(estimate, shown=shown)}",
         cure=cure,
     )
