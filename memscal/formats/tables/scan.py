@@ -258,31 +258,47 @@ def _require_use(
     uncertainties: ScanUncertainties,
 ) -> None:
     """Refuse what has no use: a unit or an uncertainty of nothing, or two of the same."""
-    if layout.load_unit and named["normal_load"] is None:
-        problem = "load_unit (--load-unit) belongs to a column of loads."
-        raise InputError(problem, cure="Give the load (--load) in N: 80 g weigh 0.785 N.")
     no_load = conditions.load is None and named["normal_load"] is None
-    if no_load and uncertainties.load_uncertainty is not None:
-        problem = "load_uncertainty (--load-uncertainty) belongs to a load."
-        raise InputError(problem, cure="Give the load, too.")
-    if no_load and uncertainties.load_scatter is not None:
-        problem = "The scatter of the loads is given, but no load."
-        raise InputError(problem, cure="Give the load in N, or its column.")
     given = (uncertainties.noise is not None, named["u_zz_errors"] is not None, layout.holds)
-    if sum(given) > 1:
-        problem = (
-            "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or of holds."
-        )
-        raise InputError(problem, cure="Give one of them.")
-    if not layout.holds and (named["depth"] is not None or layout.baseline):
-        problem = "depth (--depth) and baseline (--baseline) belong to a log with holds."
-        raise InputError(problem, cure="State holds (--holds), too.")
-    if layout.depth_unit and named["depth"] is None:
-        problem = "depth_unit (--depth-unit) belongs to a column of depths."
-        raise InputError(problem, cure="Name the column (--depth COLUMN).")
-    if layout.time_unit and named["time"] is None:
-        problem = "time_unit (--time-unit) belongs to a column of times."
-        raise InputError(problem, cure="Name the column (--time COLUMN).")
+    for useless, problem, cure in (
+        (
+            layout.load_unit and named["normal_load"] is None,
+            "load_unit (--load-unit) belongs to a column of loads.",
+            "Give the load (--load) in N: 80 g weigh 0.785 N.",
+        ),
+        (
+            no_load and uncertainties.load_uncertainty is not None,
+            "load_uncertainty (--load-uncertainty) belongs to a load.",
+            "Give the load, too.",
+        ),
+        (
+            no_load and uncertainties.load_scatter is not None,
+            "The scatter of the loads is given, but no load.",
+            "Give the load in N, or its column.",
+        ),
+        (
+            sum(given) > 1,
+            "Readings have one uncertainty: noise (--noise), u_errors (--u-errors), or of holds.",
+            "Give one of them.",
+        ),
+        (
+            not layout.holds and (named["depth"] is not None or layout.baseline),
+            "depth (--depth) and baseline (--baseline) belong to a log with holds.",
+            "State holds (--holds), too.",
+        ),
+        (
+            layout.depth_unit and named["depth"] is None,
+            "depth_unit (--depth-unit) belongs to a column of depths.",
+            "Name the column (--depth COLUMN).",
+        ),
+        (
+            layout.time_unit and named["time"] is None,
+            "time_unit (--time-unit) belongs to a column of times.",
+            "Name the column (--time COLUMN).",
+        ),
+    ):
+        if useless:
+            raise InputError(problem, cure=cure)
     require_positions(named, layout)
 
 
