@@ -90,12 +90,13 @@ def _words(item: Item) -> str:
 
 
 def _value(item: Item) -> str:
-    if item["value"] is None:
+    value = item["value"]
+    if value is None:
         return "not a number"
-    if isinstance(item["value"], str):
-        return item["value"]
+    if isinstance(value, str):
+        return value
     factor, unit = _unit_to_show(item)
-    value = item["value"] * factor
+    value *= factor
     spread = item["standard_uncertainty"]
     if spread is None:
         return f"{value:.6g}" + ("" if unit == "1" else f" {unit}")

@@ -224,10 +224,11 @@ def _timed(
     # Far from the sensor no reading tells: the times at the others' places, all alike, do.
     starts = np.flatnonzero(np.diff(dwell, prepend=-1))
     size = np.diff(starts, append=u.size)
-    time = (np.arange(u.size) - starts[dwell]) / size[dwell]
+    own = size[dwell]
+    time = (np.arange(u.size) - starts[dwell]) / own
     # Of a row, not of a place: short stops on the way are no places.
-    usual = np.median(size[dwell])
-    spread = _DEVIATIONS * np.median(np.abs(size[dwell] - usual))
+    usual = np.median(own)
+    spread = _DEVIATIONS * np.median(np.abs(own - usual))
     alike = np.abs(size - usual) <= max(_FEWEST, _ALIKE * usual, min(spread, usual / 2))
     spans = []
     for start, count in zip(starts[alike], size[alike], strict=True):
@@ -244,7 +245,7 @@ def _timed(
             why="The readings rise at other times at each place.",
             cure=_CURE,
         )
-    pressed = (time >= begin) & (time <= end) & (size[dwell] >= _FEWEST)
+    pressed = (time >= begin) & (time <= end) & (own >= _FEWEST)
     waiting = time < np.quantile(begins, 0.1)
     press = (end - begin) * usual
     for i in np.flatnonzero(~alike & ((end - begin) * size >= _FEWEST)):
