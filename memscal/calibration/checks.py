@@ -508,11 +508,11 @@ def _runs(solution: Solution) -> list[QualityCheck]:
     distance = runs.distance / reading.scale
     apart = format_measured(distance, runs.error / reading.scale, reading.unit)
     meaning = (
-        "Difference of a baseline from those of all other scans and repeats, over the largest "
-        f"signal: that of {_run(solution, runs.moved)} is off by {apart}. A failure means that the "
-        "sensor's offset moved between them, beyond chance: let it warm up, and read it without "
-        "the indenter before each run. A baseline of its own (scans have it, repeats by --centre "
-        "per-repeat) takes that up, but not what else moved."
+        "Difference of a baseline from those of all other repeats of all scans, over the largest "
+        f"signal: that of number {runs.moved + 1} of {runs.count} is off by {apart}. A failure "
+        "means that the sensor's offset moved between them, beyond chance: let it warm up, and "
+        "read it without the indenter before each run. A baseline of its own (scans have it, "
+        "repeats by --centre per-repeat) takes that up, but not what else moved."
     )
     limit = max(_OFFSET, runs.offset.limit**0.5 * runs.error / largest)
     offset = check(
@@ -520,31 +520,14 @@ def _runs(solution: Solution) -> list[QualityCheck]:
     )
     stated = "" if estimate.points.u_errors is None else ", each over what is stated"
     meaning = (
-        f"Ratio of the scatter of one scan or repeat to that of all others{stated}, or back: "
-        f"{_run(solution, runs.noisy)} has {'more' if runs.louder else 'less'}. A failure means "
-        "that their noise differs beyond chance, so that weights and uncertainties are wrong: look "
-        "for its cause, or state the noise of each (u_zz_errors)."
+        f"Ratio of the scatter of one repeat of a scan to that of all others{stated}, or back: "
+        f"number {runs.noisy + 1} of {runs.count} has {'more' if runs.louder else 'less'}. A "
+        "failure means that their noise differs beyond chance, so that weights and uncertainties "
+        "are wrong: look for its cause, or state the noise of each (u_zz_errors)."
     )
     limit = max(quality.NOISE_LIMIT, runs.noise.limit**0.5)
     ratio = runs.noise.value**0.5
     return [offset, check("noise_agreement", ratio, limit, meaning, runs.noise.p_value)]
-
-
-def _run(solution: Solution, number: int) -> str:
-    """Name a repeat by its number within its scan, and the scan where there are several."""
-    points = solution.estimate.points
-    _, start = np.unique(points.repeat, return_index=True)
-    owners = np.array(solution.owners)[points.scan[start]]
-    owner = owners[number]
-    scan = f"scan {owner + 1}"
-    source = solution.scans[points.scan[start[number]]].source
-    if source is not None and source.file_name:
-        scan += f" ({source.file_name})"
-    before = np.count_nonzero(owners[:number] == owner)
-    repeat = f"repeat {before + 1}"
-    if np.all(owners == owner):
-        return repeat
-    return f"{repeat} of {scan}" if np.count_nonzero(owners == owner) > 1 else scan
 
 
 def _held_out(solution: Solution) -> list[QualityCheck | None]:

@@ -10,7 +10,7 @@ from scipy.special import fdtrc, fdtri
 from memscal.axisymmetry.kernels import gaussian_transfer_slope
 from memscal.estimation import residuals
 from memscal.estimation.points import grouped
-from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import triangular
 from memscal.model.arrays import FloatArray, IndexArray, array_record
@@ -41,17 +41,13 @@ class _Fit:
         weights = estimate.weights / estimate.outlier_weight
         added = estimate.points.standardised(columns, weights)[model.point]
         design = np.hstack([model.design, added])
-        size = np.linalg.norm(design, axis=0)
-        design /= np.where(size > 0, size, 1.0)
         root = np.asarray(np.linalg.pinv(triangular(design), rcond=_DEPENDENT), dtype=np.float64)
         basis = design @ root
         along = basis.T @ model.data
-        # The first parameters are by columns of unit length.
-        flat = estimate.gaussian.jacobian
-        scale = np.where(size > 0, size, np.inf)
-        scale[: flat.shape[1]] *= np.linalg.norm(flat, axis=0)
-        root /= scale[:, None]
         left = model.data - basis @ along
+        # The first parameters are by columns of unit length.
+        flat = np.linalg.norm(estimate.gaussian.jacobian, axis=0)
+        root[: flat.size] /= flat[:, None]
         leverage = np.sum(basis**2, axis=1)
         degrees = leverage.size - round(float(leverage.sum()))
         if degrees < FEWEST_RESIDUALS:
@@ -107,10 +103,8 @@ def hysteresis_test(
     sigma = estimate.gaussian.sigma
     wider = estimate.conversion_constant * sigma * gaussian_transfer_slope(model.k, sigma)
     columns = [estimate.predicted - estimate.background, model.signal(geometry, wider)]
-    both = np.zeros_like(sign)
-    for scan in range(points.scans):
-        inside = points.scan == scan
-        both[inside] = np.ptp(sign[inside]) > 0
+    mean = np.bincount(points.scan, sign) / np.bincount(points.scan)
+    both = np.abs(mean)[points.scan] < np.abs(sign)
     if both.any():
         shift = model.shift_derivative(geometry, estimate.kernel)
         along = np.argmax(points.free[points.scan], axis=1)
@@ -163,6 +157,7 @@ def _centres_of_branches(
 class RunsApart:
     """Baselines and noise of runs, each repeat of each scan one, compared with all others'."""
 
+    count: int
     offset: TestOutcome  # of the run that is farthest from the mean of the others: an F ratio
     moved: int  # its number
     distance: float  # of it, in V
@@ -206,22 +201,15 @@ def compare_runs(estimate: ProfileEstimate) -> RunsApart | None:
     moved = int(np.argmax(np.abs(distances[:tests] / errors[:tests])))
     offset = fit.tested(distances[[moved]], rows[[moved]], of=tests)
     run = number[fit.point]
-    square = np.bincount(run, fit.left**2, count)[:tests]
-    degrees = np.bincount(run, 1 - fit.leverage, count)[:tests]
-    rest = fit.degrees - degrees
-    ratio = square / degrees / ((fit.left @ fit.left - square) / rest)
-    louder = ratio > 1
-    outcomes = []
-    for i, value in enumerate(ratio):
-        pair = (value, degrees[i], rest[i]) if louder[i] else (1 / value, rest[i], degrees[i])
-        outcomes.append(_ratio_outcome(*pair, of=2 * tests))
-    noisy = int(np.argmin([outcome.p_value for outcome in outcomes]))
-    return RunsApart(
-        offset=offset,
-        moved=moved,
-        distance=float(distances[moved]),
-        error=float(errors[moved]),
-        noise=outcomes[noisy],
-        noisy=noisy,
-        louder=bool(louder[noisy]),
-    )
+    # Of scans without noise rounding is left.
+    floor = NUMERICAL_FLOOR * estimate.largest_signal * estimate.weights.max() ** 0.5
+    square = np.bincount(run, fit.left**2 + floor**2, count)
+    degrees = np.maximum(np.bincount(run, 1 - fit.leverage, count), 1.0)
+    ratio = np.log(square / degrees / ((square.sum() - square) / (degrees.sum() - degrees)))
+    noisy = int(np.argmax(np.abs(ratio[:tests])))
+    louder = bool(ratio[noisy] > 0)
+    pair = (degrees[noisy], degrees.sum() - degrees[noisy])
+    larger = float(np.exp(np.abs(ratio[noisy])))
+    noise = _ratio_outcome(larger, *(pair if louder else pair[::-1]), of=2 * tests)
+    distance = float(distances[moved])
+    return RunsApart(count, offset, moved, distance, float(errors[moved]), noise, noisy, louder)

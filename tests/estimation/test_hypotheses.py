@@ -156,7 +156,7 @@ def test_what_differs_between_passes_fails_its_check_and_no_other(given, failed,
         last = 2 * given.get("pairs", 1)
         named = checks["offset_agreement"]
         assert named.value == pytest.approx(0.3, rel=0.05)
-        assert f"repeat {last if last > 2 else 1} is off by" in named.meaning
+        assert f"number {last if last > 2 else 1} of {last} is off by" in named.meaning
 
 
 @pytest.mark.parametrize("eta", [-0.05, 0.1])
