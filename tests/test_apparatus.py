@@ -14,7 +14,7 @@ from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, as_function, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad
-from scipy.stats import chi2
+from scipy.stats import chi2, ncx2, norm
 
 import memscal
 from memscal import ApparatusFunction
@@ -52,6 +52,65 @@ def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(width, load) -
     blurred = apparatus.convolve(RADII, load * unit_gaussian(RADII, width))
     exact = load * unit_gaussian(RADII, float(np.hypot(width, SIGMA)))
     np.testing.assert_allclose(blurred, exact, atol=1e-6 * exact[0])
+
+
+#: What a Gaussian sensor reads at a distance r from the middle of each, as a share of A.
+IDEAL = {
+    "disc": (1e-3, lambda r: ncx2.cdf((1e-3 / SIGMA) ** 2, 2, (r / SIGMA) ** 2)),
+    "gaussian": (1e-3, lambda r: 2e-6 * np.pi * unit_gaussian(r, float(np.hypot(1e-3, SIGMA)))),
+    "point": (0.0, lambda r: unit_gaussian(r, SIGMA)),
+    "slit": (1e-3, lambda r: norm.cdf(0.5e-3 - r, 0, SIGMA) - norm.cdf(-0.5e-3 - r, 0, SIGMA)),
+}
+
+
+@pytest.fixture(scope="module")
+def alike(apparatus) -> ApparatusFunction:
+    """The same, with errors of G that all radii share."""
+    radial = apparatus.radial_profile
+    radial = replace(radial, g_covariance=np.outer(radial.g_errors, radial.g_errors))
+    return replace(apparatus, plane=None, radial_profile=radial)
+
+
+@pytest.mark.parametrize("shape", IDEAL)
+def test_an_ideal_reference_is_predicted_by_its_closed_form(shape, alike) -> None:
+    size, share = IDEAL[shape]
+    sensor = alike
+    source = memscal.IdealReference(shape, size)
+    x = np.linspace(-3e-3, 2e-3, 41)
+    expected = sensor.conversion_constant * share(np.abs(x))
+    volts = sensor.predict(x, source)
+    np.testing.assert_allclose(volts, expected, atol=1e-4 * expected.max())
+    errors = sensor.predict_uncertainty(x, source)
+    u_a = sensor.parameters.uncertainty("conversion_constant") / sensor.conversion_constant
+    np.testing.assert_allclose(errors, volts * np.hypot(0.02, u_a), atol=1e-5 * volts.max())
+    if shape == "slit":
+        with pytest.raises(InputError, match="same along itself"):
+            sensor.predict(x, source, y=x)
+        return
+    plane = sensor.predict(x, source, y=[0.0, 1e-3])
+    np.testing.assert_allclose(plane[0], expected, atol=2e-3 * expected.max())
+    over_plane = sensor.predict_uncertainty(x, source, y=[0.0])[0]
+    np.testing.assert_allclose(over_plane, errors, atol=0.01 * errors.max())
+
+
+def test_over_the_plane_what_is_uncertain_beside_the_profile_adds_to_a_prediction(alike) -> None:
+    sensor = replace(alike, plane=ApparatusField.of_profile(alike.radial_profile))
+    x = np.linspace(-6e-3, 6e-3, 61)
+    stress = 1e3 * np.exp(-((np.hypot.outer(x, x) / 1e-3) ** 2))
+    r = x[30:]
+    along = sensor.predict_uncertainty(r, stress[30, 30:])
+    plane = sensor.predict_uncertainty(x, stress, y=x)
+    np.testing.assert_allclose(plane[30, 30:], along, atol=0.02 * along.max())
+    # Errors of independent patches, each of the largest G's tenth.
+    field = sensor.field
+    errors = np.full_like(field.g, 0.1 * field.g.max())
+    unsure = replace(sensor, plane=replace(field, g_errors=errors))
+    more = unsure.predict_uncertainty(x, stress, y=x)[30, 30]
+    patch = 4 * np.pi / 3.7e3**2
+    area = 2e-6 * np.pi
+    force = 1e3 * np.pi * 1e-6
+    extra = CONVERSION * errors[0, 0] * force * np.sqrt(patch / (patch + area))
+    assert more == pytest.approx(np.hypot(along[0], extra), rel=0.05)
 
 
 @pytest.mark.parametrize("place", [0.0, 0.7e-3, 2.3e-3])

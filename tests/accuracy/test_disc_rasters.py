@@ -101,7 +101,7 @@ def test_the_scatter_from_scan_to_scan_is_as_stated(kind: str) -> None:
     assert 0.7 < np.sqrt(np.mean(found**2 / stated)) < 1.3
 
 
-@pytest.mark.parametrize("kind", STUDIED)
+@pytest.mark.parametrize("kind", [kind for kind in STUDIED if kind != "stage"])
 def test_what_the_form_of_g_leaves_over_the_plane_fails_a_check(kind: str) -> None:
     for calibration in calibrated(kind):
         checks = {check.name: check.passed for check in calibration.apparatus.checks}

@@ -16,6 +16,7 @@ from memscal.estimation.residuals import (
     neighbour_correlation_test,
     pure_error_test,
     residuals_of,
+    ring_test,
     steps_test,
 )
 from memscal.model.scan import Scan
@@ -150,3 +151,19 @@ def test_faults_leave_steps_and_alike_neighbours(cause: str) -> None:
         found += [steps_test(residuals), chi_square_test(residuals)]
     assert all(outcome.value > outcome.limit for outcome in found)
     assert max(outcome.p_value for outcome in found) < 1e-3
+
+
+def test_a_wave_over_the_plane_is_told_from_noise_by_its_ring() -> None:
+    rng = np.random.default_rng()
+    rows, columns = (each.ravel() for each in np.indices((40, 48)))
+    noise = np.full(rows.size, 2.0)
+    wave = np.cos(0.6 * rows + 0.9 * columns)
+    p_values = []
+    for _ in range(200):
+        left = 2.0 * rng.standard_normal(rows.size)
+        p_values.append(ring_test(left, noise, (rows, columns), 800.0).p_value)
+    # The noise alone fails once in a thousand at most.
+    assert sum(p < 1e-3 for p in p_values) <= 4
+    outcome = ring_test(left + wave, noise, (rows, columns), 800.0)
+    assert outcome.value > outcome.limit
+    assert outcome.p_value < 1e-3
