@@ -15,6 +15,7 @@ from memscal.calibration.assumptions import (
     with_slow_noise,
 )
 from memscal.calibration.checks import quality_checks
+from memscal.calibration.diagnosis import naming_ceiling
 from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.explanations import explained
 from memscal.calibration.fields import RasterFields
@@ -248,11 +249,12 @@ def calibrate(
         relative=relative,
     )
     prepared = prepare(scans, request)
-    if free:
-        prepared = _with_thickness(prepared)
-    solution = with_slow_noise(less_mean_offset(at_offsets(_solved(prepared))))
-    effects = _effects(solution, prepared.alternatives)
-    results, by_other_route = _propagated(solution, effects, prepared, other=other)
+    with naming_ceiling(prepared.scans, channel):
+        if free:
+            prepared = _with_thickness(prepared)
+        solution = with_slow_noise(less_mean_offset(at_offsets(_solved(prepared))))
+        effects = _effects(solution, prepared.alternatives)
+        results, by_other_route = _propagated(solution, effects, prepared, other=other)
     done_with("uncertainties")
     assumptions = assumptions_of(solution, results, loads=prepared.reading.per == "Pa")
     checks = quality_checks(solution, results, by_other_route, assumptions)

@@ -591,9 +591,9 @@ def _saturation(estimate: ProfileEstimate) -> QualityCheck | None:
         if clipped.size > _MOST_NAMED:
             where += f" and {clipped.size - _MOST_NAMED} more"
     meaning = (
-        f"Number of points at a ceiling{where}: neighbours at the largest voltage, equal to the "
-        "last digit, or within the noise and below the profile through the other points. A failure "
-        "means that amplifier or converter is saturated: lower its gain or the load, and scan "
-        "again; A and G are wrong."
+        f"Number of points at a ceiling{where}: the highest agree far better than the fit has them "
+        "differ, or the profile through the other points rises above them. A failure means that "
+        "amplifier or converter is saturated, and A and G are wrong: leave the points out (memscal "
+        "import --ceiling VALUE), or lower gain or load and scan again."
     )
     return check("saturation", clipped.size, 0.0, meaning)

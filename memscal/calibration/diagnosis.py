@@ -7,24 +7,25 @@ scaled, the rod solved again, and a Gaussian fitted, to find the value at which 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 
 import numpy as np
 
-from memscal.errors import FitError, MemscalError
+from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import forward_model
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.outliers import robust_scale
-from memscal.estimation.points import ScanPoints, joined_points
+from memscal.estimation.points import ScanPoints, channel_order, clipped_looks, joined_points
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, stated_weights
 from memscal.estimation.reference_spectra import reference_spectra
 from memscal.mechanics.contact import BaseStress, Contact, stress_table
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import TINY, FloatArray, array_record
+from memscal.model.checks import at_ceiling_text
 from memscal.model.film import LINEAR
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -50,9 +51,42 @@ _HALVINGS = 7
 _LONGEST_SPAN = 60.0
 _USUAL_SPAN = 8.0
 _THINNEST = 0.02
+#: A ceiling that is named lies so far below the readings that it takes in their last digits.
+_BELOW = 1e-5
 #: Load of the rods that are tried, in N: the reference per newton does not depend on it.
 _LOAD = 1e-6
 _RADII = "/entry/reference/r"
+
+
+@contextmanager
+def naming_ceiling(scans: Sequence[Scan], channel: str) -> Iterator[None]:
+    """Say in a refusal which readings look clipped, or are left out at a ceiling."""
+    try:
+        yield
+    except (FitError, InputError) as error:
+        causes = "\n".join(filter(None, map(_clipped, scans)))
+        if not causes or channel_order(channel):
+            raise
+        cure = f"{causes}\n{error.cure}".strip()
+        raise type(error)(error.problem, why=error.why, cure=cure) from error
+
+
+def _clipped(scan: Scan) -> str:
+    """Say which readings of a scan look clipped, or how many are left out; nothing where none."""
+    reading = scan.reading
+    top = clipped_looks(scan.u_zz[np.isfinite(scan.u_zz)])
+    if top.size:
+        lowest = top[-1] - np.ptp(top) - _BELOW * abs(top[-1])
+        ceiling = reading.text(float(lowest), ".6g")
+        return (
+            f"{top.size} readings look clipped: they agree at {reading.text(top[0], '.4g')}. "
+            "If amplifier or converter was at its end there, leave them out (memscal import "
+            f"--ceiling VALUE, {ceiling}), or measure with a lower gain or load."
+        )
+    if scan.at_ceiling:
+        text = at_ceiling_text(round(scan.at_ceiling))
+        return f"{text} The others may not tell A: measure with a lower gain or load."
+    return ""
 
 
 def diagnosed(

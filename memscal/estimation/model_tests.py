@@ -15,7 +15,7 @@ from memscal.estimation import residuals
 from memscal.estimation.bayesian import weigh_departures
 from memscal.estimation.departures import ReducedScan, departure_basis
 from memscal.estimation.gaussian import fit_gaussian_to_points
-from memscal.estimation.points import MINIMUM_POSITIONS
+from memscal.estimation.points import FEWEST_AT_CEILING, MINIMUM_POSITIONS, agreeing_tops
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, TestOutcome
 from memscal.estimation.voltage_map import evenly, triangular
@@ -275,13 +275,14 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)
 
 
-#: So many voltages at the top, equal within a share of their range, are clipped ...
-_FEWEST = 3
-_EQUAL = 1e-9
-#: ... if voltages are read this many times more finely than their noise, or if the fitted profile
-#: changes by this many times the noise among them: else they may be equal by chance or rounding.
-_FINE = 30.0
-_CURVED = 3.0
+#: Readings at three places agree by chance so many times better than a fit has them differ once in
+#: thousands of scans; those at more places agree less closely by chance, but not so many times.
+_CLOSER = 50.0
+_LEAST_CLOSER = 10.0
+#: A fit is flat among readings where it changes by less than this share of the noise, or of the
+#: largest signal.
+_OF_NOISE = 0.5
+_FLAT = 0.01
 #: Points are a plateau while their scatter has at least this p-value; this weight leaves them out.
 _ALIKE = 1e-3
 _LITTLE = 1e-9
@@ -298,22 +299,46 @@ def clipped_points(estimate: ProfileEstimate) -> BoolArray:
     ordinary = estimate.noise_scale * (np.ones_like(u) if stated is None else stated)
     for scan in range(estimate.points.scans):
         inside = estimate.points.scan == scan
-        # Points of a scan that share its largest voltage to the last digit.
-        top = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
-        scatter = np.median(ordinary[inside])
-        finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
-        curved = np.ptp(estimate.predicted[top]) > _CURVED * scatter
-        equal = top.sum() >= _FEWEST and (curved or finest < scatter / _FINE)
-        clipped |= top if equal else _flattened(estimate, inside, ordinary)
+        agreeing, top = _agreeing(estimate, inside, float(np.median(ordinary[inside])))
+        for flat in (agreeing, _plateau(estimate, inside, ordinary)):
+            if not top.any() and _risen_above(estimate, flat, ordinary):
+                top = flat
+        clipped |= top
     return clipped
 
 
-def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) -> BoolArray:
-    """Plateau of a scan that the profile through all other points rises above."""
-    plateau = _plateau(estimate, inside, noise)
-    none = np.zeros_like(inside)
-    if plateau.sum() < _FEWEST:
-        return none
+def _agreeing(
+    estimate: ProfileEstimate, inside: BoolArray, noise: float
+) -> tuple[BoolArray, BoolArray]:
+    """Highest readings (n,) of a scan that agree, and those far better than the fit has them."""
+    rows = np.flatnonzero(inside)
+    falling, counts, apart = agreeing_tops(estimate.points.u[rows])
+    rows = rows[falling]
+    u = estimate.points.u[rows]
+    asked = estimate.predicted[rows]
+    highest = np.maximum.accumulate(asked)
+    differ = highest - np.minimum.accumulate(asked)
+    # What moves a place moves all of its readings.
+    new = np.zeros(u.size)
+    new[np.unique(estimate.points.place_numbers("index")[rows], return_index=True)[1]] = 1.0
+    places = np.maximum(np.cumsum(new), 2.0)
+    closer = np.maximum(_CLOSER ** (2 / (places - 1)), _LEAST_CLOSER)
+    least = max(_OF_NOISE * noise, _FLAT * estimate.largest_signal)
+    better = (differ > closer * apart) & (differ > least) & (highest > u[0])
+    tops = []
+    for some in (counts, counts[better[counts - 1]]):
+        top = np.zeros_like(inside)
+        top[rows[: some.max(initial=0)]] = True
+        tops.append(top)
+    return tops[0], tops[1]
+
+
+def _risen_above(estimate: ProfileEstimate, plateau: BoolArray, noise: FloatArray) -> bool:
+    """Whether the profile through all other points rises above a plateau of a scan."""
+    if plateau.sum() < FEWEST_AT_CEILING:
+        return False
+    if np.ptp(estimate.predicted[plateau]) < _FLAT * estimate.largest_signal:
+        return False
     model = estimate.model
     points = estimate.points
     weights = np.where(plateau, _LITTLE, 1.0) * estimate.weights
@@ -328,7 +353,7 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) 
     try:
         fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     except FitError:
-        return none
+        return False
     angular = estimate.basis.angular
     reduced = ReducedScan.of(model, fit, weights, angular.rings if angular else None)
     basis = departure_basis(fit, reduced, angular)
@@ -340,7 +365,7 @@ def _flattened(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) 
     overshoot = -(share @ weighed.residual)
     slope = reduced.summed(share) @ basis.columns(reduced)
     variance = share**2 @ noise[chosen] ** 2 + slope @ weighed.covariance @ slope
-    return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
+    return bool(overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance))
 
 
 def _plateau(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) -> BoolArray:
@@ -355,8 +380,8 @@ def _plateau(estimate: ProfileEstimate, inside: BoolArray, noise: FloatArray) ->
     total, first, second = (np.cumsum(weight * offset**power) for power in range(3))
     scatter = second - first**2 / total
     count = np.arange(1, half + 1)
-    beyond = (scatter > chdtri(np.maximum(count - 1, 1), _ALIKE)) & (count >= _FEWEST)
+    beyond = (scatter > chdtri(np.maximum(count - 1, 1), _ALIKE)) & (count >= FEWEST_AT_CEILING)
     last = int(np.argmax(beyond)) if beyond.any() else half - 1
-    if last >= _FEWEST:
+    if last >= FEWEST_AT_CEILING:
         plateau[order[:last]] = True
     return plateau

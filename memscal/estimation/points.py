@@ -89,6 +89,15 @@ MINIMUM_POSITIONS = 6
 _WILD = 5.0
 _FEW_OF_LINE = 0.1
 _FEW_OF_RASTER = 0.003
+#: So many readings at the top, which agree within this share of the steps to the next ones, half as
+#: many, may be at a ceiling; and more that agree so many times less closely, or to so many digits.
+FEWEST_AT_CEILING = 3
+_AGREEING = 0.05
+_AS_ALIKE = 5.0
+#: The least step of readings is of so few of their last digit, of which all are multiples, to this
+#: share of it.
+_MOST_DIGITS = 10
+_WHOLE = 0.01
 
 
 @array_record
@@ -490,6 +499,40 @@ def ordinary_readings(points: ScanPoints) -> BoolArray:
         if beyond.any():
             ordinary[rows[order[int(np.argmax(beyond)) - few :]]] = False
     return ordinary
+
+
+def agreeing_tops(u: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Order readings (n,) from the highest, and say how many of the first may be at a ceiling.
+
+    With how far each is from the highest, at least a digit.
+    """
+    falling = np.argsort(-u, kind="stable")
+    ordered = u[falling]
+    apart = np.maximum(ordered[0] - ordered, _last_digit(u))
+    count = np.arange(FEWEST_AT_CEILING, max(2 * (u.size - 1) // 3, FEWEST_AT_CEILING))
+    steps = ordered[count - 1] - ordered[count + count // 2]
+    count = count[ordered[0] - ordered[count - 1] <= _AGREEING * steps]
+    alike = apart[count - 1] <= _AS_ALIKE * apart[count[:1] - 1]
+    return falling, count[alike], apart
+
+
+def clipped_looks(u: FloatArray) -> FloatArray:
+    """Return the highest readings that look as if held at a ceiling, none where none do."""
+    if u.size < 2 * FEWEST_AT_CEILING:
+        return u[:0]
+    falling, counts, _ = agreeing_tops(u)
+    return u[falling[: counts.max(initial=0)]]
+
+
+def _last_digit(u: FloatArray) -> float:
+    """Step of readings (n,) of which all differ by multiples of one; zero of others."""
+    steps = np.diff(np.unique(u))
+    least = steps.min(initial=np.inf)
+    for digits in range(1, _MOST_DIGITS + 1):
+        number = digits * steps / least
+        if np.abs(number - np.rint(number)).max(initial=0.0) < _WHOLE:
+            return float(least) / digits
+    return 0.0
 
 
 def _require_usable(points: ScanPoints) -> None:

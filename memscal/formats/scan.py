@@ -18,6 +18,7 @@ from memscal.model.notation import Reading
 from memscal.model.quantities import by_name
 from memscal.model.scan import BRANCHES, LIKE_SIGNAL, Scan, branch_numbers, require_rod_friction
 from memscal.model.sizes import too_large
+from memscal.readings.ceiling import without_clipped
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
@@ -130,13 +131,17 @@ def scan_from(file: SafeFile, most: int | None = None) -> Scan:
 def _read_arrays(file: SafeFile, along: str, reading: Reading) -> Values:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", "y_errors"} if along == "x" else {"repeat", "x", "x_errors"}
-    arrays = read_record(records.TAKEN_FOR_GRANTED, file, _DATA)
+    arrays = read_record(records.TAKEN_FOR_GRANTED.read_in(reading), file, _DATA)
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
             ndim = len(quantity.axes) if name in _OWN_SHAPE else None
             dimension = quantity.read_in(reading).dimension
             arrays[name] = values.require_array(file, path, dimension, ndim=ndim)
+    ceiling = arrays.pop("reading_high", None)
+    if ceiling is not None:
+        arrays["u_zz"], number = without_clipped(arrays["u_zz"], ceiling)
+        arrays["at_ceiling"] = arrays.get("at_ceiling", 0) + number
     return arrays
 
 
@@ -204,7 +209,8 @@ def _data_group(scan: Scan) -> Group:
         data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(scan, positions, axes if points else (along,))
-    stated = dict(vars(scan))
+    # What was at the end of the range is missing.
+    stated = {**vars(scan), "reading_high": None}
     for name in ("line_offset", "position_errors_by_repeat", "at_ceiling"):
         stated[name] = stated[name] or None
     data |= write_record(records.TAKEN_FOR_GRANTED, stated).children

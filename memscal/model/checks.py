@@ -62,7 +62,7 @@ indentation: what a neo-Hookean film would change of A or of the width, over its
 outliers: share of points with less than half of their weight
     find out what disturbs these points
 saturation: number of points at a ceiling near the largest voltage (not of a shear)
-    lower gain or load at the points that it names
+    lower gain or load, or leave them out (--ceiling)
 noise_as_stated: scatter over the stated noise
     look for noise of position and load; state the actual noise
 chi_square: residuals that no radial G, or no radial stress, explains, against the noise

@@ -1,7 +1,9 @@
 """Holds that were found in the log of an instrument."""
 
+from dataclasses import field
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from memscal.model.arrays import Arrays, FloatArray, IndexArray, array_record
@@ -21,3 +23,5 @@ class Holds(Result):
     u_errors: FloatArray  # (m,): standard uncertainty of the mean reading
     reading: Reading
     notes: tuple[str, ...]
+    highest: FloatArray = field(default_factory=lambda: np.zeros(0))  # (m,): row, as it was logged
+    ceiling: float | None = None  # at which rows pile up, as they were logged

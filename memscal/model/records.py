@@ -145,6 +145,7 @@ TAKEN_FOR_GRANTED = record(
     ),
     Quantity("position_errors_by_repeat", "truth", "whether x_errors are new in each repeat"),
     Quantity("at_ceiling", _ONE, "number of readings left out at a ceiling"),
+    Quantity("reading_high", _U, "end of the range, at which readings are left out"),
 )
 """What a scan states of that beside its arrays, each number only where it is stated."""
 SYNTHETIC = record(

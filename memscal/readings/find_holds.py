@@ -1,11 +1,14 @@
 """Holds in the log of an instrument: rows in which the indenter presses at rest, averaged."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.arrays import Arrays, BoolArray, FloatArray, IndexArray
 from memscal.model.holds import Holds
 from memscal.model.notation import Reading
+from memscal.readings.ceiling import ceiling_of_holds
 
 Runs = list[IndexArray]
 """Rows of a log that follow each other, run by run."""
@@ -82,11 +85,14 @@ def find_holds(
             why=f"A hold is {_FEWEST} rows or more in which position, load and reading are steady.",
             cure=_CURE,
         )
+    highest = np.array([u[run].max() for run in held])
+    ceiling = ceiling_of_holds(u, held, highest)
     before = None
     if baseline:
         before = _before_each(columns, line, held, waiting, dwell)
         notes.append("The mean of the rows before its press is subtracted from each hold.")
-    return _averaged(columns, line, held, before, len(runs) - len(held), reading, notes)
+    holds = _averaged(columns, line, held, before, len(runs) - len(held), reading, notes)
+    return replace(holds, highest=highest, ceiling=ceiling)
 
 
 def _averaged(

@@ -13,7 +13,7 @@ from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.arrays import Values
 from memscal.model.assumptions import MOVED
-from memscal.model.checks import REPEAT_CENTRES, Message
+from memscal.model.checks import EXPLANATIONS, REPEAT_CENTRES, Message
 from memscal.model.quantities import (
     ESTIMATED,
     MM,
@@ -77,7 +77,11 @@ def answer(result: Calibrated) -> str:
     a = a.replace("(relative)", "(relative: the load is not known)")
     law = _dominating_law(apparatus)
     checks = verdict(apparatus.checks)
-    if not misfit(apparatus.checks):
+    failed = [check.kind for check in apparatus.checks if not check.passed]
+    if failed and not misfit(apparatus.checks):
+        cures = [EXPLANATIONS[kind][1] for kind in dict.fromkeys(failed) if kind in EXPLANATIONS]
+        return f"{law}A = {a}{by} is in doubt. {checks}\nWhat to do: {'; '.join(cures)}."
+    if not failed:
         sigma = measured_text(apparatus.parameters, "gaussian_sigma")
         suffices = f"Its Gaussian of σ = {sigma} suffices: the scan shows no departure."
         return f"{law}Use A = {a}{by}. {checks}\n{suffices}"

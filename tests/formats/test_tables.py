@@ -559,12 +559,22 @@ def test_readings_at_the_ceiling_are_left_out_and_counted(unit, ceiling, sign, l
     assert scan.at_ceiling == left
 
 
-def test_a_hold_of_which_a_row_is_at_the_ceiling_is_left_out():
+@pytest.mark.parametrize("baseline", [None, "before-each"])
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("ceiling", [3.5, 9.0])
+@pytest.mark.parametrize("digit", [1e-9, 1e-3, 0.1])
+def test_a_hold_of_which_a_row_is_at_the_ceiling_is_left_out(digit, ceiling, stated, baseline):
+    """Rows at the largest reading tell the ceiling by themselves, where noise spreads others."""
     place = np.repeat(np.arange(5.0), 60)
     pressed = np.arange(300) % 60 >= 30
-    noise = np.random.default_rng(1).normal(0, 1e-3, 300)
-    u = pressed * np.array([1.0, 2.0, 4.0, 2.0, 1.0]).repeat(60) + noise
-    layout = TableLayout(x_unit="mm", u_unit="mV", holds=True, ceiling=4.0)
-    table = {"x": place, "U": np.minimum(u, 4.0), "F": 1.0 * pressed}
+    noise = np.random.default_rng(1).normal(0, 3e-3, 300)
+    # Less the reading before its press the fourth hold is above the ceiling, which it was not.
+    u = pressed * np.array([1.0, 2.0, 4.0, 3.8, 1.0]).repeat(60) + noise - 0.5
+    given = ceiling if stated else None
+    layout = TableLayout(x_unit="mm", u_unit="mV", holds=True, ceiling=given, baseline=baseline)
+    table = {"x": place, "U": np.minimum(np.round(u / digit) * digit, ceiling), "F": 1.0 * pressed}
     scan = import_table(table, x="x", u="U", load_column="F", layout=layout)
-    np.testing.assert_array_equal(np.isnan(scan.u_zz), np.arange(5) == 2)
+    left_out = ceiling == 3.5 and (stated or digit < 0.1)
+    np.testing.assert_array_equal(np.isnan(scan.u_zz), (np.arange(5) == 2) & left_out)
+    assert scan.at_ceiling == left_out
+    assert ("a ceiling" in scan.notes) == (left_out and not stated)

@@ -10,6 +10,7 @@ double Fourier sum over the plane, so that G and the line may be anything.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -189,6 +190,31 @@ def scan(
         film=FILM,
         load_cell=LoadCell(),
     )
+
+
+def wide_scan(seed: int, *, width: float = 1.3e-3, places: int = 20, **made: Any) -> Scan:
+    """Return a scan of 20 mm over a film of 2.5 mm by a Gaussian sensor, its centre anywhere."""
+    x = np.linspace(-9.5e-3, 9.5e-3, places)
+    rng = np.random.default_rng(seed)
+    world = World(thickness=2.5e-3, parts=(Part(width=(width, width)),))
+    measured = scan(world, seed, x=x - rng.uniform(-0.5e-3, 0.5e-3), **made)
+    return replace(measured, x=x, film=replace(FILM, thickness=2.5e-3))
+
+
+def clipped(measured: Scan, count: int, *, seed: int = 0, scatter: float = 3e-5) -> Scan:
+    """Return a scan whose highest readings agree to a share of the largest."""
+    u = measured.u_zz
+    falling = np.sort(u)[::-1]
+    rng = np.random.default_rng(seed)
+    ceiling = falling[count] + rng.uniform(0.1, 0.9) * (falling[count - 1] - falling[count])
+    held = ceiling + rng.normal(0.0, scatter * falling[0] / 2, u.size)
+    return replace(measured, u_zz=np.where(u > ceiling, held, u))
+
+
+def marked(measured: Scan, count: int) -> Scan:
+    """Return the same without these readings."""
+    u = np.where(measured.u_zz >= np.sort(measured.u_zz)[-count], np.nan, measured.u_zz)
+    return replace(measured, u_zz=u, at_ceiling=count)
 
 
 Noise = Callable[[np.random.Generator, int], FloatArray]

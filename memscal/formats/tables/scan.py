@@ -30,6 +30,7 @@ from memscal.model.quantities import dimension_in
 from memscal.model.records import FILM, LOAD, ROUND_INDENTER, TAKEN_FOR_GRANTED
 from memscal.model.scan import BRANCHES, Scan, branch_numbers, load_groups
 from memscal.progress import Listener, reported
+from memscal.readings.ceiling import without_clipped
 from memscal.readings.dead_rows import without_dead_rows
 from memscal.readings.find_holds import find_holds
 from memscal.readings.find_places import places_of
@@ -212,7 +213,8 @@ def import_table(
         columns = dict(holds.mean)
         if holds.u_errors.all():  # readings of few digits may not scatter
             columns["u_zz_errors"] = holds.u_errors
-    at_ceiling = _leave_out_clipped(columns, holds, layout.ceiling, wanted["u_zz"], notes)
+    of = wanted["u_zz"]
+    at_ceiling = _leave_out_clipped(columns, holds, layout.ceiling, of, reading, notes)
     columns = _placed(columns, notes, (lambda _: "of holds") if holds else table.lines)
     columns = without_dead_rows(columns, notes)
     scan = _scan_of(columns, notes, reading, conditions, uncertainties, table, holds)
@@ -363,18 +365,24 @@ def _read_columns(
 
 
 def _leave_out_clipped(
-    columns: Columns, holds: Holds | None, ceiling: float | None, of: Wanted, notes: list[str]
+    columns: Columns,
+    holds: Holds | None,
+    stated: float | None,
+    of: Wanted,
+    reading: Reading,
+    notes: list[str],
 ) -> int:
     """Mark readings at a ceiling, and holds with a row there, as missing; return how many."""
+    ceiling = holds.ceiling if holds else None
+    if stated is not None:
+        ceiling = float(to_si(stated, of.unit, of.dimension, "ceiling (--ceiling)"))
+    elif ceiling is not None:
+        text = reading.text(ceiling, ".6g")
+        notes.append(f"Rows pile up at {text}, a ceiling (a higher --ceiling keeps them).")
     if ceiling is None:
         return 0
-    highest = columns["u_zz"]
-    if holds is not None:
-        rows = zip(holds.first, holds.stop, strict=True)
-        highest = np.array([holds.log["u_zz"][first:stop].max() for first, stop in rows])
-    clipped = highest >= to_si(ceiling, of.unit, of.dimension, "ceiling (--ceiling)")
-    columns["u_zz"] = np.where(clipped, np.nan, columns["u_zz"])
-    number = int(clipped.sum())
+    highest = holds.highest if holds else None
+    columns["u_zz"], number = without_clipped(columns["u_zz"], ceiling, highest)
     notes.append(at_ceiling_text(number))
     return number
 
