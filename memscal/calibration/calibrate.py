@@ -323,7 +323,7 @@ def _require_distinct(results: Results, solution: Solution) -> None:
         f"{solution.method.name}: it is not distinct from zero.",
         why=f"It is {a / uncertainty:.3g} standard uncertainties, those of the inputs left out; at "
         f"least {LEAST_DISTINCT:g} are needed.",
-        cure='Look at the scan; take method="bayesian" (--method bayesian), or other options.',
+        cure='Look at the scan; scan farther, or take method="bayesian" (--method bayesian).',
     )
 
 
