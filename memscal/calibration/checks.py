@@ -471,8 +471,7 @@ def _steadiness(solution: Solution) -> list[QualityCheck]:
 def _hysteresis(solution: Solution) -> list[QualityCheck]:
     """Compare approach with retreat where scans say which is which."""
     estimate = solution.estimate
-    owner = np.array(solution.owners)[estimate.points.scan]
-    branches = hysteresis_test(estimate, owner)
+    branches = hysteresis_test(estimate)
     if branches is None:
         return []
     reading = estimate.points.reading
@@ -534,7 +533,7 @@ def _held_out(solution: Solution) -> list[QualityCheck | None]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
     estimate = solution.estimate
     groups = {
-        "scan": np.array(solution.owners)[estimate.points.scan],
+        "scan": estimate.points.owner,
         "load": model_tests.load_groups(estimate.points.load),
         "repeat": estimate.points.repeat,
     }

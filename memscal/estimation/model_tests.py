@@ -120,13 +120,13 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     if points.planar or repeats.size == points.scans or readings.min() < MINIMUM_POSITIONS:
         return None
     model = residuals.free_model(estimate, clip_outliers=True)
-    along = points.positions[np.argmax(points.free[points.scan], axis=1), range(points.u.size)]
+    along = points.along(points.positions)
     shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
     # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
     own = [
         np.ones_like(along),
         along / np.abs(along).max(),
-        shift[np.argmax(points.free[points.scan], axis=1), range(points.u.size)],
+        points.along(shift),
     ]
     # The first repeat of each scan has the scan's centre, the others are shifted from it.
     shifted = np.diff(scan, prepend=-1) == 0
@@ -150,9 +150,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     # Over the scatter that is left: exact whether the noise is stated or not.
     value = max(without - left, 0.0) / count / (left / degrees)
     return CentresApart(
-        value=value,
-        limit=float(fdtri(count, degrees, 1 - FALSE_ALARM)),
-        p_value=float(fdtrc(count, degrees, value)),
+        **vars(residuals.ratio_outcome(value, count, degrees)),
         distance=max(float(np.ptp(places[scan == i])) for i in range(points.scans)),
     )
 
@@ -216,9 +214,7 @@ class ExtraColumns:
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
-    side = estimate.offset[
-        np.argmax(estimate.points.free[estimate.points.scan], axis=1), range(estimate.points.u.size)
-    ]
+    side = estimate.points.along(estimate.offset)
     return _add(estimate, side[:, None] * _widened(estimate, (0.5, 1.0, 1.5)))
 
 

@@ -205,6 +205,10 @@ class ScanPoints:
         # A line has no step across it.
         return self.step * min(places.steps[1] for places in self.places if all(places.steps))
 
+    def along(self, components: FloatArray) -> FloatArray:
+        """Return of components (2, n) along x and y each point's along its line; a raster's: x."""
+        return components[np.argmax(self.free[self.scan], axis=1), range(self.u.size)]
+
     def only(self, scan: int) -> ScanPoints:
         """Return one of the scans."""
         if self.scans == 1:

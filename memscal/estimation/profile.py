@@ -253,9 +253,7 @@ def estimate_profile(
     slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
     # Uncertain positions make noise where U is steep.
-    moved = (
-        slope[np.argmax(points.free[points.scan], axis=1), range(points.u.size)] * points.x_errors
-    )
+    moved = points.along(slope) * points.x_errors
     stated = stated_weights(points, moved)
     points = points.sharing_positions(moved, stated)
     model = replace(model, points=points)

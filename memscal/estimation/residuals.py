@@ -189,9 +189,7 @@ def pure_error_test(estimate: ProfileEstimate, model: FreeModel) -> TestOutcome 
     degrees = group.size - basis.shape[1] - pure_degrees
     if degrees < FEWEST_RESIDUALS or pure_degrees < FEWEST_RESIDUALS or pure == 0.0:
         return None
-    value = misfit / degrees / (pure / pure_degrees)
-    limit = float(fdtri(degrees, pure_degrees, 1 - FALSE_ALARM))
-    return TestOutcome(value, limit, float(fdtrc(degrees, pure_degrees, value)))
+    return ratio_outcome(misfit / degrees / (pure / pure_degrees), degrees, pure_degrees)
 
 
 def ring_test(
@@ -207,12 +205,14 @@ def ring_test(
     ring = np.rint(np.hypot.outer(*cycles)).astype(np.intp).ravel()
     count = np.bincount(ring)
     ratio = np.bincount(ring, power.ravel()) / count / _NEGLIGIBLE
-    share = FALSE_ALARM / count.size
-    p_values = fdtrc(count, rest, ratio)
-    limits = fdtri(count, rest, 1 - share)
-    worst = int(np.argmax(ratio / limits))
-    p_value = min(count.size * float(p_values[worst]), 1.0)
-    return TestOutcome(float(ratio[worst]), float(limits[worst]), p_value)
+    worst = int(np.argmax(ratio / fdtri(count, rest, 1 - FALSE_ALARM / count.size)))
+    return ratio_outcome(float(ratio[worst]), count[worst], rest, of=count.size)
+
+
+def ratio_outcome(value: float, above: float, below: float, of: int = 1) -> TestOutcome:
+    """Test an F ratio; the least p-value of so many is their number times as likely."""
+    limit = float(fdtri(above, below, 1 - FALSE_ALARM / of))
+    return TestOutcome(value, limit, min(of * float(fdtrc(above, below, value)), 1.0))
 
 
 def steps_test(residuals: Residuals) -> TestOutcome:
