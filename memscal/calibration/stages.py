@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TypeGuard
 
 import numpy as np
 from scipy.special import j1
 
-from memscal.axisymmetry.hankel import ACROSS, RadialSpectrum
+from memscal.axisymmetry.hankel import ACROSS
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution import fourier_ratio
@@ -26,12 +25,11 @@ from memscal.estimation import points
 from memscal.estimation.band import Band, beyond_zeros, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.model_tests import CentresApart, repeat_centres_test
-from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference_spectra import expected_spectra, reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import BaseStress
-from memscal.model.arrays import BoolArray, FloatArray, array_record, value_record
+from memscal.model.arrays import FloatArray, array_record, value_record
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
 from memscal.progress import done_with
@@ -110,36 +108,24 @@ def require_profile(
     references = expected_spectra(scans, stresses, reference_spectra(stresses, measured))
     joined = points.joined_points(measured, owners)
     joined = replace(joined, reading=replace(joined.reading, per=per))
-    outcome = _attempted(joined, references, np.ones(joined.u.size, dtype=np.bool_))
     ordinary = points.ordinary_readings(joined)
-    if not _has_width(outcome) and not ordinary.all():
-        # A few wild readings drew the first fit to themselves, which nothing but a failure tells.
-        again = _attempted(joined, references, ordinary)
-        outcome = again if _has_width(again) else outcome
-    if _has_width(outcome):
-        return outcome
+    outcome: ProfileEstimate | Exception
+    # A few wild readings draw the first fit to themselves, which nothing but a failure tells.
+    for begin_with in (np.ones_like(ordinary), ordinary):
+        try:
+            # At a width of zero the slopes by the width vanish, and no later step is defined.
+            with np.errstate(all="ignore"):
+                outcome = estimate_profile(joined, *references, angular=True, begin_with=begin_with)
+            if outcome.gaussian.has_width(outcome.weights, outcome.noise_scale):
+                return outcome
+        except (FitError, np.linalg.LinAlgError) as failure:
+            outcome = failure
+        if ordinary.all():
+            break
     # Imported here, for it searches only where something is wrong.
     from memscal.calibration.diagnosis import diagnosed
 
     raise diagnosed(scans, stresses, measured, outcome) from None
-
-
-def _attempted(
-    joined: ScanPoints, references: Sequence[RadialSpectrum], begin_with: BoolArray
-) -> ProfileEstimate | Exception:
-    """Estimate the profile, or return why that failed."""
-    try:
-        # At a width of zero the slopes by the width vanish, and no later step is defined.
-        with np.errstate(all="ignore"):
-            return estimate_profile(joined, *references, angular=True, begin_with=begin_with)
-    except (FitError, np.linalg.LinAlgError) as failure:
-        return failure
-
-
-def _has_width(outcome: ProfileEstimate | Exception) -> TypeGuard[ProfileEstimate]:
-    if isinstance(outcome, Exception):
-        return False
-    return outcome.gaussian.has_width(outcome.weights, outcome.noise_scale)
 
 
 def deconvolve(
