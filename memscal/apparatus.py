@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field, fields, replace
 from functools import cached_property
 from os import PathLike
@@ -19,6 +20,7 @@ from memscal.axisymmetry.hankel import (
     radial_spline,
     ring_areas,
 )
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.extensions import hook
@@ -136,7 +138,10 @@ class ApparatusFunction(Result, ApparatusData):
         True
         """
         if y is not None:
-            return self._convolved_field(r, y, sigma_zz, self.field)
+            if isinstance(sigma_zz, IdealReference):
+                return self._of_ideal(self.convolve, r, y, sigma_zz)
+            stress = self._checked_field(r, y, sigma_zz)
+            return _convolved(r, y, stress, self.field)
         radii, spectrum = self._checked(r, sigma_zz)
         profile = self.radial_profile
         kernel = hankel_transform(profile.r, profile.g, spectrum.wavenumbers.k)
@@ -194,6 +199,8 @@ class ApparatusFunction(Result, ApparatusData):
         >>> apparatus.predict_uncertainty(x, stress, y=x).shape
         (101, 101)
         """
+        if y is not None and isinstance(sigma_zz, IdealReference):
+            return self._of_ideal(self.predict_uncertainty, r, y, sigma_zz)
         profile = self.radial_profile
         a = self.conversion_constant
         u_a = self.parameters.uncertainty("conversion_constant")
@@ -206,9 +213,10 @@ class ApparatusFunction(Result, ApparatusData):
             with_a = operator @ shared
         else:
             blurred = self.convolve(r, sigma_zz, y=y)
-            of_g = self._field_variance(r, y, sigma_zz)
+            stress = np.asarray(sigma_zz, dtype=np.float64)
+            of_g = self._field_variance(r, y, stress)
             lifted = ApparatusField.of_profile(replace(profile, g=shared))
-            with_a = self._convolved_field(r, y, sigma_zz, lifted)
+            with_a = _convolved(r, y, stress, lifted)
         variance = a**2 * of_g + (blurred * u_a) ** 2 + 2 * a * blurred * u_a * with_a
         return np.sqrt(np.maximum(variance, 0.0))
 
@@ -265,63 +273,55 @@ class ApparatusFunction(Result, ApparatusData):
         operator = replace(spectrum, values=spectrum.values[:, None] * kernel).at(radii)
         return operator, operator @ profile.g
 
-    def _field_variance(
-        self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike | IdealReference
+    def _of_ideal(
+        self, quantity: Callable[..., FloatArray], x: ArrayLike, y: ArrayLike, ideal: IdealReference
     ) -> FloatArray:
+        """Sample an ideal reference over the plane, and interpolate a quantity of that field."""
+        from scipy.interpolate import RectBivariateSpline
+
+        if ideal.shape == "slit":
+            raise InputError(
+                "A slit is the same along itself.",
+                cure="Give positions across it, without y.",
+            )
+        size = max(np.abs(x).max(), np.abs(y).max(), 8 * ideal.size)
+        step = self.gaussian_sigma / _PER_WIDTH
+        reach = int(np.ceil((size + np.abs(self.field.x).max()) / step))
+        axis = floats(step * np.arange(-reach, reach + 1))
+        sampled = Lattice(axis, axis).sampled(
+            lambda ky, kx: ideal.transform(np.hypot.outer(ky, kx))
+        )
+        return RectBivariateSpline(axis, axis, quantity(axis, sampled, y=axis))(
+            floats(y), floats(x)
+        )
+
+    def _field_variance(self, x: ArrayLike, y: ArrayLike, stress: FloatArray) -> FloatArray:
         """Variance of a convolved field that G brings: by the profile, and by what is not round."""
         profile = self.radial_profile
         g = self.field
         values, vectors = np.linalg.eigh(profile.g_covariance)
         kept = values > _NEGLIGIBLE * values[-1]
-        total = np.zeros((np.size(y), np.size(x)))
+        total = np.zeros_like(stress)
         for column in (vectors[:, kept] * np.sqrt(values[kept])).T:
             lifted = ApparatusField.of_profile(replace(profile, g=column))
-            total += self._convolved_field(x, y, sigma_zz, lifted) ** 2
-        round_errors = np.interp(np.hypot.outer(g.y, g.x), profile.r, profile.g_errors)
+            total += _convolved(x, y, stress, lifted) ** 2
+        radius = np.hypot.outer(g.y, g.x)
+        round_errors = np.interp(radius, profile.r, profile.g_errors)
         rest = np.maximum(g.g_errors**2 - round_errors**2, 0.0)
-        # Of independent patches each adds its variance, times its area and its stress, twice.
-        patch = 4 * np.pi / self.resolved_wavenumber**2
-        if isinstance(sigma_zz, IdealReference):
-            force = float(sigma_zz.transform(np.zeros(1))[0])
-            area = {"disc": force, "gaussian": 2 * force}.get(sigma_zz.shape, 0.0)
-        else:
-            stress = np.abs(floats(sigma_zz))
-            force = float(stress.sum() * np.ptp(x) * np.ptp(y) / stress.size)
-            area = force * float(stress.sum() / (stress**2).sum())
-            sigma_zz = stress
-        spread = force * patch / (patch + area)
-        varied = self._convolved_field(x, y, sigma_zz, replace(g, g=rest))
-        return total + spread * np.maximum(varied, 0.0)
+        # Such errors are alike within a Gaussian patch, and independent beyond.
+        width = 1 / self.resolved_wavenumber
+        smooth = _convolved(x, y, stress, replace(g, g=unit_gaussian(radius, width)))
+        patch = 4 * np.pi * width**2
+        return total + patch * np.maximum(_convolved(x, y, smooth**2, replace(g, g=rest)), 0.0)
 
-    def _convolved_field(
-        self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike | IdealReference, g: ApparatusField
-    ) -> FloatArray:
-        """Convolve a field with a kernel over the plane, on the field's own lattice."""
-        from scipy.interpolate import RectBivariateSpline
-        from scipy.signal import fftconvolve
-
+    def _checked_field(self, x: ArrayLike, y: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+        """Return a field with which G over the plane can be convolved."""
         if self.order:
             raise InputError(
                 f"Channel {self.sensor.channel} measures a component of a vector field.",
                 cure="Give the radial profile of the shear, without y.",
             )
-        if isinstance(sigma_zz, IdealReference):
-            if sigma_zz.shape == "slit":
-                raise InputError(
-                    "A slit is the same along itself.",
-                    cure="Give positions across it, without y.",
-                )
-            size = max(np.abs(x).max(), np.abs(y).max(), 8 * sigma_zz.size)
-            step = self.gaussian_sigma / _PER_WIDTH
-            reach = int(np.ceil((size + np.abs(g.x).max()) / step))
-            axis = floats(step * np.arange(-reach, reach + 1))
-            source = Lattice(axis, axis).sampled(
-                lambda ky, kx: sigma_zz.transform(np.hypot.outer(ky, kx))
-            )
-            blurred = self._convolved_field(axis, axis, source, g)
-            return RectBivariateSpline(axis, axis, blurred)(floats(y), floats(x))
         stress = floats(sigma_zz)
-        offsets = []
         if stress.ndim != 2 or not np.isfinite(stress).all():
             raise InputError(
                 "sigma_zz is no field (y, x) of finite stresses.",
@@ -329,7 +329,6 @@ class ApparatusFunction(Result, ApparatusData):
             )
         for name, values, size in (("x", x, stress.shape[-1]), ("y", y, len(stress))):
             axis = finite_vector(name, values)
-            step = float(np.ptp(axis)) / max(axis.size - 1, 1)
             require_increasing(name, axis)
             if axis.size != size:
                 raise InputError(
@@ -337,6 +336,7 @@ class ApparatusFunction(Result, ApparatusData):
                     f"{name}.",
                     cure="Give a field of shape (y, x).",
                 )
+            step = _step(axis)
             if np.abs(np.diff(axis) - step).max() > _UNEVEN * step:
                 raise InputError(
                     f"The positions along {name} are not even.",
@@ -344,21 +344,9 @@ class ApparatusFunction(Result, ApparatusData):
                     cure="Interpolate it to even positions.",
                 )
             self._require_fine(step)
-            reach = int(max(np.abs(getattr(g, name)).max() / step, 1))
-            offsets.append(step * np.arange(-reach, reach + 1))
         edge = max(float(np.abs(stress[[0, -1]]).max()), float(np.abs(stress[:, [0, -1]]).max()))
         self._require_decayed(edge, float(np.abs(stress).max()), "the edge of the field")
-        outside = [(abs(o) > abs(a).max()) for o, a in zip(offsets, (g.x, g.y), strict=True)]
-        kernel = RectBivariateSpline(g.y, g.x, g.g)(offsets[1], offsets[0])
-        kernel[outside[1]] = 0.0
-        kernel[:, outside[0]] = 0.0
-        cell = float((offsets[0][1] - offsets[0][0]) * (offsets[1][1] - offsets[1][0]))
-        # The kernel has its zero in the middle, and may be larger than the field.
-        first_y = len(kernel) // 2
-        first_x = kernel.shape[-1] // 2
-        last_y = first_y + len(stress)
-        last_x = first_x + stress.shape[1]
-        return fftconvolve(stress, kernel)[first_y:last_y, first_x:last_x] * cell
+        return stress
 
     def _require_fine(self, step: float) -> None:
         """Refuse a stress whose step (m) does not resolve G."""
@@ -426,6 +414,27 @@ class ApparatusFunction(Result, ApparatusData):
         """Nodes for a stress out to ``reach`` (m): G is zero beyond the last one of its grid."""
         last = float(self.transfer.k[-1])
         return Wavenumbers.covering(last, reach + float(self.radial_profile.r[-1]))
+
+
+def _step(axis: ArrayLike) -> float:
+    """Mean step of positions."""
+    return float(np.ptp(axis)) / max(np.size(axis) - 1, 1)
+
+
+def _convolved(x: ArrayLike, y: ArrayLike, stress: FloatArray, g: ApparatusField) -> FloatArray:
+    """Convolve a field with a kernel over the plane, on the field's own lattice."""
+    from scipy.interpolate import RectBivariateSpline
+    from scipy.signal import fftconvolve
+
+    offsets = []
+    cell = 1.0
+    for axis, own in ((x, g.x), (y, g.y)):
+        step = _step(axis)
+        reach = int(np.abs(own).max() / step)
+        offsets.append(step * np.arange(-reach, reach + 1))
+        cell *= step
+    kernel = RectBivariateSpline(g.y, g.x, g.g)(offsets[1], offsets[0])
+    return fftconvolve(stress, kernel, mode="same") * cell
 
 
 def load_apparatus(path: str | PathLike[str], *, accept_altered: bool = False) -> ApparatusFunction:
